@@ -83,6 +83,14 @@ def test_an_archive_holds_what_its_folder_holds(one, tmp_path, suffix):
             np.testing.assert_array_equal(a[name], b[name])
 
 
+def test_an_archive_whose_first_text_is_a_read_me_is_recognised(tmp_path, make_log):
+    path = tmp_path / "set.tar"
+    with tarfile.open(path, "w") as tar:
+        tar.addfile(*member("set/ReadME.txt", b"This is a roll of 0 degrees\n"))
+        tar.addfile(*member("set/000.TXT", make_log(seconds=1).text().encode()))
+    assert IMPORTER.recognises(path)
+
+
 def member(name: str, content: bytes = b"%x\n", **attributes) -> tuple[tarfile.TarInfo, io.BytesIO]:
     info = tarfile.TarInfo(name)
     info.size = len(content)
