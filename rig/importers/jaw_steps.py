@@ -154,7 +154,7 @@ def _segmented(means: FloatArray, shares: FloatArray) -> FloatArray:
             left = count - free - 2 * len(trial)
             if left < 2:
                 continue
-            found = np.linalg.lstsq(gram[np.ix_(trial, trial)], cross[trial], rcond=None)[0]
+            found = np.asarray(np.linalg.lstsq(gram[np.ix_(trial, trial)], cross[trial])[0])
             squares = max(float(rest @ rest - found @ cross[trial]), LEAST_RAD2)
             # what the levels have taken is no evidence; a cut costs its place and its height
             gain = left * np.log(cost / squares) - 2 * len(more) * np.log(count)
