@@ -143,8 +143,7 @@ def _adapted(label: str, source: BankEstimator, runs: Sequence[RunEvidence], cou
     at_random = [draw.choice(len(runs), count, replace=False) for _ in range(len(runs))]
     choices = [np.array([k]) for k in range(len(runs))] if count == 1 else at_random
     scored = [
-        _on_others(source, runs, choice)
-        for choice in [np.array(spread_out(source, runs, count)), *choices]
+        _on_others(source, runs, choice) for choice in [np.array(spread_out(runs, count)), *choices]
     ]
     errors = [np.sqrt(np.mean([run.square for run in part])) for part in scored]
     ratio = float(errors[0] / np.median(errors[1:]))
@@ -168,9 +167,10 @@ class _Run:
 
 
 def _on_run(fitted: BankEstimator, run: RunEvidence) -> _Run:
-    assert fitted.interval is not None  # noqa: S101  enough runs were fitted
     error = run.design @ fitted.weights - run.truth
-    width = fitted.interval.half_width(run.design, run.places)
+    width = np.full(len(error), np.nan)
+    if fitted.interval is not None:
+        width = fitted.interval.half_width(run.design, run.places)
     stated = np.isfinite(width)
     return _Run(
         float(np.mean(error**2)),
