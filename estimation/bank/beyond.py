@@ -8,7 +8,8 @@ variance left of a Gaussian process with unit variance after one observation of 
 What a score costs is measured, not assumed: levels at the edge of a condition are left out in turn,
 and their errors beyond the usual ones, over their scores beyond the usual one, are the variance per
 score. Few levels can be left out, so its quantile is Student's. It is added to the square of half
-the interval's width; beyond the grid, opening or at rest, the width is not known.
+the interval's width; beyond the grid, opening or at rest, the width is not known. The grid ends
+where runs had no angle or pose: a polynomial carried there has errors that no score foretells.
 
 Source: C. E. Rasmussen, C. K. I. Williams, "Gaussian Processes for Machine Learning" (2006),
 equation 2.26, with places visited by n runs observed with noise variance 1 / n.

@@ -222,8 +222,9 @@ def _interval(
         others = [j for j in range(len(runs)) if j != k]
         wide = with_scores(source, visits.scores(np.array(others)).values)
         error = run.design @ pulled([runs[j] for j in others]) - run.truth
-        one_sigma = wide.half_width(run.design, run.places) / NORMAL_95
-        ratios.append(np.nanmean((error / one_sigma) ** 2))
+        square = (NORMAL_95 * error / wide.half_width(run.design, run.places)) ** 2
+        if np.isfinite(square).any():
+            ratios.append(np.nanmean(square))
     return scaled(found, max(float(np.mean(ratios)), 1.0) ** 0.5) if ratios else found
 
 
