@@ -114,11 +114,9 @@ def _only(found: Sequence["IndexedCampaign"]) -> "IndexedCampaign":
 
 
 def _diagnose(folder: Path) -> None:
-    from rig.campaigns.index import DIAGNOSIS
     from rig.cli.diagnose import diagnose
 
-    out = folder / DIAGNOSIS
-    diagnose(folder, report=out.parent, json_out=out)
+    diagnose(folder)
 
 
 def _open(campaign: "IndexedCampaign") -> None:
@@ -131,8 +129,7 @@ def _open(campaign: "IndexedCampaign") -> None:
     if not page.is_file():
         raise UsageError(
             f"{campaign.folder} has no page of a diagnosis.",
-            fix=f"Make it: rig diagnose {campaign.folder} --report {page.parent} --json-out"
-            f" {campaign.folder / DIAGNOSIS}, or this command with --diagnose for --open.",
+            fix=f"Make it: rig diagnose {campaign.folder}",
         )
     results(json=False).print(str(page))
     webbrowser.open(page.resolve().as_uri())

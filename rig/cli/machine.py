@@ -55,7 +55,7 @@ def check(
     ] = None,
     json_: JsonFlag = False,
 ) -> int:
-    """Check which equations can be written, what each identifies, and what would be needed.
+    """Check what can be identified of a machine, and what would be needed.
 
     With DATA each equation is also fitted. Exit code 1 where one cannot be, where recordings
     contradict the file, or where nothing can be identified.

@@ -202,8 +202,8 @@ def zhao(
     steps = (3 + seeds) * len(FAMILIES) + seeds  # three diagnoses a family, and haptics
     with resumable(state, "zhao", steps, workers, "graspers") as keeper:
         study = run_study(prototype, seeds, spread, keeper)
-        added = study.lacking[OWN, "grasp"].terms
-        haptics = haptics_of(prototype, seeds, spread, added, keeper)
+        model = study.lacking[OWN, "grasp"].model
+        haptics = haptics_of(prototype, seeds, spread, model, keeper)
     drawn = shown.write_figures(figures, study, haptics) if figures is not None else []
 
     def markdown() -> str:
