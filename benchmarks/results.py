@@ -186,6 +186,13 @@ PAGES = (
         f"rig/studies/zhang {_ARM}",
         30,
     ),
+    Page(
+        "zhao",
+        "rig study zhao --seeds 2 --state {state} --out docs/results/zhao.md"
+        " --figures docs/figures",
+        f"rig/studies/zhao rig/grasper {_DIAGNOSIS}",
+        6,
+    ),
 )
 
 

@@ -61,6 +61,11 @@ def default_folder(environment: Mapping[str, str] = os.environ) -> Path:
     return (Path(base) if base else Path.home() / ".config") / "rig" / "calibrations"
 
 
+def simulated_folder(folder: Path) -> Path:
+    """Return the separate folder of a simulated rig's calibrations, next to the real ones."""
+    return folder.with_name(f"{folder.name}-simulated")
+
+
 class CalibrationStore:
     """Records and choices in a folder, which is made at the first record."""
 

@@ -24,6 +24,18 @@ from rig.log.writer import PART_SUFFIX, LogWriter
 KIND = "calibration"
 
 
+def require_absent(folder: Path) -> None:
+    """Refuse a folder that exists.
+
+    Raises:
+        UsageError: It does.
+    """
+    if folder.exists():
+        raise UsageError(
+            f"{folder} is there already.", "Nothing recorded is ever overwritten.", "Name another."
+        )
+
+
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
     """Yield a folder to write to that gets its name when the block ends well, and is gone if not.
@@ -31,10 +43,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
     Raises:
         UsageError: There is something of that name already.
     """
-    if folder.exists():
-        raise UsageError(
-            f"{folder} is there already.", "Nothing recorded is ever overwritten.", "Name another."
-        )
+    require_absent(folder)
     part = folder.with_name(f".{folder.name}{PART_SUFFIX}")
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)

@@ -1,5 +1,6 @@
 """What a guided calibration shows a person: each step's reading, and the result in words."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -71,7 +72,9 @@ def _moving(steps: Sequence[Step]) -> str:
 
 def with_unit(value: float, unit: str) -> str:
     """Return a number with its unit, in thousandths or millionths where that reads better."""
-    if unit in ("", "1", "counts"):
+    if unit == "kg":
+        return f"{value * 1e3:.4g} g"
+    if unit in ("", "1") or unit.startswith("counts"):
         return f"{value:.4g} {unit.removeprefix('1')}".strip()
     size = abs(value)
     factor, prefix = next((p for p in PREFIXES if size >= p[0]), PREFIXES[-1 if size else 0])
@@ -98,6 +101,17 @@ def parameter_texts(result: Result | CalibrationRecord) -> dict[str, str]:
     return texts
 
 
+MAIN = ("slope", "torque_constant_n_m_a", "gain_a", "stiffness_n_m_rad", "ratio", "mass_kg", "c1")
+"""Gain or scale of each form of a fit."""
+
+
+def main_parameter(record: CalibrationRecord) -> str:
+    """Return the name and text of a record's gain or scale; empty if it has no parameter."""
+    texts = parameter_texts(record)
+    name = next((name for name in MAIN if name in texts), next(iter(texts), ""))
+    return f"{name} {texts[name]}" if texts else ""
+
+
 def parameter_unit(name: str, result: Result | CalibrationRecord) -> str:
     """Return the unit of a parameter: of a line's slope and zero from what it reads and gives."""
     if name == "slope":
@@ -105,10 +119,18 @@ def parameter_unit(name: str, result: Result | CalibrationRecord) -> str:
         return f"{_unit(result.channel)} a {read}"
     if name == "zero":
         return _unit(result.input) or "counts"
+    if power := re.fullmatch(r"c(\d+)", name):
+        exponent, read = int(power[1]), _unit(result.input)
+        below = f"/{read}^{exponent}" if exponent > 1 else f"/{read}"
+        return _unit(result.channel) + (below if exponent and read else "")
     return _unit(name)
 
 
 def _unit(name: str) -> str:
+    if name == "contact_wrench":  # its residual is that of the forces
+        return "N"
+    if name.startswith("counts_per_"):
+        return f"counts/{_unit(name.removeprefix('counts_'))}"
     try:
         return unit_of(name)
     except UnknownUnitError:

@@ -14,12 +14,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-LAYOUT = 1
+LAYOUT = 2
 """Version of the tables; an index of another one is built again."""
 
 ENDINGS = (".mcap", ".mcap.part")
 DIAGNOSIS = Path("diagnosis") / "diagnosis.json"
 """Where a campaign's folder holds its latest diagnosis."""
+
+CALIBRATION = "calibration of"
+"""How the protocol of a calibration's raw logs begins."""
 
 TABLES = f"""
 PRAGMA user_version = {LAYOUT};
@@ -39,7 +42,7 @@ class IndexedRun:
         rig: Name of the rig.
         instrument: Identity of the instrument in words.
         date: When it was started, ISO 8601, UTC; empty if not recorded.
-        protocol: Name of the protocol.
+        protocol: Name of the protocol, or the calibration whose raw log it is.
         conditions: Name with unit to value.
         notes: Operator's notes.
         state: `complete`, or what is wrong with the log.
@@ -78,6 +81,11 @@ class IndexedCampaign:
     runs: tuple[IndexedRun, ...]
     diagnosis: Mapping[str, Any] | None
 
+    @property
+    def is_calibration(self) -> bool:
+        """Whether these are the raw logs of a calibration."""
+        return any(run.protocol.startswith(CALIBRATION) for run in self.runs)
+
 
 def default_index(root: Path) -> Path:
     """Return the index file of a folder of campaigns, in the person's cache."""
@@ -101,10 +109,12 @@ def campaigns(
         rebuild: Read every log again.
         on_folder: Called with each folder that is read.
 
-    Raises:
-        OSError: The index cannot be written.
+    Where the index cannot be written, it is made for this call alone, in memory.
     """
-    index.parent.mkdir(parents=True, exist_ok=True)
+    with suppress(OSError):
+        index.parent.mkdir(parents=True, exist_ok=True)
+    if not os.access(index if index.exists() else index.parent, os.W_OK):
+        return _up_to_date(root, Path(":memory:"), on_folder)
     if rebuild:
         index.unlink(missing_ok=True)
     try:

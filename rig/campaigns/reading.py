@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from rig.campaigns.index import IndexedRun
+from rig.campaigns.index import CALIBRATION, IndexedRun
 from rig.log.attempts import heads_of, is_unfinished, run_name, standing
 from rig.log.reader import LogFile
 from rig.log.scan import NotALogError
@@ -39,7 +39,7 @@ def _indexed(log: LogFile) -> IndexedRun:
         rig=run.rig if run else "",
         instrument=instrument,
         date=_date(run.started_at_ns) if run else "",
-        protocol=str(conditions.get("protocol", "")),
+        protocol=_protocol(log),
         conditions=conditions,
         notes=run.notes if run else "",
         state=_state(log),
@@ -48,6 +48,15 @@ def _indexed(log: LogFile) -> IndexedRun:
         duration_s=run.duration_s if run else None,
         excluded=(run.excluded if run else None) or (end.excluded if end else None) or "",
     )
+
+
+def _protocol(log: LogFile) -> str:
+    """Return the protocol of a run, or the calibration whose raw log it is."""
+    if log.run is None:
+        return ""
+    if kind := log.run.details.get("calibration"):
+        return f"{CALIBRATION} {kind}"
+    return str(log.run.conditions.get("protocol", ""))
 
 
 def _state(log: LogFile) -> str:

@@ -25,7 +25,9 @@ cal_app = typer.Typer(
 StoreOption = Annotated[
     Path | None,
     typer.Option(
-        "--store", help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations."
+        "--store",
+        help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations; what is not"
+        " there is searched in NAME-simulated, the folder of the simulated rig.",
     ),
 ]
 Hash = Annotated[str, typer.Argument(help="Hash of a record, or its beginning.")]
@@ -90,32 +92,31 @@ def add(
 @cal_app.command("list")
 def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
     """List every record, oldest first; the active ones are marked."""
-    from rig.calibrate.shown import parameter_texts
+    from rig.calibrate.shown import main_parameter
 
-    kept = _store(store)
-    active = {record.content_hash for record in kept.active().values()}
-    records = kept.records()
     screen = results(json)
-    screen.print(f"Store {kept.folder}", markup=False)
-    for r in records:  # lines, not a table: a terminal would cut the hashes off
-        mark = "*" if r.content_hash in active else " "
-        whom = f", instrument {r.instrument}" if r.instrument else ""
-        made = f"{r.kind}, {r.made:%Y-%m-%d %H:%M} by {r.operator}{whom}"
-        name, value = next(iter(parameter_texts(r).items()), ("", ""))
-        screen.print(f"{mark} {r.content_hash}  {r.channel}  {made}: {name} {value}", markup=False)
+    listed: list[dict[str, Any]] = []
+    for kept in _stores(store):
+        active = {record.content_hash for record in kept.active().values()}
+        if not (records := kept.records()):
+            continue
+        screen.print(f"Store {kept.folder}", markup=False)
+        for r in records:  # lines, not a table: a terminal would cut the hashes off
+            mark = "*" if r.content_hash in active else " "
+            whom = f", instrument {r.instrument}" if r.instrument else ""
+            made = f"{r.kind}, {r.made:%Y-%m-%d %H:%M} by {r.operator}{whom}"
+            line = f"{mark} {r.content_hash}  {r.channel}  {made}: {main_parameter(r)}"
+            screen.print(line, markup=False)
+            is_active = r.content_hash in active
+            listed.append(_summary(r) | {"active": is_active, "store": kept.folder})
     screen.print(
         "* active"
-        if records
+        if listed
         else "No records yet. `rig calibrate` makes one, `rig cal add` takes a certificate."
     )
     if json:
-        emit_json(
-            {
-                "store": kept.folder,
-                "records": [_summary(r) | {"active": r.content_hash in active} for r in records],
-                "choices": kept.choices(),
-            }
-        )
+        kept = _store(store)
+        emit_json({"store": kept.folder, "records": listed, "choices": kept.choices()})
 
 
 @cal_app.command()
@@ -129,7 +130,7 @@ def show(
     from estimation.files import write_text_atomic
     from rig.errors import UsageError
 
-    found = _store(store).get(record)
+    found = _holding(record, store).get(record)
     for name, value in _in_words(found).items():
         results(json).print(f"{name}: {value}", markup=False)
     if figure is not None:
@@ -144,8 +145,7 @@ def show(
 @cal_app.command()
 def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = False) -> None:
     """Show what differs between two records."""
-    kept = _store(store)
-    a, b = kept.get(first), kept.get(second)
+    a, b = (_holding(start, store).get(start) for start in (first, second))
     left, right = _flat(a), _flat(b)
     changes = {
         name: {"first": left.get(name), "second": right.get(name)}
@@ -171,7 +171,7 @@ def use(
     json: JsonFlag = False,
 ) -> None:
     """Make a record the active one of its kind, channel and instrument."""
-    kept = _store(store)
+    kept = _holding(record, store)
     before = kept.active()
     chosen = kept.use(record, _now(), by)
     old = before.get(chosen.key)
@@ -241,7 +241,7 @@ def diagnose(
     from rig.diagnosis.subject import of_calibration
     from rig.reports.diagnosis_words import sentences
 
-    asked = of_calibration(declared_by_record(_store(store).get(record)))
+    asked = of_calibration(declared_by_record(_holding(record, store).get(record)))
     looks = Ledger(ledger or default_ledger())
     with stages() as on_stage:
         done = run_diagnosis(asked.campaign, asked.models, looks, seed=seed, on_stage=on_stage)
@@ -273,6 +273,22 @@ def _store(folder: Path | None, settings: "Config | None" = None) -> "Calibratio
     if folder is None and settings is not None:
         return settings.store or settings.default_store
     return CalibrationStore(folder or default_folder())
+
+
+def _stores(folder: Path | None) -> "list[CalibrationStore]":
+    """Return the named store; with none the real rig's and the simulated rig's."""
+    from calibration.store import CalibrationStore, simulated_folder
+
+    kept = _store(folder)
+    return [kept] if folder else [kept, CalibrationStore(simulated_folder(kept.folder))]
+
+
+def _holding(start: str, folder: Path | None) -> "CalibrationStore":
+    """Return the store that has a record of this hash; the first one where none has."""
+    first, *more = _stores(folder)
+    holds = (s for s in more if any(r.content_hash.startswith(start) for r in s.records()))
+    known = any(r.content_hash.startswith(start) for r in first.records())
+    return first if known else next(holds, first)
 
 
 def _now() -> str:

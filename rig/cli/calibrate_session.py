@@ -49,6 +49,11 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
         )
     if how.seed is not None:
         settings = settings.changed(simulation={"seed": how.seed})
+    own = settings.store or settings.default_store
+    store = CalibrationStore(how.store) if how.store else own
+    folder = (
+        how.out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-calibrate-{procedure.kind}"
+    )
     if how.raw is not None:
         kind, measurements, lines = read_raw(how.raw)
         if kind != procedure.kind:
@@ -59,12 +64,8 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
         for line in announced(procedure):
             remarks().print(line, markup=False)
         lines = settings.calibration_set()
+        _refuse_unkept(store, folder)
         measurements = _measure(procedure, settings, how)
-    own = settings.store or settings.default_store
-    store = CalibrationStore(how.store) if how.store else own
-    folder = (
-        how.out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-calibrate-{procedure.kind}"
-    )
     signature = Signature(
         operator=how.operator,
         days=how.days,
@@ -78,6 +79,40 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
         for digest in kept.records:
             store.use(digest, _now(), how.operator)
     _show(kept, how, store, page)
+    if settings.store is None or settings.store.folder != store.folder:
+        results(how.json).print(
+            f"Sessions of {settings.name} take no record from this store. To change that, write"
+            f' calibration_store = "{_name_of(store)}" in its configuration.',
+            markup=False,
+        )
+
+
+def _name_of(store: "CalibrationStore") -> str:
+    """Return the name of a store in a configuration."""
+    from calibration.store import default_folder
+
+    return "default" if store.folder == default_folder() else str(store.folder.resolve())
+
+
+def _refuse_unkept(store: "CalibrationStore", folder: Path) -> None:
+    """Refuse, before anything is measured, a result or raw logs that could not be written.
+
+    Raises:
+        UsageError: The folder of the raw logs is there already.
+        OutputError: A folder cannot be written.
+    """
+    from os import W_OK, access
+
+    from estimation.files import OutputError
+    from rig.calibrate.raw import require_absent
+
+    require_absent(folder)
+    for place in (store.folder.absolute(), folder.absolute()):
+        there = next(above for above in (place, *place.parents) if above.exists())
+        if not there.is_dir() or not access(there, W_OK):
+            raise OutputError(
+                f"{place} cannot be written.", f"See {there}.", "Name another folder."
+            )
 
 
 def _refuse_idle_force_sensor(procedure: "Procedure", settings: "Config", how: "Keeping") -> None:

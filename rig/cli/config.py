@@ -48,7 +48,7 @@ def init(
     from difflib import get_close_matches
 
     from estimation.files import write_text_atomic
-    from rig.configuration.config import SHIPPED
+    from rig.configuration.config import SHIPPED, load_config
     from rig.doctor.ports import serial_ports
     from rig.errors import UsageError
 
@@ -64,6 +64,11 @@ def init(
     text = (SHIPPED / f"{like}.toml").read_text()
     if len(boards) == 1:
         text = text.replace(f'"usb:{TEENSY}"', f'"usb:{boards[0].usb}"')
+    if not load_config(Path(like)).is_simulated:
+        line = 'calibration = "reference"\n'
+        text = text.replace(
+            line, line + 'calibration_store = "default"  # what `rig cal use` chose\n'
+        )
     write_text_atomic(out, text)
     screen = results(json)
     found = ", ".join(f"{board.path} (usb:{board.usb})" for board in boards)

@@ -52,7 +52,10 @@ def _told(result: "Demo") -> list[str]:
 
     lines = [f"{len(result.runs)} runs, {sum(r.samples for r in result.runs)} samples."]
     if not result.firmware:
-        lines.append("Left out: the firmware core in the loop (no C++ compiler; apt install g++).")
+        lines.append(
+            "The simulated board was the plain one. The compiled firmware takes its place in a"
+            " checkout of the sources, after make -C firmware."
+        )
     logs = result.folder / "logs"
     return [
         *lines,

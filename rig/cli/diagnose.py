@@ -25,7 +25,10 @@ def diagnose(
     json_out: Annotated[
         Path | None, typer.Option("--json-out", help="File for the diagnosis as JSON.")
     ] = None,
-    report: Annotated[Path | None, typer.Option(help="Folder of the HTML report.")] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the HTML report; of a folder of logs, diagnosis in it."),
+    ] = None,
     model_out: Annotated[
         Path | None, typer.Option(help="File of the models with the identified effects.")
     ] = None,
@@ -77,7 +80,9 @@ def diagnose(
     from rig.reports.diagnosis import page
     from rig.reports.diagnosis_words import sentences
 
-    page_file = report / "diagnosis.html" if report else None
+    kept = _kept_with(path)
+    page_file = report / "diagnosis.html" if report else kept and kept.with_suffix(".html")
+    json_out = json_out or kept
     outputs = {json_out: DIAGNOSIS, page_file: HTML, model_out: MODEL, protocol_out: PROTOCOL}
     for output, kind in outputs.items():
         check_output(output, kind)
@@ -119,6 +124,26 @@ def diagnose(
         screen.print(line, markup=False)
     if json_:
         emit_json(done.diagnosis.to_json())
+
+
+def _kept_with(path: Path) -> Path | None:
+    """Return the file of a campaign's diagnosis in its folder; None where it cannot be kept."""
+    from estimation.file_kinds import DIAGNOSIS as KIND
+    from estimation.file_kinds import HTML
+    from estimation.files import OutputError, check_output
+    from rig.campaigns.index import DIAGNOSIS
+    from rig.output.console import remarks
+
+    if not path.is_dir() or not any(path.glob("*.mcap")):
+        return None
+    kept = path / DIAGNOSIS
+    try:
+        check_output(kept, KIND)
+        check_output(kept.with_suffix(".html"), HTML)
+    except OutputError as error:
+        remarks().print(f"The page is not kept with the recordings: {error}", markup=False)
+        return None
+    return kept
 
 
 def _plan(

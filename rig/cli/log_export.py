@@ -24,7 +24,8 @@ def export(
     ] = "csv",
     topic: Annotated[str | None, typer.Option(help="Only this topic.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File with --topic, else folder; by default by the log.")
+        Path | None,
+        typer.Option("--out", "-o", help="File with --topic, else folder; by default by the log."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
     calibration: Annotated[

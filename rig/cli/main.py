@@ -136,6 +136,21 @@ def main(arguments: list[str] | None = None) -> int:
     return int(result) if isinstance(result, int) else 0
 
 
+def _of_the_computer(error: OSError) -> Exception:
+    """Return the refusal of a file by the computer in words, else the error itself."""
+    from errno import EACCES, EDQUOT, EIO, EISDIR, ENOSPC, ENOTDIR, EPERM, EROFS
+
+    from estimation.files import OutputError
+
+    if error.errno not in (EACCES, EDQUOT, EIO, EISDIR, ENOSPC, ENOTDIR, EPERM, EROFS):
+        return error
+    return OutputError(
+        f"{error.filename or 'A file'} cannot be read or written.",
+        error.strerror or "",
+        "Name another file or folder, or free some space.",
+    )
+
+
 def _report(error: Exception, words: list[str]) -> int:
     """Write an error for people to stderr, for machines to stdout, and return its exit code."""
     from rig.errors import KNOWN_ERRORS, PAGE, ExitCode, anchor_of, exit_code_of
@@ -148,6 +163,8 @@ def _report(error: Exception, words: list[str]) -> int:
         # a word on the command line that typer itself refused
         getattr(error, "show", lambda **_: None)(file=sys.stderr)
         return int(ExitCode.USAGE)
+    if "--debug" not in words and isinstance(error, OSError):
+        error = _of_the_computer(error)
     if "--debug" in words or not isinstance(error, KNOWN_ERRORS):
         import traceback
 

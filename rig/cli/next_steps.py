@@ -96,11 +96,11 @@ def of_recordings(root: Path, record: str) -> Iterator[Step]:
         yield Step(f"There is no recording in {root}.", record)
         return
     yield Step(f"{len(found)} recorded campaigns in {root}.", "rig campaigns")
-    yield _of_campaign(found[0])
+    recorded = [one for one in found if not one.is_calibration]
+    yield _of_campaign(recorded[0]) if recorded else Step("They are all calibrations.", record)
 
 
 def _of_campaign(newest: "IndexedCampaign") -> Step:
-    from rig.campaigns.index import DIAGNOSIS
     from rig.campaigns.search import families, verdict
 
     folder = newest.folder
@@ -109,10 +109,6 @@ def _of_campaign(newest: "IndexedCampaign") -> Step:
         state = f"The newest, {folder}: {len(broken)} of {len(newest.runs)} runs not complete."
         return Step(state, f"rig log check {folder}")
     if newest.diagnosis is None:
-        out = folder / DIAGNOSIS
-        return Step(
-            f"The newest, {folder}, is not diagnosed.",
-            f"rig diagnose {folder} --report {out.parent} --json-out {out}",
-        )
+        return Step(f"The newest, {folder}, is not diagnosed.", f"rig diagnose {folder}")
     said = ", ".join([verdict(newest).replace("_", " "), *families(newest)])
     return Step(f"The newest, {folder}: {said}.", f"rig campaigns --open --root {folder}")

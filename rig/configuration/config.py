@@ -18,7 +18,13 @@ from pydantic import (
 
 from calibration.linear import CalibrationSet, load_calibration_set, shipped_calibration_set
 from calibration.rules import Verdict, judge, judge_raw, refuse_errors
-from calibration.store import CalibrationStore, active_lines, compose, default_folder
+from calibration.store import (
+    CalibrationStore,
+    active_lines,
+    compose,
+    default_folder,
+    simulated_folder,
+)
 from rig.configuration.machine_settings import (
     DriftSection,
     LimitsSection,
@@ -154,9 +160,7 @@ class Config(Section):
         Calibrations of a simulated rig are stored separately from the real ones.
         """
         folder = default_folder()
-        if self.is_simulated:
-            folder = folder.with_name(f"{folder.name}-simulated")
-        return CalibrationStore(folder)
+        return CalibrationStore(simulated_folder(folder) if self.is_simulated else folder)
 
     def calibration_set(self) -> CalibrationSet:
         """Return the calibrations in use: the set, with the store's active lines in place of its.

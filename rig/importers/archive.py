@@ -5,6 +5,7 @@ import shutil
 import tarfile
 import tempfile
 import zlib
+from collections.abc import Iterator
 from functools import lru_cache
 from lzma import LZMAError
 from pathlib import Path, PurePosixPath
@@ -23,19 +24,18 @@ def is_archive(path: Path) -> bool:
     return path.is_file() and path.name.lower().endswith(SUFFIXES)
 
 
-def first_text(path: Path, size: int = 4096, members: int = 64) -> bytes:
-    """Return the first bytes of the first `.txt` member, or b"" where none is near the front."""
+def first_texts(path: Path, size: int = 4096, members: int = 64) -> Iterator[bytes]:
+    """Yield the first bytes of each `.txt` file among the first members; damage ends it."""
     try:
         with tarfile.open(path, "r|*") as archive:
             for _, member in zip(range(members), archive, strict=False):
                 if member.size > MAX_MEMBER_BYTES:
-                    return b""
+                    return
                 if member.isfile() and member.name.lower().endswith(".txt"):
                     content = archive.extractfile(member)
-                    return content.read(size) if content else b""
+                    yield content.read(size) if content else b""
     except _DAMAGE:
-        return b""
-    return b""
+        return
 
 
 def unpack_text(path: Path) -> Path:

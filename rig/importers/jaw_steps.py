@@ -1,10 +1,10 @@
 """Find steps of the jaw's zero between the runs of a campaign, and count them out.
 
 A cable that slips on its pulley, or a re-index, moves the zero of the jaw's encoder; every later
-run is off by the step. A single run does not show it. Runs under the same conditions do, since they
-should have the same mean angle of the jaw:
+run is off by the step. A single run does not show it. Runs that share conditions do: each level of
+a condition moves the mean angle of the jaw by as much in every run,
 
-    mean angle of run k = level of its conditions + zero of its segment.
+    mean angle of run k = sum over conditions of the level's share + zero of its segment.
 
 Segments of consecutive runs are found by binary segmentation with the Bayesian information
 criterion (J. Bai, P. Perron, "Estimating and testing linear models with multiple structural
@@ -18,7 +18,6 @@ from functools import partial
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.campaign import Campaign, Run
 from estimation.recording import FloatArray, Recording
@@ -26,6 +25,7 @@ from estimation.recording import FloatArray, Recording
 JAW = "jaw_angle_rad"
 STEP_LIMIT_RAD = float(np.deg2rad(0.3))
 """On the reference rig, equal runs repeat within 0.22 deg and steps are 0.35 to 0.63 deg."""
+LEAST_RAD2 = 1e-18
 ALIKE = {
     "load_command_a": 0.01,
     "jaw_stop_index": 1.0,
@@ -34,7 +34,7 @@ ALIKE = {
     "wrist_roll_rad": 0.01,
     "wrist_pitch_rad": 0.01,
 }
-"""Conditions under which the jaw's mean angle repeats, and how closely they must agree."""
+"""Conditions that move the jaw's mean angle, and how closely equal levels must agree."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,11 +81,11 @@ class JawZeros:
 
 
 def jaw_zeros(campaign: Campaign) -> JawZeros:
-    """Find the jaw's zero in every run by comparing runs under the same conditions.
+    """Find the jaw's zero in every run by comparing runs that share conditions.
 
-    The load stretches the cable and so moves the jaw by degrees; only runs of the same load, wrist,
-    trajectory and instrument are compared. Flagged samples are left out. One run is held at a time.
-    A campaign that repeats no condition shows no step.
+    The load stretches the cable and so moves the jaw by degrees; the share of each load, wrist,
+    trajectory and instrument is fitted with the zeros. Flagged samples are left out. One run is
+    held at a time. A campaign with as many levels as runs shows no step.
 
     Args:
         campaign: Runs with `jaw_angle_rad`, in the order they were taken.
@@ -93,17 +93,15 @@ def jaw_zeros(campaign: Campaign) -> JawZeros:
     Raises:
         MissingChannelError: A run has no `jaw_angle_rad`.
     """
-    names, means, keys = [], [], []
+    names, means, levels = [], [], []
     for recording in campaign.evidence:
         if recording.valid.any():
             names.append(recording.name)
             means.append(float(recording[JAW][recording.valid].mean()))
-            keys.append(_alike(recording))
-    levels = {key: place for place, key in enumerate(dict.fromkeys(keys))}
-    if len(levels) == len(keys):
-        return JawZeros(tuple(names), np.zeros(len(names)))
-    level_of = np.array([levels[key] for key in keys])
-    zeros = _segmented(np.array(means), level_of)
+            levels.append(_levels(recording))
+    if not names:
+        return JawZeros((), np.zeros(0))
+    zeros = _segmented(np.array(means), _shares(levels))
     return JawZeros(tuple(names), zeros - zeros[-1])
 
 
@@ -134,44 +132,38 @@ def sentence(steps: Sequence[JawStep]) -> list[str]:
     ]
 
 
-def _segmented(means: FloatArray, level_of: NDArray[np.int_]) -> FloatArray:
-    """Return the zero of each run's segment, shape (runs,)."""
-    count = len(means)
-    free = int(level_of.max()) + 1
+def _segmented(means: FloatArray, shares: FloatArray) -> FloatArray:
+    """Return the zero of each run's segment, shape (runs,).
+
+    Args:
+        means: Mean angle of each run, shape (runs,).
+        shares: Independent columns of the conditions' levels, shape (runs, columns).
+    """
+    count, free = shares.shape
+    basis = np.linalg.qr(shares)[0]
+    after = np.tri(count, count - 1, -1)  # column k: the runs after a cut before run k + 1
+    own, rest = (part - basis @ (basis.T @ part) for part in (after, means))
+    gram, cross = own.T @ own, own.T @ rest
     cuts: list[int] = []
-    zeros, cost = _fitted(means, level_of, cuts)
+    steps, cost = np.zeros(0), float(rest @ rest)
     while True:
         best: tuple[float, list[int], FloatArray, float] | None = None
-        places = [place for place in range(1, count) if place not in cuts]
+        places = [place for place in range(count - 1) if place not in cuts]
         for more in [*((place,) for place in places), *combinations(places, 2)]:
             trial = sorted([*cuts, *more])
             left = count - free - 2 * len(trial)
             if left < 2:
                 continue
-            found, squares = _fitted(means, level_of, trial)
+            found = np.asarray(np.linalg.lstsq(gram[np.ix_(trial, trial)], cross[trial])[0])
+            squares = max(float(rest @ rest - found @ cross[trial]), LEAST_RAD2)
             # what the levels have taken is no evidence; a cut costs its place and its height
             gain = left * np.log(cost / squares) - 2 * len(more) * np.log(count)
-            steps = np.abs(np.diff(found)[np.array(trial) - 1])
-            if gain > 0 and steps.min() > STEP_LIMIT_RAD and (best is None or gain > best[0]):
+            large = np.abs(found).min() > STEP_LIMIT_RAD
+            if gain > 0 and large and (best is None or gain > best[0]):
                 best = float(gain), trial, found, squares
         if best is None:
-            return zeros
-        _, cuts, zeros, cost = best
-
-
-def _fitted(
-    means: FloatArray, level_of: NDArray[np.int_], cuts: Sequence[int]
-) -> tuple[FloatArray, float]:
-    """Fit levels and segments by least squares; return the zeros and the squares left."""
-    count, segments = len(means), np.searchsorted(cuts, np.arange(len(means)), "right")
-    table = np.zeros((count, int(level_of.max()) + 1 + len(cuts)))
-    table[np.arange(count), level_of] = 1.0
-    later = segments > 0
-    table[np.flatnonzero(later), level_of.max() + segments[later]] = 1.0
-    values = np.linalg.lstsq(table, means, rcond=None)[0]
-    left = means - table @ values
-    heights = np.concatenate([[0.0], values[int(level_of.max()) + 1 :]])
-    return heights[segments], max(float(left @ left), 1e-18)
+            return np.asarray(after[:, cuts] @ steps)
+        _, cuts, steps, cost = best
 
 
 def _shifted(run: Run, zero_rad: float) -> Recording:
@@ -179,9 +171,20 @@ def _shifted(run: Run, zero_rad: float) -> Recording:
     return recording.with_columns(**{JAW: recording[JAW] - zero_rad})
 
 
-def _alike(recording: Recording) -> tuple[object, ...]:
+def _levels(recording: Recording) -> tuple[object, ...]:
     parts: list[object] = [recording.instrument]
     for name, width in ALIKE.items():
         value = recording.conditions.get(name)
         parts.append(round(value / width) if isinstance(value, float) else value)
     return tuple(parts)
+
+
+def _shares(levels: Sequence[tuple[object, ...]]) -> FloatArray:
+    """Return independent columns of the levels of each condition, shape (runs, columns)."""
+    columns = [np.ones(len(levels))]
+    for one in zip(*levels, strict=True):
+        for level in list(dict.fromkeys(one))[1:]:
+            more = [*columns, np.array([float(other == level) for other in one])]
+            if np.linalg.matrix_rank(np.column_stack(more)) == len(more):
+                columns = more
+    return np.column_stack(columns)

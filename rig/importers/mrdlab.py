@@ -10,7 +10,7 @@ from pathlib import Path
 
 from estimation.campaign import Campaign, Run
 from rig.errors import DataError
-from rig.importers.archive import first_text, is_archive, unpack_text
+from rig.importers.archive import first_texts, is_archive, unpack_text
 from rig.importers.mrdlab_run import load_run
 from rig.importers.mrdlab_text import looks_like_log
 
@@ -30,7 +30,7 @@ class MrdlabImporter:
         if path.is_dir():
             return any(looks_like_log(_first_bytes(file)) for file in _texts(path))
         if is_archive(path):
-            return looks_like_log(first_text(path, FIRST_BYTES))
+            return any(map(looks_like_log, first_texts(path, FIRST_BYTES)))
         return _is_text(path) and looks_like_log(_first_bytes(path))
 
     def open(self, path: Path) -> Campaign:

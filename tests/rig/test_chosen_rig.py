@@ -106,7 +106,8 @@ def test_a_simulated_calibration_stays_out_of_the_real_store(home, capsys):
     assert main([*words, "-o", "raw"]) == 0
     assert not (home / "calibrations").exists()
     assert (home / "calibrations-simulated").is_dir()
-    hint = capsys.readouterr().out.splitlines()[-1]
+    lines = capsys.readouterr().out.splitlines()
+    (hint,) = [line for line in lines if line.startswith("Use it:")]
     assert main(hint.partition("rig ")[2].split()) == 0
 
 

@@ -40,6 +40,14 @@ def test_exit_codes(error, code):
     assert exit_code_of(error) == code
 
 
+def test_a_folder_that_cannot_be_made_is_no_fault_of_the_program(tmp_path, capsys):
+    (tmp_path / "file").write_text("no folder")
+    assert main(["record", "--sim", "-p", "quick", "-o", str(tmp_path / "file" / "a")]) == 2
+    said = capsys.readouterr().err
+    assert f"{tmp_path / 'file' / 'a'} cannot be read or written" in said
+    assert "Traceback" not in said
+
+
 def verbs(command, words=()):
     """Yield every verb of the command line and its options that take no value."""
     if not getattr(command, "commands", None):

@@ -102,6 +102,25 @@ def test_a_record_is_shown_with_units_and_spread(rig, tmp_path, capsys):
     assert "covariance" not in said
 
 
+def test_records_of_the_simulated_rig_are_listed_by_their_gains_and_found(
+    monkeypatch, tmp_path, capsys
+):
+    monkeypatch.setenv("RIG_CALIBRATIONS", str(tmp_path / "store"))
+    monkeypatch.chdir(tmp_path)
+    assert main(["calibrate", "current", "--sim", "--yes", "--operator", "Ada", "--use"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert f'calibration_store = "{tmp_path / "store-simulated"}"' in said
+    assert main(["cal", "list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].endswith("store-simulated")
+    constant, gain = sorted(lines[1:3], key=lambda line: "motor_current_a" in line)
+    assert re.search(r"SIM-TOOL-1: torque_constant_n_m_a 8\d\d\.\d mN m/A", constant)
+    assert re.search(r": gain_a 2\.\d+ A", gain)
+    assert main(["cal", "show", constant.split()[1]]) == 0
+    assert main(["cal", "use", constant.split()[1], "--by", "Ada"]) == 0
+    assert not (tmp_path / "store").exists()
+
+
 def test_a_log_beyond_the_calibrated_range_is_reported(rig, tmp_path):
     from dataclasses import replace
 

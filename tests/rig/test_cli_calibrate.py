@@ -11,6 +11,7 @@ import pytest
 
 from calibration.fsr_curve import ZHANG_2022
 from calibration.store import CalibrationStore
+from rig.calibrate.hands import SimulatedHands
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED
 from rig.importers.registry import open_campaign
@@ -44,6 +45,17 @@ def hidden(tmp_path, words):
     path = tmp_path / "hidden.toml"
     path.write_text(SIMULATED.read_text().replace("seed = 0", f"seed = 0\nhidden = {words}"))
     return str(path)
+
+
+@pytest.mark.parametrize("words", [("--out", "taken"), ("--store", "file/store")])
+def test_what_could_not_be_kept_is_refused_before_the_first_weight(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "file").write_text("no folder")
+    asked = []
+    monkeypatch.setattr(SimulatedHands, "prepare", lambda _, step: asked.append(step))
+    assert main(["calibrate", "torque", "--sim", "--yes", "--operator", "Ada", *words]) == 2
+    assert not asked
 
 
 def test_torque_from_weights_to_a_session_that_uses_it(calibrate, tmp_path, capsys):

@@ -73,6 +73,21 @@ def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
     assert "[spring.position]" in capsys.readouterr().out
 
 
+def test_a_folder_of_logs_keeps_its_diagnosis_with_them(tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "monday"
+    words = ["record", "--sim", "-p", "quick", "-o", str(folder), "--seed", "5"]
+    assert main(words) == 0
+    words = ["diagnose", str(folder), "--balance", "motor", "--quick"]
+    assert main([*words, "--ledger", str(tmp_path / "looks.jsonl")]) == 0
+    out = capsys.readouterr().out
+    page = folder / "diagnosis" / "diagnosis.html"
+    assert f"Report: {page}" in out.replace("\n", "")
+    assert page.read_text().startswith("<!DOCTYPE html>")
+    assert main(["campaigns", "--root", str(tmp_path), "--json"]) == 0
+    (campaign,) = json.loads(capsys.readouterr().out)["campaigns"]
+    assert campaign["diagnosis"]["verdict"]
+
+
 def test_every_equation_that_is_decided_goes_into_the_model_file(campaign, tmp_path):
     path = tmp_path / "found.model.toml"
     found = run(tmp_path, "--model-out", str(path), "--quick")

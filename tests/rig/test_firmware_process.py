@@ -1,6 +1,7 @@
 """The firmware as a process on a pseudo-terminal, in real time; asserted is its own clock."""
 
 import gc
+import json
 import os
 import signal
 import subprocess
@@ -16,7 +17,7 @@ from drivers.teensy.protocol import STATUS_ARMED, Trip
 from drivers.transport import open_transport
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
-from rig.configuration.config import load_config
+from rig.configuration.config import SHIPPED, load_config
 from rig.errors import SafetyTripError
 from rig.simulation.firmware_process import PROGRAM, FirmwareProcess
 
@@ -83,6 +84,30 @@ def test_a_host_that_is_killed_leaves_a_board_that_makes_itself_safe(
         board.terminate()
     assert report.code is Trip.HOST_SILENT
     assert 50_000 < report.late_us <= 52_000
+
+
+def test_a_second_program_on_the_port_is_refused_and_the_first_goes_on(
+    program: Path, tmp_path: Path
+) -> None:
+    rig = [sys.executable, "-m", "rig"]
+    with subprocess.Popen([str(program)], stdout=subprocess.PIPE, text=True) as board:
+        assert board.stdout is not None
+        path = board.stdout.readline().strip()
+        config = tmp_path / "rig.toml"
+        config.write_text((SHIPPED / "pty.toml").read_text().replace("sim://pty", path))
+        first = [*rig, "live", "-c", str(config), "--json"]
+        with subprocess.Popen(first, stdout=subprocess.PIPE, text=True) as live:
+            assert live.stdout is not None
+            live.stdout.readline()
+            second = [*rig, "record", "-c", str(config), "-p", "quick", "-o", str(tmp_path / "a")]
+            refused = subprocess.run(second, capture_output=True, text=True, check=False)
+            later = [json.loads(live.stdout.readline()) for _ in range(5)]
+            live.send_signal(signal.SIGINT)
+        board.terminate()
+    assert refused.returncode == 3
+    assert f"{path} is in use" in refused.stderr
+    assert f"PID {live.pid}" in refused.stderr
+    assert [one["lost"] for one in later] == [0] * 5
 
 
 def test_a_process_that_dies_is_a_lost_link(program: Path) -> None:

@@ -65,11 +65,21 @@ def test_the_newest_recording_decides_what_to_do_with_it(empty, capsys, state):
     if state == "diagnosed":
         diagnosed(folder)
     expected = {
-        "undiagnosed": "rig diagnose logs/monday --report",
+        "undiagnosed": "rig diagnose logs/monday\n",
         "lossy": "rig log check logs/monday",
         "diagnosed": "identified, ripple.motor",
     }
     assert expected[state] in said(capsys)
+
+
+def test_the_raw_logs_of_a_calibration_are_no_recording_to_diagnose(empty, capsys):
+    words = ["--sim", "--yes", "--operator", "Ada", "--out", "logs/a"]
+    assert main(["calibrate", "gearbox", *words]) == 0
+    capsys.readouterr()
+    assert "rig record --sim" in said(capsys)
+    assert main(["campaigns", "--json"]) == 0
+    (campaign,) = json.loads(capsys.readouterr().out)["campaigns"]
+    assert {run["protocol"] for run in campaign["runs"]} == {"calibration of gearbox"}
 
 
 def error_classes():

@@ -15,7 +15,7 @@ from rig.importers.table.delimited import bad_cell
 from rig.importers.table.formula import FormulaError, evaluate, names_in
 from rig.importers.table.mapping import Mapping
 from rig.importers.table.raw import Raw, Values
-from rig.importers.table.units import conversion
+from rig.importers.table.units import BASE, conversion
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,14 @@ def find(raw: Raw, mapping: Mapping, path: Sequence[str], name: str) -> Values |
         return raw.columns[name]
     if name in raw.fields:
         return raw.fields[name]
+    column, _, unit = name.rpartition(":")
+    if column in raw.columns or column in raw.fields:
+        raise DataError(
+            f"{mapping.where(*path)}: {unit!r} is not a unit that is known.",
+            "A unit is a product of powers of these with an optional number:"
+            f" {', '.join(BASE)}; with a prefix, such as mm or N cm.",
+            f"Write {path[1]} = '{column}:UNIT', or the column alone where it is in SI units.",
+        )
     near = raw.nearest(name)
     raise DataError(
         f"{mapping.where(*path)}: {raw.path.name} has no column {name!r} for {path[1]}.",

@@ -43,6 +43,7 @@ BASE: dict[str, tuple[float, dict[str, int]]] = {
     "V": (1.0, {"V": 1}),
     "K": (1.0, {"K": 1}),
     "Nm": (1.0, {"N": 1, "m": 1}),
+    "Ncm": (1e-2, {"N": 1, "m": 1}),
 }
 """Symbol to its factor to SI and its powers of base symbols; `BASE` without `PREFIXES`."""
 

@@ -14,13 +14,13 @@ import numpy as np
 from scipy import stats
 
 from estimation.filters import CausalFilter, LowPass
-from estimation.model import Model, Term, predict
+from estimation.model import Model, predict
 from estimation.recording import FloatArray, Recording
 from rig.grasper.current_force import FILTER, CurrentForce
 from rig.grasper.inputs import hold
 from rig.grasper.plant import PROTOTYPES, RATE_HZ
 from rig.studies.seeds import Keeper, kept_outcomes
-from rig.studies.zhao.methods import Axes, axes_of, fitted, record
+from rig.studies.zhao.methods import Axes, axes_of, declared, fitted, record
 
 MATERIALS_N_M_RAD = {"wood": 2.0, "foam": 0.3, "sponge": 0.06}
 """Stiffness at the joint. Assumed; the paper gives none."""
@@ -84,7 +84,7 @@ class Answer:
 
 
 def haptics_of(
-    prototype: str, seeds: int, spread: float, added: Sequence[Term], keeper: Keeper
+    prototype: str, seeds: int, spread: float, model: Model, keeper: Keeper
 ) -> list[tuple[Answer, ...]]:
     """Return the answers on graspers of one make, one tuple a seed, in their order.
 
@@ -92,23 +92,21 @@ def haptics_of(
         prototype: `third`, `journal` or `ball`.
         seeds: Number of graspers, from seed 0.
         spread: Spread of the hidden parameters from grasper to grasper.
-        added: Effects that ours adds to the declared model.
+        model: The declared model with the effects that ours adds.
         keeper: Keeps each grasper.
     """
-    one = partial(run_haptics, prototype, spread, tuple(added))
+    one = partial(run_haptics, prototype, spread, model)
     name = f"{SCHEMA} {prototype} {spread:g}"
     return kept_outcomes(tuple[Answer, ...], one, seeds, name, keeper)
 
 
-def run_haptics(
-    prototype: str, spread: float, added: Sequence[Term], seed: int
-) -> tuple[Answer, ...]:
+def run_haptics(prototype: str, spread: float, model: Model, seed: int) -> tuple[Answer, ...]:
     """Return the answers of the paper's method, of ours, and of ours with friction not declared."""
     axes = axes_of(PROTOTYPES[prototype], DOF, seed, spread)
     methods = {
         "paper's method": _of_current(axes),
-        "ours": _of_model(fitted(DOF, axes, seed, added), axes),
-        "ours, friction not declared": _of_model(fitted(DOF, axes, seed, ()), axes),
+        "ours": _of_model(fitted(DOF, axes, seed, model), axes),
+        "ours, friction not declared": _of_model(fitted(DOF, axes, seed, declared(DOF)), axes),
     }
     return tuple(_answer(name, way, axes, seed) for name, way in methods.items())
 

@@ -40,11 +40,11 @@ class Lacking:
 
     Attributes:
         findings: Family and verdict of each finding.
-        terms: The effects it named, with the values it found.
+        model: The declared model with the effects it named, and the signals they read.
     """
 
     findings: tuple[tuple[str, str], ...]
-    terms: tuple[Term, ...]
+    model: Model
 
 
 @dataclass(frozen=True)
@@ -139,16 +139,15 @@ def lacking(dof: str, axes: Axes, seed: int, repeats: int = 2) -> Lacking:
     model = replace(model, terms=(*model.terms, rubs))
     found = answer(runs, [model], split(runs, seed))
     (written,) = found.models
+    terms = (*declared(dof).terms, *written.terms[len(model.terms) :])
     return Lacking(
         tuple((finding.family, finding.verdict) for finding in found.diagnosis.findings),
-        written.terms[len(model.terms) :],
+        replace(written, terms=terms, evidence=None),
     )
 
 
-def fitted(dof: str, axes: Axes, seed: int, added: Sequence[Term]) -> Model:
-    """Return the declared model with added effects, fitted on this grasper's calibration runs."""
-    model = declared(dof)
-    model = replace(model, terms=(*model.terms, *added))
+def fitted(dof: str, axes: Axes, seed: int, model: Model) -> Model:
+    """Return a model fitted on this grasper's calibration runs."""
     return fit(model, Campaign.of(calibration_runs(dof, axes, seed)), bootstrap=0)
 
 

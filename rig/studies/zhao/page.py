@@ -115,7 +115,7 @@ def write_figures(
     """Write the paper's kinds of figures for one grasper: Figures 12 to 14 and 16."""
     short = next(name for name, one in PROTOTYPES.items() if one.name == study.prototype)
     axes = axes_of(PROTOTYPES[short], "grasp", seed, 0.0)
-    model = fitted("grasp", axes, seed, study.lacking[OWN, "grasp"].terms)
+    model = fitted("grasp", axes, seed, study.lacking[OWN, "grasp"].model)
     arm_m = axes[0].arm_m
     mean = float(np.mean([cell.slope for cell in _own(study, "grasp")]))
     method = CurrentForce(arm_m, coefficient=1 / mean)

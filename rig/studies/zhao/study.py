@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
-from typing import Any
 
-from estimation.effects import effect
-from estimation.model import Estimate, Term
+from estimation.model import Model
+from estimation.model_file import parse, to_toml
 from rig.grasper.current_force import CurrentForce
 from rig.grasper.hidden import FAMILIES
 from rig.grasper.plant import PROTOTYPES
@@ -22,6 +21,7 @@ from rig.studies.zhao.methods import (
     Lacking,
     Outcome,
     axes_of,
+    declared,
     fitted,
     lacking,
     of_current,
@@ -79,10 +79,10 @@ class Study:
 
 @dataclass(frozen=True)
 class Looked:
-    """The stored result of the diagnosis of one degree of freedom."""
+    """The stored result of the diagnosis of one degree of freedom, with its model as TOML."""
 
     findings: tuple[tuple[str, str], ...]
-    terms: tuple[Mapping[str, Any], ...]
+    model: str
 
 
 def look(prototype: str, spread: float, number: int) -> Looked:
@@ -90,17 +90,17 @@ def look(prototype: str, spread: float, number: int) -> Looked:
     family, dof = FAMILIES[number // len(DOFS)], DOFS[number % len(DOFS)]
     axes = axes_of(PROTOTYPES[prototype], dof, LOOKED_AT, spread, family)
     found = lacking(dof, axes, LOOKED_AT)
-    return Looked(found.findings, tuple(_plain(term) for term in found.terms))
+    return Looked(found.findings, to_toml(found.model))
 
 
 def one_grasper(prototype: str, spread: float, added: Added, number: int) -> tuple[Cell, ...]:
     """Measure all degrees of freedom of one grasper, in the order of `DOFS`."""
     seed, family = arm_of(number, FAMILIES)
     axes = {dof: axes_of(PROTOTYPES[prototype], dof, seed, spread, family) for dof in DOFS}
-    return tuple(measure(dof, axes[dof], seed, added[family, dof].terms) for dof in DOFS)
+    return tuple(measure(dof, axes[dof], seed, added[family, dof].model) for dof in DOFS)
 
 
-def measure(dof: str, axes: Axes, seed: int, added: Sequence[Term]) -> Cell:
+def measure(dof: str, axes: Axes, seed: int, model: Model) -> Cell:
     """Calibrate both methods on some runs of a grasper and report them on others."""
     arm_m = axes[0].arm_m
     method = CurrentForce(arm_m)
@@ -108,8 +108,8 @@ def measure(dof: str, axes: Axes, seed: int, added: Sequence[Term]) -> Cell:
     tests = report_runs(dof, axes, seed * 1000 + 700)
     ways = [
         of_current(dof, replace(method, coefficient=1.0 / steep)),
-        of_model(fitted(dof, axes, seed, added), arm_m),
-        of_model(fitted(dof, axes, seed, ()), arm_m),
+        of_model(fitted(dof, axes, seed, model), arm_m),
+        of_model(fitted(dof, axes, seed, declared(dof)), arm_m),
     ]
     return Cell(seed, steep, *(outcome(dof, tests, way, arm_m) for way in ways))
 
@@ -128,25 +128,10 @@ def run_study(prototype: str, seeds: int, spread: float, keeper: Keeper) -> Stud
     diagnosed = partial(look, prototype, spread)
     looked = kept_outcomes(Looked, diagnosed, every, f"{name} diagnosis", keeper)
     lacked = {
-        (family, dof): Lacking(found.findings, tuple(_term(term) for term in found.terms))
+        (family, dof): Lacking(found.findings, parse(found.model))
         for (family, dof), found in zip(product(FAMILIES, DOFS), looked, strict=True)
     }
     one = partial(one_grasper, prototype, spread, lacked)
     graspers = kept_outcomes(tuple[Cell, ...], one, seeds * len(FAMILIES), name, keeper)
     cells = {dof: [grasper[k] for grasper in graspers] for k, dof in enumerate(DOFS)}
     return Study(PROTOTYPES[prototype].name, spread, cells, lacked)
-
-
-def _plain(term: Term) -> dict[str, Any]:
-    values = {name: estimate.value for name, estimate in term.values.items()}
-    return {
-        "id": term.effect.id,
-        "sign": term.sign,
-        "channels": dict(term.channels),
-        "values": values,
-    }
-
-
-def _term(told: Mapping[str, Any]) -> Term:
-    values = {name: Estimate(value) for name, value in told["values"].items()}
-    return Term(effect(told["id"]), told["sign"], told["channels"], values)

@@ -83,6 +83,14 @@ def test_an_archive_holds_what_its_folder_holds(one, tmp_path, suffix):
             np.testing.assert_array_equal(a[name], b[name])
 
 
+def test_an_archive_whose_first_text_is_a_read_me_is_recognised(tmp_path, make_log):
+    path = tmp_path / "set.tar"
+    with tarfile.open(path, "w") as tar:
+        tar.addfile(*member("set/ReadME.txt", b"This is a roll of 0 degrees\n"))
+        tar.addfile(*member("set/000.TXT", make_log(seconds=1).text().encode()))
+    assert IMPORTER.recognises(path)
+
+
 def member(name: str, content: bytes = b"%x\n", **attributes) -> tuple[tarfile.TarInfo, io.BytesIO]:
     info = tarfile.TarInfo(name)
     info.size = len(content)
@@ -185,6 +193,22 @@ def test_a_jaw_step_is_found_between_runs_of_the_same_load_and_taken_off(slipped
     np.testing.assert_array_equal(
         whole[9]["jaw_angle_rad"], campaign.runs[9].recording()["jaw_angle_rad"]
     )
+
+
+def test_a_jaw_step_is_found_where_no_two_runs_share_all_conditions(tmp_path, make_log):
+    folder = tmp_path / "Tool_4_Maryland_L_Roll_1"
+    folder.mkdir()
+    for i in range(20):
+        stop, load = divmod(i, 4)
+
+        def edit(rows, i=i, stop=stop, load=load):
+            rows[:, 4] += 10 * (i >= 9) + i % 3 - 40 * load + 300 * stop
+
+        log = make_log(seconds=2.0, load_a=0.2 * (load + 1), edit=edit)
+        (folder / f"{stop}0{load}.TXT").write_text(log.text())
+    (step,) = jaw_zeros(IMPORTER.open(folder)).steps
+    assert step.run == "201"
+    assert np.rad2deg(step.step_rad) == pytest.approx(0.9, abs=0.15)
 
 
 def test_a_fit_of_the_jaws_angle_states_the_steps(slipped, capsys):

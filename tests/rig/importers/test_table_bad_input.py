@@ -43,6 +43,7 @@ MAPPINGS = {
     "a unit of another travel": ("angle:deg", "angle:mm", 5, "'mm' is not a unit", "motor_angle_m"),
     "counts": ("angle:deg", "angle:count", 5, "'count' is not a unit", "rev/4096"),
     "no dimension": ("angle:deg", "angle:1", 5, f"is not a unit of {ANGLE}"),
+    "no unit that is known": ("angle:deg", "angle:grad", 5, "'grad' is not a unit", "N cm"),
     "no unit there is": (
         *('"angle:deg"', '{ column = "angle", unit = "furlong" }'),
         *(5, "'furlong'"),
