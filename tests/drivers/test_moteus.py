@@ -65,7 +65,7 @@ def test_the_documented_lines() -> None:
 
 
 def test_modes_faults_and_sizes_are_the_documented_ones() -> None:
-    """Source: "Register reference", 0x000 and 0x00f; ISO 11898-1 for what a CAN-FD frame carries."""
+    """Source: "Register reference", 0x000 and 0x00f; ISO 11898-1 for the sizes of CAN FD."""
     modes = (protocol.STOPPED, protocol.FAULT, protocol.POSITION_MODE, protocol.TIMEOUT)
     assert modes == (0, 1, 10, 11)
     assert set(protocol.PREPARING) == {2, 3, 4}
