@@ -1,7 +1,7 @@
 """What can be identified of a machine from its sensors, and from recordings of it."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -58,6 +58,8 @@ class CheckedEquation:
         unit: Unit of the target.
         relative_error: Root mean square of what the fit does not explain over that of the target;
             None without recordings.
+        between_runs: The same of the runs' means, where the fit ignores them (`run_offsets`); None
+            where it does not.
         trouble: Why it cannot be fitted on the recordings; empty where it can.
     """
 
@@ -67,6 +69,7 @@ class CheckedEquation:
     target: str
     unit: str
     relative_error: float | None = None
+    between_runs: float | None = None
     trouble: str = ""
 
 
@@ -151,14 +154,10 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
     evidence = fitted.evidence
     assert evidence is not None  # noqa: S101  a fit sets its evidence
     size = float(np.sqrt(np.mean([float(np.mean(r**2)) for r in _targets(fitted, campaign)])))
-    return CheckedEquation(
-        found.name,
-        found.sentence,
-        found.parameters,
-        found.target,
-        found.unit,
-        (evidence.rmse if fitted.run_offsets else evidence.rmse_with_means) / size,
-    )
+    if not fitted.run_offsets:
+        return replace(found, relative_error=evidence.rmse_with_means / size)
+    means = np.sqrt(max(evidence.rmse_with_means**2 - evidence.rmse**2, 0.0))
+    return replace(found, relative_error=evidence.rmse / size, between_runs=float(means) / size)
 
 
 def _targets(model: Model, campaign: Campaign) -> Iterator[FloatArray]:
@@ -170,9 +169,7 @@ def _targets(model: Model, campaign: Campaign) -> Iterator[FloatArray]:
 
 
 def _troubled(plain: CheckedEquation, trouble: str) -> CheckedEquation:
-    return CheckedEquation(
-        plain.name, plain.sentence, plain.parameters, plain.target, plain.unit, trouble=trouble
-    )
+    return replace(plain, trouble=trouble)
 
 
 def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) -> Iterator[str]:

@@ -243,6 +243,13 @@ def _deflections(plant: Plant, chain: Chain) -> Iterator[Written]:
 def missing(plant: Plant) -> list[Missing]:
     """Return the gaps of these sensors: quantities without an equation, and the sensor for each."""
     found = []
+    if not plant.actuators and not any(plant.effort(axis.name) for axis in plant.axes):
+        found.append(
+            Missing(
+                "Nothing drives the machine and no effort is read.",
+                "An [[actuator]], or a [[sensor]] that reads an effort (N or N m).",
+            )
+        )
     for chain in chains(plant):
         if not any(plant.effort(axis) for axis in chain.axes):
             scale = unit_of(chain.actuator.name)

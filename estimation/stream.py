@@ -35,6 +35,9 @@ class Stream:
         self._weights = [np.array(term.weights) for term in model.terms]
         self._shapes = [term.numbers(term.effect.shape) for term in model.terms]
         self._states = [term.effect.start() for term in model.terms]
+        self._rest = {k: v for k, v in model.signals.rest.items() if k in model.channels}
+        self.at_rest = False
+        """Whether one of the model's axes stands at the newest sample."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -52,6 +55,7 @@ class Stream:
             Shape (n,), in `model.unit`; NaN where a needed channel is not finite.
         """
         channels = self._source.step(time_s, measured)
+        self.at_rest = any(bool(abs(channels[k][-1]) < v) for k, v in self._rest.items())
         rows = np.column_stack([channels[name] for name in self.model.channels])
         return np.array([self._one(row) for row in rows.tolist()])
 

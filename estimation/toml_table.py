@@ -89,7 +89,7 @@ class Table:
             return default
         if key not in self.content:
             near = difflib.get_close_matches(key, self.content, n=1, cutoff=0.4)
-            fix = f"Did you mean {near[0]!r}?" if near else ""
+            fix = f"Did you mean {near[0]!r}?" if near else f"Write {key} = ... there."
             raise self.error(f"{self.at()} lacks the key {key!r}.", fix=fix)
         value = self.content[key]
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):

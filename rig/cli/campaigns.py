@@ -8,7 +8,7 @@ import typer
 
 from rig.cli.refit import show_refit
 from rig.cli.shipped import complete_campaign, complete_model
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.output.console import JsonFlag, emit_json, remarks, results, show_table
 
 if TYPE_CHECKING:
     from rig.campaigns.index import IndexedCampaign, IndexedRun
@@ -65,7 +65,6 @@ def campaigns(
     from rig.campaigns.index import campaigns as all_campaigns
     from rig.campaigns.index import default_index
     from rig.errors import UsageError
-    from rig.output.table import to_rich
 
     if not root.is_dir():
         raise UsageError(
@@ -95,12 +94,12 @@ def campaigns(
         return
     screen = results(json)
     if compare and found:
-        screen.print(to_rich(_side_by_side(found, root)))
+        show_table(screen, _side_by_side(found, root))
         return
     count = sum(len(campaign.runs) for campaign in found)
     if found:
         table = _by_run(found, root, most) if runs else _by_campaign(found[:most], root)
-        screen.print(to_rich(table))
+        show_table(screen, table)
         if len(table.rows) < (count if runs else len(found)):
             screen.print(f"Older ones are not shown; --most shows more than {most} rows.")
     screen.print(f"{len(found)} of {len(whole)} campaigns, {count} runs.")
@@ -162,7 +161,9 @@ def _by_campaign(found: Sequence["IndexedCampaign"], root: Path) -> "TextTable":
         facts = _facts(campaign)
         name = str(campaign.folder.relative_to(root))
         rows.append([name, *(_short(text) for text in facts.values())])
-    return TextTable("", ["campaign", *(_facts(found[0]))], rows)
+    columns = ["campaign", *(_facts(found[0]))]
+    kept = [k for k in range(len(columns)) if any(row[k] for row in rows)]
+    return TextTable("", [columns[k] for k in kept], [[row[k] for k in kept] for row in rows])
 
 
 def _facts(campaign: "IndexedCampaign") -> dict[str, str]:

@@ -102,6 +102,12 @@ def _parameter_lines(equation: "CheckedEquation") -> list[str]:
     if equation.relative_error is not None:
         share = 100 * equation.relative_error
         lines.append(f"  Residual: {share:.3f} % of the root mean square of {equation.target}.")
+        if equation.between_runs and equation.between_runs > equation.relative_error:
+            lines.append(
+                f"  Between runs, in their means: {100 * equation.between_runs:.3f} %. The fit"
+                " ignores it (run_offsets = true). State false where a load differs from run to"
+                " run: without its differences gain and friction may be confused."
+            )
     if equation.trouble:
         lines.append(f"  Cannot be fitted: {equation.trouble}")
     return lines

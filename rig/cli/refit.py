@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.output.console import emit_json, progress, results
+from rig.output.console import emit_json, progress, results, show_table
 
 if TYPE_CHECKING:
     from rig.campaigns.index import IndexedCampaign
@@ -31,7 +31,6 @@ def show_refit(
     from estimation.model_file import read, to_toml
     from rig.diagnosis.engine import engine
     from rig.diagnosis.refit import refit_all
-    from rig.output.table import to_rich
 
     declared = to_toml(read(Path(model)))
     dates = {one.folder: one.runs[0].date for one in reversed(found)}  # the newest come first
@@ -53,7 +52,7 @@ def show_refit(
         if one.failed:
             screen.print(f"{folder.relative_to(root)}: {one.failed}", markup=False)
     if good:
-        screen.print(to_rich(_table(good, moved)))
+        show_table(screen, _table(good, moved))
     screen.print(f"{len(good)} of {len(fitted)} campaigns fitted.")
 
 

@@ -62,8 +62,11 @@ class ModelEstimator:
     def half_width(self) -> float | None:
         """Half the 95 % interval of the newest sample; None where it is not known.
 
-        A state estimator's differs from sample to sample, as in its C header.
+        A state estimator's differs from sample to sample, as in its C header. A physical model's is
+        of its errors in motion; at rest friction takes any value.
         """
+        if isinstance(self._stream, Stream):
+            return None if self._stream.at_rest else self.usual_half_width
         if not isinstance(self._stream, BankStepper):
             return self.usual_half_width
         newest = self._stream.half_width[-1:]

@@ -42,6 +42,20 @@ def results(json: bool) -> "Console":
     return screen
 
 
+def show_table(screen: "Console", table: "TextTable") -> None:
+    """Print a table; where the terminal is too narrow for it, a paragraph for each row."""
+    from rig.output.table import to_rich
+
+    whole = to_rich(table)
+    unlimited = screen.options.update(width=10_000)
+    if not screen.is_terminal or screen.measure(whole, options=unlimited).maximum <= screen.width:
+        screen.print(whole)
+        return
+    for name, *cells in table.rows:
+        said = (f"{c} {cell}" for c, cell in zip(table.columns[1:], cells, strict=True) if cell)
+        screen.print(f"{name}: {', '.join(said)}", style="default", soft_wrap=False)
+
+
 def remarks() -> "Console":
     """Return the console for progress and remarks: stderr."""
     return _console(stderr=True)

@@ -1,6 +1,7 @@
 """`rig campaigns`: what is listed and found, and that the index follows the logs."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,18 @@ def test_folders_are_compared_and_opened_by_their_names(root, capsys, monkeypatc
     assert str(root / "monday" / "diagnosis") in capsys.readouterr().out
     assert main(["campaigns", "friday", "--compare", *words]) == 0
     assert "0 of 3 campaigns" in capsys.readouterr().out
+
+
+def test_a_narrow_terminal_has_a_paragraph_for_each_campaign(root, capsys, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "60")
+    assert main(["campaigns", "--root", str(root)]) == 0
+    out = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out)
+    assert "…" not in out
+    assert all(len(line) <= 60 for line in out.splitlines())
+    paragraph = " ".join(out.split())
+    assert "tuesday: date 2" in paragraph
+    assert "notes first try" in paragraph
 
 
 def test_without_a_writable_cache_campaigns_are_listed_all_the_same(rig, tmp_path, monkeypatch):

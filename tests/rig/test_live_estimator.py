@@ -49,6 +49,24 @@ def test_replayed_estimates_are_the_causal_prediction(model_path):
     assert np.abs(live[1000:] - run[SPINDLE][1000:]).max() < 0.01
 
 
+def test_a_physical_model_states_no_interval_at_rest(tmp_path):
+    """Friction at rest takes any value: an interval of the errors in motion does not hold there."""
+    path = tmp_path / "motor.toml"
+    runs = list(campaign())
+    (declared,) = [m for m in model_file.reference_rig() if m.balance == "motor"]
+    model_file.write(fit(declared, Campaign.of(runs)), path)
+    estimator, run = ModelEstimator(path, runs[0].sample_rate_hz), runs[0]
+    shown = HalfWidths([estimator])
+    stood = {name: np.full(4000, values[0]) for name, values in run.columns.items()}
+    estimator.push(stood, np.arange(4000) / run.sample_rate_hz)
+    assert SPINDLE not in shown
+    begun = 4000 / run.sample_rate_hz + run.time_s - run.time_s[0]
+    speed = np.abs(np.gradient(run["spindle_angle_rad"], run.time_s))
+    fastest = int(speed.argmax()) + 1
+    estimator.push({k: v[:fastest] for k, v in run.columns.items()}, begun[:fastest])
+    assert shown[SPINDLE] > 0
+
+
 def test_a_channel_the_model_lacks_is_named(model_path):
     run = Recording("x", np.arange(100) / 1000, {SPINDLE: np.zeros(100)})
     estimator = ModelEstimator(model_path, 1000.0)

@@ -89,6 +89,42 @@ def test_a_table_in_millimetres_and_volts_is_fitted_in_metres_and_newtons(slide,
     assert "drive_force_n" in json.dumps(frames)
 
 
+LOADED = SLIDE.replace(
+    "[data]\n",
+    """[[sensor]]
+name = "belt_force_n"
+axis = "carriage"
+reads = "effort"
+
+[data]
+""",
+).replace('drive_force_n = "volts:35 N"', 'drive_force_n = "volts:35 N"\nbelt_force_n = "cell"')
+"""The slide with a force cell."""
+
+
+@pytest.mark.parametrize("constant_n", [0.0, 60.0])
+def test_a_load_that_differs_between_runs_and_is_left_out_is_said(tmp_path, capsys, constant_n):
+    table = slide_table(tmp_path)
+    rows = np.loadtxt(table, delimiter=",", skiprows=1)
+    load = constant_n * (np.floor(rows[:, 0] / 3.0) % 3)
+    drive = 35.0 * rows[:, 2] + load + 8.0 * np.sign(np.gradient(rows[:, 1]))
+    rows = np.column_stack([rows[:, :2], drive / 35.0, 0.9 * (35.0 * rows[:, 2]) + load])
+    np.savetxt(table, rows, delimiter=",", header="t,x,volts,cell", comments="", fmt="%.9g")
+    file = tmp_path / "slide.toml"
+    for stated, said in (("true", constant_n > 0), ("false", False)):
+        file.write_text(LOADED.replace("run_offsets = false", f"run_offsets = {stated}"))
+        assert main(["machine", "check", str(file), str(table)]) == 0
+        assert ("The fit ignores it (run_offsets = true)" in capsys.readouterr().out) == said
+
+
+def test_without_a_drive_and_without_a_reading_of_effort_both_are_named(tmp_path, capsys):
+    file = tmp_path / "bare.toml"
+    head, _, rest = SLIDE.partition("[[actuator]]")
+    file.write_text(head + "[[sensor]]" + rest.partition("[[sensor]]")[2])
+    assert main(["machine", "check", str(file)]) == 1
+    assert "An [[actuator]], or a [[sensor]] that reads an effort" in capsys.readouterr().out
+
+
 def test_a_column_that_was_not_recorded_is_named(slide, capsys):
     file, table = slide
     file.write_text(SLIDE.replace('drive_force_n = "volts:35 N"', 'motor_force_n = "volts:35 N"'))
