@@ -1,4 +1,4 @@
-"""One model fitted on every campaign, each result kept beside its logs.
+"""One model fitted on every campaign, each result kept with its logs.
 
 A campaign whose logs and model are those of a kept result is not fitted again, so a call that was
 interrupted goes on where it stopped. Results are written as they come; when a process of the pool
