@@ -17,7 +17,7 @@ from estimation.causes.equations import lay_out
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
-from estimation.causes.search import assessed
+from estimation.causes.scoring import assessed
 from estimation.recording import Recording
 from rig.simulation.campaign import simulate_reference_campaign
 

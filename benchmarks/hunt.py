@@ -8,7 +8,7 @@ host, board and load motor fail, up to eight faults a sequence. Whatever breaks 
 with its seed and its events, shrunk to as few as still break it. Where a search stopped is kept in
 `build/hunt.json` for the core that it searched; another core begins from the start.
 
-Exit code 1 when a rule was broken by something else than what is in `KNOWN`.
+Exit code 1 when a rule was broken.
 """
 
 import argparse
@@ -17,7 +17,6 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections import Counter
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
@@ -35,11 +34,6 @@ PAGE = Path("docs/results/hunt.md")
 CHUNKS = {"commands": 20_000, "faults": 5_000}
 MOST_EVENTS = 5
 """Events of a sequence that is worth a person's time."""
-KNOWN = {
-    ("all encoders dead",): "friction hides the current that creeps up (docs/decisions/0281); the"
-    " encoders' supply in the emergency stop's loop is the remedy",
-}
-"""Events that are known to break a rule, and why they still do."""
 
 _FOUND = re.compile(r"seed (\d+): ([^:]+):((?: \[[^]]+\])+)")
 
@@ -63,17 +57,6 @@ class Search:
     trips: int = 0
     farthest_rad: float = 0.0
     found: list[tuple[int, str, list[str]]] = field(default_factory=list)
-
-    @property
-    def open(self) -> list[tuple[int, str, list[str]]]:
-        """What was found and is not known."""
-        return [one for one in self.found if not is_known(one[2])]
-
-
-def is_known(events: list[str]) -> bool:
-    """Whether the events of a sequence hold all of a known case, whatever else they hold."""
-    kinds = Counter(event.split(" at ")[0] for event in events)
-    return any(Counter(case) <= kinds for case in KNOWN)
 
 
 def write_settings(path: Path, config: str = "reference") -> None:
@@ -144,14 +127,10 @@ def page(searches: dict[str, Search], core: str) -> str:
         "|---|---:|---:|---:|---:|---:|---|",
     ]
     for kind, s in searches.items():
-        known = len(s.found) - len(s.open)
-        broken = f"{len(s.open)}" + (f", and {known} times a known case" if known else "")
         lines.append(
             f"| {kind} | {s.sequences} | {s.hours:.1f} | {s.armings} | {s.trips} |"
-            f" {s.farthest_rad:.3f} | {broken} |"
+            f" {s.farthest_rad:.3f} | {len(s.found)} |"
         )
-    lines += ["", "Known cases:", ""]
-    lines += [f"- {', '.join(case)}: {why}." for case, why in KNOWN.items()]
     now = Provenance.now(0)
     lines += ["", f"Made {now.date}, commit {now.commit}, core {core}, seeds from 0."]
     return "\n".join(lines) + "\n"
@@ -185,7 +164,7 @@ def main() -> int:
                 first = searches[kind].sequences
                 more = run(PROGRAM, settings, kind, first, CHUNKS[kind])
                 searches[kind] = joined(searches[kind], more)
-                for seed, rule, events in more.open:
+                for seed, rule, events in more.found:
                     text = f"{kind}, seed {seed}: {rule}: {'; '.join(events[:MOST_EVENTS])}"
                     sys.stderr.write(f"{text}{' ...' if len(events) > MOST_EVENTS else ''}\n")
             STATE.parent.mkdir(exist_ok=True)
@@ -194,7 +173,7 @@ def main() -> int:
             said = ", ".join(f"{s.sequences} {kind}" for kind, s in searches.items())
             sys.stderr.write(f"{said}, {searches['faults'].hours:.1f} rig-hours with faults\n")
     write_text_atomic(PAGE, page(searches, core))
-    return 1 if any(s.open for s in searches.values()) else 0
+    return 1 if any(s.found for s in searches.values()) else 0
 
 
 if __name__ == "__main__":

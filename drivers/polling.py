@@ -1,6 +1,7 @@
 """Devices that must be asked for every sample: their steady rate, and what their drivers share."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -163,12 +164,15 @@ class PolledDevice:
             self._closed = True
             stop_and_let_go(self.stop, self._way.close)
 
+    @cached_property
+    def _names(self) -> list[str]:
+        return [channel.name for channel in self.channels]
+
     def _batch(self, sample: tuple[Sequence[float], int] | None) -> Batch:
         count = 0 if sample is None else 1
-        values, flags = sample or ([0.0] * len(self.channels), 0)
-        names = [channel.name for channel in self.channels]
+        values, flags = sample or ([0.0] * len(self._names), 0)
         return Batch(
-            {name: np.full(count, value) for name, value in zip(names, values, strict=True)},
+            {name: np.full(count, value) for name, value in zip(self._names, values, strict=True)},
             np.full(count, self._way.now_s),
             "host",
             np.full(count, self._schedule.asked - 1, np.int64),

@@ -23,7 +23,8 @@ from estimation.campaign import Campaign
 from estimation.causes.equations import lay_out, on_one_clock
 from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT
-from estimation.causes.search import probabilities, search
+from estimation.causes.scoring import probabilities
+from estimation.causes.search import search
 from estimation.diagnosis.split import split
 from estimation.files import write_text_atomic
 from estimation.model import Model

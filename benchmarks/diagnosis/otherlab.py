@@ -41,7 +41,8 @@ def cases(path: Path) -> Iterator[Case]:
 
 def listed(path: Path) -> list[dict[str, Any]]:
     """Return the cases as the simulator lists them."""
-    sys.path.insert(0, str(path))
+    if str(path) not in sys.path:
+        sys.path.insert(0, str(path))
     found: list[dict[str, Any]] = importlib.import_module("cases").ALL
     return found
 

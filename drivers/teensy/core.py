@@ -153,6 +153,10 @@ class FirmwareBoard:
         """Press or release the emergency stop that is wired to the board."""
         self._functions.rig_board_stop(self._handle, pressed)
 
+    def index(self) -> None:
+        """Let the index of the spindle's encoder come with the next tick."""
+        self._functions.rig_board_index(self._handle)
+
     def receive(self, data: bytes) -> None:
         """Take bytes from the host and carry out the commands they complete."""
         self._functions.rig_board_receive(self._handle, data, len(data))
@@ -262,6 +266,7 @@ def _load(path: Path, built_ns: int) -> ctypes.CDLL:
         ("rig_board_assume_hot", None, (pointer,)),
         ("rig_board_limit", number, (pointer, text)),
         ("rig_board_stop", None, (pointer, number)),
+        ("rig_board_index", None, (pointer,)),
         ("rig_board_in_force", number, (pointer,)),
         ("rig_board_trip", number, (pointer,)),
         ("rig_board_restore", None, (pointer, number)),

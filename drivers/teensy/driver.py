@@ -156,17 +156,19 @@ class TeensyLogger:
         self._require_identity()
         self._command(Kind.CLEAR, protocol.encode_clear(self._number(), code))
 
-    def reference(self, counts: Sequence[int]) -> None:
-        """Give the encoders their counts at the present place; the board must be at rest.
+    def reference(self, counts: Sequence[int], at_index: bool = False) -> None:
+        """Give the encoders their counts; the board must be at rest.
 
         Args:
             counts: Of each encoder, in the order of a sample.
+            at_index: Whether they are those of the place where the spindle's index came last, not
+                of the present one.
 
         Raises:
-            CommandRefusedError: The board is armed, or a shaft is turning.
+            CommandRefusedError: The board is armed, a shaft is turning, or no index came.
         """
         self._require_identity()
-        payload = protocol.encode_reference(self._number(), counts)
+        payload = protocol.encode_reference(self._number(), counts, at_index)
         self._command(Kind.REFERENCE, payload)
 
     def start(self) -> None:

@@ -110,6 +110,7 @@ class Result(IntEnum):
     TOO_HOT = 14
     BEYOND_BOARD = 15
     TOO_FAST = 16
+    NO_INDEX = 17
 
 
 def layout(*fields: str) -> np.dtype[np.void]:
@@ -184,13 +185,13 @@ FIXED_LIMITS = (
 """What a rig is built like: a board that holds such a number takes no other."""
 FREE_LIMITS = (
     *("stall_motion", "current_offset", "frozen_motion", "twist_e6", "stretch_e6", "jaw_zero"),
-    *("safe_state", "seek"),
+    *("probe_within", "safe_state", "seek"),
 )
 """What a host may choose on any board."""
 PING_DTYPE = layout(*SESSION_FIELDS, "token u8")
 CLEAR_DTYPE = layout(*HEADER_FIELDS, "code u1")
-REFERENCE_DTYPE = layout(*HEADER_FIELDS, "count_1 i4", "count_2 i4", "count_3 i4")
-"""Counts of each encoder at the present place, in the order of a sample."""
+REFERENCE_DTYPE = layout(*HEADER_FIELDS, "count_1 i4", "count_2 i4", "count_3 i4", "at_index u1")
+"""Counts of each encoder, ordered as in a sample: at the present place, or where the index came."""
 TRIP_REPORT_DTYPE = layout(
     *HEADER_FIELDS, "code u1", "channel u1", "value i4", "limit i4", "tick_us u4", "late_us u4"
 )
@@ -293,9 +294,10 @@ def encode_clear(sequence: int, code: int) -> bytes:
     return np.array((VERSION, Kind.CLEAR, sequence, code), CLEAR_DTYPE).tobytes()
 
 
-def encode_reference(sequence: int, counts: Sequence[int]) -> bytes:
-    """Return the payload of the command that gives the encoders their present counts."""
-    return np.array((VERSION, Kind.REFERENCE, sequence, *counts), REFERENCE_DTYPE).tobytes()
+def encode_reference(sequence: int, counts: Sequence[int], at_index: bool = False) -> bytes:
+    """Return the payload of the command that gives the encoders their counts."""
+    fields = (VERSION, Kind.REFERENCE, sequence, *counts, at_index)
+    return np.array(fields, REFERENCE_DTYPE).tobytes()
 
 
 def encode_hello_reply(sequence: int, identity: Identity) -> bytes:

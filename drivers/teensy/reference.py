@@ -72,6 +72,8 @@ LIMIT_NAMES = (
     "max_still_rise",
     "jaw_zero",
     "max_beyond",
+    "probe_within",
+    "probe_patience",
     *CHOICE_NAMES,
 )
 ARM_DTYPE = layout(
@@ -151,6 +153,12 @@ class Limits:
         jaw_zero: Jaw count at spindle count 0 with no distal torque.
         max_beyond: Farthest beyond its travel the spindle may be as the jaw shows it, spindle
             counts.
+        probe_within: Distance to the end of the travel towards which the spindle is to turn,
+            counts, within which encoders may not count for 30 ticks, or ten times so long at the
+            target. Then the motor pulls away from that end; 10 ticks without a count are then a
+            dead encoder.
+        probe_patience: Ticks more for each 1000 counts farther from that end; `TOP` for no such
+            pull anywhere.
         stall_ticks: How long it may be stalled.
         saturated_ticks: How long a torque or current count may be at the end of its range.
         stale_ticks: How long a torque or current count may stay the same.
@@ -204,6 +212,8 @@ class Limits:
     max_still_rise: int = TOP
     jaw_zero: int = 0
     max_beyond: int = TOP
+    probe_within: int = 0
+    probe_patience: int = TOP
     stall_ticks: int = TOP
     saturated_ticks: int = TOP
     stale_ticks: int = TOP
@@ -215,5 +225,5 @@ class Limits:
     seek: int = 0
 
     def as_array(self) -> NDArray[np.int64]:
-        """Return the limits in the order of the wire, shape (44,)."""
+        """Return the limits in the order of the wire, shape (51,)."""
         return np.array(astuple(self), np.int64)

@@ -34,6 +34,10 @@ _REASONS: dict[int, tuple[str, str]] = {
         "It is armed, or a shaft is turning.",
         "Disarm it, let go of the shafts and try again.",
     ),
+    Result.NO_INDEX: (
+        "No index of the spindle's encoder has come since it was started or last referenced.",
+        "Turn the spindle through its index. If that does not help, check the index's wire.",
+    ),
     Result.NOT_ARMED: (
         "It is not armed: it never was, was disarmed, or its watchdog or a limit tripped.",
         "Look at the status of its samples, then arm it.",

@@ -8,7 +8,8 @@ variance left of a Gaussian process with unit variance after one observation of 
 What a score costs is measured, not assumed: levels at the edge of a condition are left out in turn,
 and their errors beyond the usual ones, over their scores beyond the usual one, are the variance per
 score. Few levels can be left out, so its quantile is Student's. It is added to the square of half
-the interval's width; beyond the grid, opening or at rest, the width is not known.
+the interval's width; beyond the grid, opening or at rest, the width is not known. The grid ends
+where runs had no angle or pose: a polynomial carried there has errors that no score foretells.
 
 Source: C. E. Rasmussen, C. K. I. Williams, "Gaussian Processes for Machine Learning" (2006),
 equation 2.26, with places visited by n runs observed with noise variance 1 / n.
@@ -29,6 +30,8 @@ STEPS = (0.5, 0.25, 0.5, 0.25)
 of speed in octaves."""
 OCTAVES = 2
 """The coordinate in octaves."""
+HELD, MARGIN = (0, 3), 0.1
+"""Angle and pose, and the share of their range that the grid reaches beyond it."""
 TAIL = 0.005
 """Share of the samples at each end that the grid need not hold: starts and stops."""
 VISITED = 0.02
@@ -74,6 +77,28 @@ class Beyond:
         shape = np.array(self.values.shape)
         _look_up((places - self.lowest) / self.step, shape, self.values.ravel(), found)
         return found
+
+
+def cut_to(table: Beyond, places: FloatArray) -> Beyond | None:
+    """Return a table of the angles and poses that places have too; None where it has none of them.
+
+    Args:
+        table: The table.
+        places: Conditions, shape (n, d).
+    """
+    lowest, step, nodes = table.lowest.copy(), table.step.copy(), np.array(table.values.shape)
+    for axis in (axis for axis in HELD if axis < len(lowest)):
+        low, high = np.quantile(places[:, axis], [TAIL, 1.0 - TAIL])
+        margin = MARGIN * max(high - low, LEAST_SPAN)
+        first = max(low - margin, lowest[axis])
+        last = min(high + margin, lowest[axis] + step[axis] * (nodes[axis] - 1))
+        if first >= last:
+            return None
+        lowest[axis], step[axis] = first, (last - first) / (nodes[axis] - 1)
+    grid = np.indices(table.values.shape).reshape(len(lowest), -1).T * step + lowest
+    end = table.lowest + table.step * (nodes - 1)
+    values = table.at(np.clip(grid, table.lowest, end))
+    return Beyond(lowest, step, values.reshape(table.values.shape))
 
 
 @njit(cache=True)
@@ -148,11 +173,20 @@ class Visits:
         return float(np.mean([np.nanmean(table.at(self._places[k])) for k in of]))
 
 
+def within(places: FloatArray, runs: Sequence[FloatArray]) -> NDArray[np.bool_]:
+    """Return whether places lie on the grid of some runs, shape (n,)."""
+    lowest, step, nodes = _grid(np.concatenate(runs))
+    at = (places - lowest) / step
+    return np.asarray(((at >= 0.0) & (at <= nodes - 1)).all(axis=1))
+
+
 def _grid(places: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
     """Return the first node, the step and the number of nodes, each of shape (d,)."""
     low, high = np.quantile(places, [TAIL, 1.0 - TAIL], axis=0)
     share = np.array(STEPS[: places.shape[1]])
     span = np.maximum(high - low, LEAST_SPAN)
     step = np.where(np.arange(len(share)) == OCTAVES, share, share * span)
-    nodes = np.ceil(span / step).astype(np.int64) + 3  # one beyond each end
+    held = np.isin(np.arange(len(share)), HELD)
+    step = np.where(held, (1.0 + 2.0 * MARGIN) * step, step)
+    nodes = np.where(held, np.round(1.0 / share), np.ceil(span / step) + 2).astype(np.int64) + 1
     return (low + high - step * (nodes - 1)) / 2, step, nodes

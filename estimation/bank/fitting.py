@@ -226,7 +226,11 @@ def chosen(whole: Pool, folds: Sequence[Pool], shape: Shape) -> Settings:
 
 
 def pull(
-    runs: Sequence[Normal], prior: FloatArray, scale: FloatArray, stiffness: FloatArray
+    runs: Sequence[Normal],
+    prior: FloatArray,
+    scale: FloatArray,
+    stiffness: FloatArray,
+    flat: FloatArray | float = 0.0,
 ) -> FloatArray:
     """Return weights that fit the runs and stay near the prior, shape (p,).
 
@@ -235,10 +239,11 @@ def pull(
         prior: Weights to stay near, shape (p,).
         scale: Spread of each column where the prior was found, shape (p,).
         stiffness: Penalty on a weight's change in units of `scale`, a sample, shape (p,).
+        flat: Penalty on products of two weights' changes, a sample, shape (p, p).
     """
     gram = np.sum([run.gram for run in runs], axis=0)
     cross = np.sum([run.cross for run in runs], axis=0)[:, 0]
-    penalty = stiffness * sum(run.count for run in runs)
-    scaled = gram / np.outer(scale, scale) + np.diag(penalty)
+    count = sum(run.count for run in runs)
+    scaled = (gram + count * flat) / np.outer(scale, scale) + np.diag(count * stiffness)
     rest = (cross - gram @ prior) / scale
     return np.asarray(prior + np.linalg.solve(scaled, rest) / scale)

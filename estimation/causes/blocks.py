@@ -43,6 +43,8 @@ class Outcome:
         errors: For each family of folds, part to squared error, shape (runs, causes).
         amplitudes: On all runs, shape (causes, k).
         changes: Equation to the factor by which its largest linear term changes, shape (causes,).
+        slopes: Equation to the factor of each channel times a constant within runs, the causes'
+            own contribution included, shape (causes, channels).
         cross: Products of the columns with the base's residual within runs, weighted, shape
             (runs, causes, k).
         own: Products of the columns with themselves, shape (runs, causes, k, k).
@@ -52,6 +54,7 @@ class Outcome:
     errors: Sequence[Mapping[Part, FloatArray]]
     amplitudes: FloatArray
     changes: Mapping[str, FloatArray]
+    slopes: Mapping[str, FloatArray]
     cross: FloatArray
     own: FloatArray
     base: FloatArray
@@ -132,12 +135,16 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
         for kind in (block.base, block.own, block.target)
     )
     declared = joint.whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
-    entered = {name for name, _ in block.base}
-    changes = {
-        name: declared[:, at] / (joint.whole(usual)[at] or 1.0)
-        for name, (at, _) in joint.largest_linear.items()
-        if name in entered
-    }
+    changes, slopes = {}, {}
+    for name in {name for name, _ in block.base}:
+        at = [*joint.linear(name)]
+        usual_there = joint.whole(usual)[at]
+        factor = np.where(usual_there == 0.0, 1.0, usual_there)
+        given = _per_unit(joint, block, (name, "within"), at, amplitudes)
+        slopes[name] = (declared[:, at] + given) / factor
+        if name in joint.largest_linear:
+            largest = at.index(joint.largest_linear[name][0])
+            changes[name] = declared[:, at[largest]] / factor[largest]
     # the columns as they were before declared ones were taken off: in some runs these differ
     gram = np.asarray(sum((weights[p] * joint.gram[p] for p in inside), zero))
     count = block.taken.shape[1]
@@ -147,7 +154,17 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
     right = right + (gram[:, None, None, :count, -1] @ block.taken)[:, :, 0]
     cross = cross + gram[:, None, :-1, :count] @ block.taken
     residual = right - (usual @ cross)
-    return Outcome(errors, amplitudes, changes, residual, own, cross)
+    return Outcome(errors, amplitudes, changes, slopes, residual, own, cross)
+
+
+def _per_unit(
+    joint: Joint, block: Block, p: Part, at: Sequence[int], amplitudes: FloatArray
+) -> FloatArray:
+    """Return the slopes of causes' contribution over declared columns, (causes, columns)."""
+    across = joint.gram[p][:, at, : block.taken.shape[1]].sum(axis=0)
+    raw = block.base[p][:, :, at].sum(axis=0) + np.einsum("jd,cdk->cjk", across, block.taken)
+    own = across[range(len(at)), at]
+    return np.asarray(np.einsum("cjk,ck->cj", raw, amplitudes) / np.where(own > 0.0, own, 1.0))
 
 
 def _squared(

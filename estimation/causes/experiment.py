@@ -14,12 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.causes.equations import Layout, LayoutError, laid_out_like
+from estimation.causes.findings import IN_SET, Kept
 from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
-from estimation.causes.search import Scored, shares_of
+from estimation.causes.scoring import Scored, posterior
 from estimation.causes.sources import Source
-from estimation.causes.verdict import IN_SET, Answer, Kept
+from estimation.causes.verdict import Answer
 from estimation.recording import FloatArray, Recording
 
 MOST = 4
@@ -127,7 +128,7 @@ def _likely(kept: Kept, joint: Joint) -> list[tuple[float, Scored]]:
     """Return the likeliest hypotheses in a finding's place with their probabilities, best first."""
     shares: dict[str, float] = {}
     best: dict[str, Scored] = {}
-    weights = shares_of(kept.ranked, joint.numbers)
+    weights = posterior(kept.ranked, joint.numbers)
     for scored, weight in zip(kept.ranked, weights, strict=True):
         label = _label(scored)
         shares[label] = shares.get(label, 0.0) + float(weight)

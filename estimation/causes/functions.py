@@ -13,8 +13,12 @@ from estimation.causes.places import Place, direction_width
 from estimation.derived import CAMPAIGN_TIME
 from estimation.recording import FloatArray
 
-KNOTS, KNOTS_ALONE = 6, 14
-"""Knots of a variable's hat functions: of a function of two variables, and of one alone."""
+KNOTS, KNOTS_ALONE, KNOTS_OF_FACTOR = 6, 14, 3
+"""Knots of a variable's hat functions: of a function of two variables, of one alone, and of a load
+that is a factor."""
+
+RANKS = 513
+"""Points of the distribution of a variable's values."""
 
 PLAY = 0.06
 """Half width of the play operator that stands for history, share of the travel."""
@@ -40,13 +44,13 @@ class Function:
     Attributes:
         place: Where it acts.
         variables: Names of its variables, as a verdict lists them.
-        ranges: Range of each variable that the knots cover.
+        knots: Places of each variable's hat functions; none of a direction.
         width: Speed over which friction changes its sign.
     """
 
     place: Place
     variables: tuple[str, ...]
-    ranges: tuple[tuple[float, float], ...]
+    knots: tuple[tuple[float, ...], ...]
     width: float
 
     family = "unknown"
@@ -57,35 +61,30 @@ class Function:
         roles = [ROLE_OF_VARIABLE.get(v, v) for v in self.variables if v != "time"]
         return tuple(self.place.roles[role][0] for role in roles)
 
-    @property
-    def knots(self) -> int:
-        """Number of knots of each variable that is not a direction."""
-        return KNOTS_ALONE if len({*self.variables} - {"velocity_sign"}) == 1 else KNOTS
-
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray]:
         """Return the tensor product of the variables' bases in every equation it enters."""
         made = {}
         for entry in self.place.enters:
             used = run.used[entry.equation]
             product = np.full((len(used), 1), entry.gain)
-            for variable, inside in zip(self.variables, self.ranges, strict=True):
-                own = self._basis(run, variable, inside, entry.equation)[used]
+            for variable, knots in zip(self.variables, self.knots, strict=True):
+                own = self._basis(run, variable, knots, entry.equation)[used]
                 product = (product[:, :, None] * own[:, None, :]).reshape(len(used), -1)
             made[entry.equation] = product
         return made
 
     def _basis(
-        self, run: RunSignals, variable: str, inside: tuple[float, float], equation: str
+        self, run: RunSignals, variable: str, knots: tuple[float, ...], equation: str
     ) -> FloatArray:
         """Return a variable's hat functions on the run's grid, or one and the direction."""
         values = variable_of(run, self.place, variable, equation, self.width)
         if variable == "velocity_sign":
             return np.column_stack([np.ones(len(values)), values])
         channel = _channel(run, self.place, variable, equation)
-        key = ("hats", variable, channel, inside, self.knots)
+        key = ("hats", variable, channel, knots)
         found = run.memo.get(key)
         if found is None:
-            found = run.memo[key] = _hats(values, inside, self.knots)
+            found = run.memo[key] = _hats(values, knots)
         return found
 
 
@@ -103,8 +102,9 @@ def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
             ("velocity_sign", *pair) for pair in itertools.combinations(rest, 2) if "load" in pair
         ]
     for variables in chosen:
-        ranges = tuple(_variable_range(layout, place, v, width) for v in variables)
-        yield Function(place, variables, ranges, width)
+        counts = _counts(variables)
+        knots = tuple(_knots(layout, place, v, width, counts[v]) for v in variables)
+        yield Function(place, variables, knots, width)
 
 
 def variables_at(layout: Layout, place: Place) -> list[str]:
@@ -175,19 +175,47 @@ def _worked_out(run: RunSignals, variable: str, name: str, width: float) -> Floa
     return run.on_grid(name)
 
 
-def _variable_range(
-    layout: Layout, place: Place, variable: str, width: float
-) -> tuple[float, float]:
-    inside = [variable_of(run, place, variable, place.home, width) for run in layout.runs]
-    low = min(float(np.percentile(x, 1)) for x in inside)
-    high = max(float(np.percentile(x, 99)) for x in inside)
-    return (low, high) if high > low else (low, low + 1.0)
+def _counts(variables: Sequence[str]) -> dict[str, int]:
+    """Return the number of knots of each variable; next to another one, load is a factor."""
+    others = {*variables} - {"velocity_sign"}
+    if len(others) == 1:
+        return dict.fromkeys(variables, KNOTS_ALONE)
+    if "load" in others:
+        return dict.fromkeys(variables, KNOTS_ALONE) | {"load": KNOTS_OF_FACTOR}
+    return dict.fromkeys(variables, KNOTS)
 
 
-def _hats(values: FloatArray, inside: tuple[float, float], count: int) -> FloatArray:
-    """Return hat functions of values at knots that are spaced evenly, shape (n, count)."""
-    place = (np.clip(values, *inside) - inside[0]) * ((count - 1) / (inside[1] - inside[0]))
-    return np.asarray(np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(count))))
+def _knots(
+    layout: Layout, place: Place, variable: str, width: float, count: int
+) -> tuple[float, ...]:
+    """Return the knots of a variable: as close by its range as by how many samples are near.
+
+    A form has the more detail where there are more samples, and none is far from a knot.
+    """
+    if variable == "velocity_sign":
+        return ()
+    known = layout.runs[0].memo
+    key = ("knots", variable, _channel(layout.runs[0], place, variable, place.home), count)
+    if key not in known:
+        values = [variable_of(run, place, variable, place.home, width) for run in layout.runs]
+        low = min(float(np.percentile(x, 1)) for x in values)
+        high = max(float(np.percentile(x, 99)) for x in values)
+        high = high if high > low else low + 1.0
+        rank = np.linspace(0.0, 1.0, RANKS)
+        at = np.quantile(np.clip(np.concatenate(values), low, high), rank)
+        at[0], at[-1] = low, high
+        grid = np.linspace(low, high, RANKS)
+        even = (grid - low) / (high - low)
+        place_of = 0.5 * even + 0.5 * np.interp(grid, at, rank)
+        known[key] = np.interp(np.linspace(0.0, 1.0, count), place_of, grid)
+    found = known[key]
+    return () if found is None else tuple(map(float, found))
+
+
+def _hats(values: FloatArray, knots: tuple[float, ...]) -> FloatArray:
+    """Return hat functions of values at knots, shape (n, knots)."""
+    place = np.interp(values, knots, np.arange(len(knots)))
+    return np.asarray(np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(len(knots)))))
 
 
 @numba.njit(cache=True)

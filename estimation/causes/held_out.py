@@ -1,5 +1,6 @@
 """The test runs: opened once, when every hypothesis is fixed, to keep or drop each cause."""
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,32 +16,43 @@ from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.split import Sealed
 from estimation.recording import FloatArray
 
+OPEN = 0.05
+"""Probability of acting, or of not acting, below which the training runs decide."""
+
 
 @dataclass(frozen=True)
 class Gains:
     """The score of one more cause in each test run.
 
     Attributes:
-        by_run: Run to score, as if the cause acted in those that are open.
-        is_open: Runs in which the training runs do not decide whether it acts.
+        by_run: Run to score, as if the cause acted there.
+        acting: Run to the probability that it acts there, from the training runs.
     """
 
     by_run: Mapping[str, float]
-    is_open: frozenset[str]
+    acting: Mapping[str, float]
 
     def log_ratio(self, per_score: float) -> float:
         """Return the logarithm of the likelihood ratio of all runs.
 
-        In a run that is open it is that of the mean of acting and not acting.
+        In each run it is that of the mean of acting and not acting.
 
         Args:
             per_score: Log likelihood ratio for one unit of score in one run.
         """
-        total = 0.0
-        for name, gain in self.by_run.items():
-            ratio = per_score * gain
-            total += np.logaddexp(ratio, 0.0) - math.log(2.0) if name in self.is_open else ratio
-        return float(total)
+        return float(
+            sum(
+                np.logaddexp(
+                    _log(self.acting[name]) + per_score * gain, _log(1.0 - self.acting[name])
+                )
+                for name, gain in self.by_run.items()
+            )
+        )
+
+    def acts_in(self, name: str, per_score: float) -> bool:
+        """Whether the cause more probably acts in a run than not, the run itself included."""
+        odds = _log(self.acting[name]) + per_score * self.by_run[name]
+        return odds > _log(1.0 - self.acting[name])
 
 
 class HeldOut:
@@ -64,20 +76,23 @@ class HeldOut:
     def acts_in(
         self, before: Sequence[Candidate], cause: Candidate
     ) -> tuple[Mapping[str, bool], Sequence[str]]:
-        """Return whether a cause acts in each run, and the test runs that themselves decide it.
-
-        A test run between a run in which the cause acts and one in which it does not is open: a
-        change at one time of the campaign may be before it or after it. The cause acts in it if it
-        lowers the error there, next to the causes before it.
-        """
-        known = self._known(cause)
-        is_open = [name for name, acts in known.items() if acts is None]
-        found = self.gains(before, cause).by_run if is_open else {}
-        acts = {name: found[name] > 0.0 if x is None else x for name, x in known.items()}
+        """Return whether a cause acts in each run, and the test runs that themselves decide it."""
+        acting = self._acting(cause)
+        is_open = [name for name, p in acting.items() if min(p, 1.0 - p) > OPEN]
+        acts = {name: p > 0.5 for name, p in acting.items()}
+        if is_open:
+            gains = self.gains(before, cause)
+            per_score = 0.5 * self.numbers.samples_a_run
+            acts |= {name: gains.acts_in(name, per_score) for name in is_open}
         return acts, is_open
 
-    def _known(self, candidate: Candidate) -> Mapping[str, bool | None]:
-        """Return whether a cause acts in each run; None where the training runs do not decide."""
+    def _acting(self, candidate: Candidate) -> Mapping[str, float]:
+        """Return the probability that a cause acts in each run, from the training runs.
+
+        From one training run to the next, a cause comes or goes as often as it does on average
+        over them: one that came once acts in a test run between two runs that have it, and one
+        that comes and goes need not.
+        """
         order = [run.name for run in self.layout.runs]
         train = [r for k, r in enumerate(order) if k not in self.at]
         since_s = _since(candidate)
@@ -87,13 +102,22 @@ class HeldOut:
             ends = {r.name: float(r.channels[CAMPAIGN_TIME][-1]) for r in self.layout.runs}
             known = {name: ends[name] >= since_s for name in train}
         else:
-            return dict.fromkeys(order, True)
-        out: dict[str, bool | None] = {}
+            return dict.fromkeys(order, 1.0)
+        states = [*known.values()]
+        changes = sum(a != b for a, b in itertools.pairwise(states))
+        change = min(0.5, changes / max(1, len(states) - 1))
+        out: dict[str, float] = {}
         for k, name in enumerate(order):
-            before = [known[n] for n in order[: k + 1] if n in known][-1:]
+            if name in known:
+                out[name] = float(known[name])
+                continue
+            before = [known[n] for n in order[:k] if n in known][-1:]
             after = [known[n] for n in order[k:] if n in known][:1]
-            around = {*before, *after}
-            out[name] = around.pop() if len(around) == 1 else None
+            acting, not_acting = (
+                math.prod(1.0 - change if x == state else change for x in (*before, *after))
+                for state in (True, False)
+            )
+            out[name] = acting / (acting + not_acting)
         return out
 
     def gains(self, before: Sequence[Candidate], cause: Candidate) -> "Gains":
@@ -105,8 +129,7 @@ class HeldOut:
             mean = [e[p] / samples[self.at] for e in (old, new)]
             total += self.joint.log_ratio(p, mean[0], mean[1])
         names = [self.layout.runs[k].name for k in self.at]
-        is_open = frozenset(name for name, acts in self._known(cause).items() if acts is None)
-        return Gains(dict(zip(names, total.tolist(), strict=True)), is_open)
+        return Gains(dict(zip(names, total.tolist(), strict=True)), self._acting(cause))
 
     def _next_to(self, causes: Sequence[Candidate]) -> tuple[Joint, Mapping[Part, FloatArray]]:
         """Return the regression with causes, and its squared errors; the last one is kept."""
@@ -123,12 +146,18 @@ class HeldOut:
         return {p: values[self.at] for p, values in errors.items()}
 
     def _with(self, joint: Joint, candidate: Candidate) -> Joint:
-        """Return a regression with a cause; where it is open whether it acts it does."""
+        """Return a regression with a cause, as if it acted in every test run."""
         acts = None
         if candidate.acts is not None:
-            acts = tuple(on is not False for on in self._known(candidate).values())
+            trained = iter(candidate.acts)
+            count = len(self.layout.runs)
+            acts = tuple(k in self.at or next(trained) for k in range(count))
         laid = laid_out(self.joint, Claim(candidate.cause, acts))
         return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
+
+
+def _log(x: float) -> float:
+    return math.log(x) if x > 0.0 else -math.inf
 
 
 def _since(candidate: Candidate) -> float | None:

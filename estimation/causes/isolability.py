@@ -10,15 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimation.causes.acting import solved
 from estimation.causes.blocks import block_of
 from estimation.causes.candidates import Candidate, Group, candidates, skews, with_skews
-from estimation.causes.equations import Layout, lay_out
+from estimation.causes.equations import lay_out
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.search import assessed, best_of_each, probabilities, solved
+from estimation.causes.scoring import assessed, best_of_each, probabilities
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
 
@@ -55,16 +56,16 @@ class Isolable:
 def isolability(
     models: Sequence[Model],
     recordings: Sequence[Recording],
-    size: float = 1.0,
     numbers: Numbers = DEFAULT,
     on_part: Callable[[int, int], None] = lambda done, count: None,
 ) -> list[Isolable]:
     """Return the expected conclusion on each effect from these runs, the vaguest first.
 
+    Each effect is as large as the residual of the declared equations.
+
     Args:
         models: Declared equations.
         recordings: Runs of the machine, recorded or simulated, without an unmodelled effect.
-        size: Root mean square of each effect over that of the declared equations' residual.
         numbers: What decides.
         on_part: Called with the number of effects done and of all.
 
@@ -75,16 +76,6 @@ def isolability(
     names = [r.name for r in recordings]
     layout = lay_out(models, recordings, names)
     add_instruments(layout, names)
-    return isolability_of(layout, size, numbers, on_part)
-
-
-def isolability_of(
-    layout: Layout,
-    size: float = 1.0,
-    numbers: Numbers = DEFAULT,
-    on_part: Callable[[int, int], None] = lambda done, count: None,
-) -> list[Isolable]:
-    """Return the expected conclusions from runs that are laid out; see `isolability`."""
     plain = Joint(layout, numbers)
     joint = with_skews(plain, skews(plain))
     pool, folds = candidates(joint), folds_of(layout)
@@ -93,7 +84,7 @@ def isolability_of(
     for done, (name, shapes) in enumerate(effects.items()):
         on_part(done, len(effects))
         shares = [
-            _shares(joint.with_effect(one.laid, _amplitudes(joint, one, size)), pool, folds)
+            _shares(joint.with_effect(one.laid, _amplitudes(joint, one)), pool, folds)
             for one in shapes
         ]
         mean = {
@@ -124,15 +115,15 @@ def _spread(count: int, most: int) -> list[int]:
     return sorted({int(k) for k in (np.arange(min(count, most)) + 0.5) * count / min(count, most)})
 
 
-def _amplitudes(joint: Joint, one: Candidate, size: float) -> FloatArray:
-    """Return equal amplitudes at which the effect has a size, in declared errors, where it acts."""
+def _amplitudes(joint: Joint, one: Candidate) -> FloatArray:
+    """Return equal amplitudes at which the effect is as large as the declared error there."""
     ones = np.ones(one.laid.size.shape[1])
     power = max(
         float(np.sum((x[:, 0] @ ones) ** 2))
         / (joint.samples[name, "within"].sum() * joint.error[name, "within"])
         for name, x in one.laid.inner.items()
     )
-    return np.asarray(ones * size / np.sqrt(max(power, 1e-300)))
+    return np.asarray(ones / np.sqrt(max(power, 1e-300)))
 
 
 def _shares(joint: Joint, pool: Sequence[Group], folds: Folds) -> dict[str, float]:

@@ -361,16 +361,24 @@ class Joint:
             out[:, self._equations_at[name]] = taken
         return out
 
+    def linear(self, name: str) -> Mapping[int, str]:
+        """Return place to channel of each declared column that is a channel times a constant."""
+        equation = self.layout.equations[name]
+        at = self._equations_at[name].start + np.flatnonzero(equation.of_channel)
+        return dict(zip(at.tolist(), filter(None, equation.of_channel), strict=True))
+
     @cached_property
     def largest_linear(self) -> Mapping[str, tuple[int, str]]:
         """Return place and channel of each equation's largest channel times a constant."""
         out = {}
-        for name, equation in self.layout.equations.items():
-            linear = self._equations_at[name].start + np.flatnonzero(equation.of_channel)
-            power = np.diag(self.gram[name, "within"].sum(axis=0))[linear]
-            if len(linear):
-                most = int(linear[np.argmax(self.declared[linear] ** 2 * power)])
-                out[name] = most, equation.of_channel[most - self._equations_at[name].start]
+        for name in self.layout.equations:
+            linear = self.linear(name)
+            samples, means = self.samples[name, "within"], self.gram[name, "between"]
+            whole = self.gram[name, "within"].sum(axis=0) + np.tensordot(samples, means, 1)
+            power = self.declared**2 * np.diag(whole)[: len(self.declared)]
+            if linear:
+                most = max(linear, key=lambda at: float(power[at]))
+                out[name] = most, linear[most]
         return out
 
     # ---- errors

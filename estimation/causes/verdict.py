@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,82 +13,31 @@ from threadpoolctl import threadpool_limits
 
 from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Layout, lay_out, on_one_clock
+from estimation.causes.findings import (
+    Kept,
+    family_probabilities,
+    named,
+    parameters_of,
+    unpredicted,
+)
 from estimation.causes.folds import unvaried
-from estimation.causes.functions import Function, names
+from estimation.causes.functions import Function
 from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.refit import Errors, Part
+from estimation.causes.refit import Errors
 from estimation.causes.refits import Refits
-from estimation.causes.search import Found, Scored, posterior, probabilities, search
+from estimation.causes.scoring import probabilities
+from estimation.causes.search import Found, search
+from estimation.causes.unsteady import unsteady
 from estimation.diagnosis.audit import audit
-from estimation.diagnosis.result import Diagnosis, Finding, Value
+from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
-from estimation.model import Model, Term
+from estimation.model import Model
 from estimation.recording import Recording
-
-SURE = 0.9
-"""Probability from which a single name is given; below it the verdict is a set."""
-
-IN_SET = 0.95
-"""Probability that a set covers."""
 
 LEAST_SHARE = 0.001
 """Probability from which a family is held against the test runs."""
-
-VARIABLE_OF_ROLE: Mapping[str, str] = {
-    "speed": "velocity",
-    "acceleration": "acceleration",
-    "position": "spindle_angle",
-    "output_angle": "spindle_angle",
-    "encoder": "spindle_angle",
-    "stop": "jaw_angle",
-    "tilt": "jaw_angle",
-    "motor_angle": "motor_angle",
-    "load": "load",
-    "reading": "load",
-    "creeping": "load",
-    "current": "current",
-    "drive": "current",
-    "clock": "time",
-    "elapsed": "time",
-    "campaign_clock": "time",
-    "travel": "history",
-    "temperature": "temperature",
-}
-"""Role of an effect to the variable a finding names."""
-
-
-@dataclass(frozen=True)
-class Probability:
-    """A family's share of the posterior in one slot of the leading hypothesis.
-
-    Attributes:
-        family: The family.
-        share: Its probability.
-        best: Its best candidate.
-    """
-
-    family: str
-    share: float
-    best: Scored
-
-
-@dataclass(frozen=True)
-class Kept:
-    """A cause that the test runs confirmed.
-
-    Attributes:
-        scored: The cause.
-        likely: The probabilities of the families in its place.
-        ranked: Every candidate in its place, given the other causes, best first.
-        part: What it adds to its home equation.
-    """
-
-    scored: Scored
-    likely: Sequence[Probability]
-    ranked: Sequence[Scored]
-    part: Part | None = None
 
 
 @dataclass(frozen=True)
@@ -154,12 +103,19 @@ def answer(
         found = search(layout.select(sealed.discover), numbers)
     on_stage("opening the held-out test runs")
     refits = Refits(layout, timed, sealed, numbers)
-    kept, findings, notes = _judged(found, HeldOut(layout, sealed, numbers, found.late), refits)
+    held_out = HeldOut(layout, sealed, numbers, found.late)
+    kept, findings, notes = _judged(found, held_out, refits)
     written = refits.models()
     findings = [
-        replace(f, parameters=_parameters(k, f.balance, written))
+        replace(f, parameters=parameters_of(k, f.balance, written))
         for k, f in zip(kept, findings, strict=True)
     ]
+    if not kept and sealed.may_name and (changing := unsteady(held_out, numbers)):
+        findings = [unpredicted(changing, refits)]
+        notes.append(
+            f"{changing.equation}: the level of {changing.effect} changes within runs, at times"
+            " that no recorded signal predicts."
+        )
     diagnosis = Diagnosis(
         findings=tuple(findings),
         errors=refits.errors(),
@@ -172,16 +128,6 @@ def answer(
         seconds=time.perf_counter() - began,
     )
     return Answer(diagnosis, layout, found, tuple(kept), refits, tuple(written))
-
-
-def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
-    """Return the posterior over families of one slot, each by its best candidate, best first."""
-    best: dict[str, Scored] = {}
-    for scored in ranked:
-        best.setdefault(scored.candidate.cause.family, scored)
-    shares = posterior(list(best.values()), numbers)
-    found = [Probability(f, float(p), best[f]) for f, p in zip(best, shares, strict=True)]
-    return sorted((p for p in found if p.share > 0.0), key=lambda p: -p.share)
 
 
 def _judged(
@@ -217,7 +163,7 @@ def _judged(
                 " lower the error on the test runs."
             )
             continue
-        finding = _named(one, sealed.may_name)
+        finding = named(one, sealed.may_name)
         findings.append(
             replace(
                 finding,
@@ -289,18 +235,6 @@ def _tested(
     return replace(one, scored=found[0].best, likely=found), total
 
 
-def _set_of(likely: Sequence[Probability]) -> list[str]:
-    """Return the families besides the first that a verdict lists."""
-    some, covered = sum(p.share for p in likely), likely[0].share
-    others: list[str] = []
-    for one in likely[1:]:
-        if covered >= (IN_SET if others else SURE) * some:
-            break
-        covered += one.share
-        others.append(one.family)
-    return others
-
-
 def _is_lower(before: Errors, after: Errors, numbers: Numbers) -> bool:
     """Whether an error on the test runs falls, with each run's mean removed or left in."""
     least = math.sqrt(1.0 - numbers.form_floor)
@@ -318,82 +252,6 @@ def _unwritten(candidate: Candidate) -> str:
     else:
         why = f"it needs a reading that no model of {cause.place.home} may use"
     return f"{cause.place.home}: {cause.family} is reported and not added to the model file; {why}."
-
-
-def _named(one: Kept, may_name: bool) -> Finding:
-    """Return the claim of a cause, without its errors."""
-    cause = one.scored.candidate.cause
-    home = cause.place.home
-    lead, others = one.likely[0], _set_of(one.likely)
-    unknown = isinstance(lead.best.candidate.cause, Function)
-    if not may_name:
-        verdict = "something_missing"
-    elif unknown:
-        verdict = "depends_on"
-    else:
-        verdict = "identified" if lead.share >= SURE else "one_of"
-    return Finding(
-        balance=home,
-        also_in=tuple(dict.fromkeys(e.equation for e in cause.place.enters if e.equation != home)),
-        place=cause.place.name,
-        family=lead.family if may_name else "unknown",
-        verdict=verdict,
-        alternatives=tuple(others) if may_name else (),
-        probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]}
-        if may_name
-        else {},
-        depends_on=_variables(lead.best.candidate),
-        confidence=None if unknown or not may_name else round(lead.share, 4),
-        rmse_before=float("nan"),
-        rmse_after=float("nan"),
-        runs_improved=0,
-        runs_total=0,
-    )
-
-
-def _variables(candidate: Candidate) -> tuple[str, ...]:
-    cause = candidate.cause
-    if isinstance(cause, Function):
-        return names(cause.place, cause.variables)
-    found = [VARIABLE_OF_ROLE[r] for r, _ in cause.channels if r in VARIABLE_OF_ROLE]
-    if cause.family == "friction.dwell":
-        found = ["dwell" if v == "time" else v for v in found]
-    signed = cause.family.startswith("friction.") and not cause.family.endswith(
-        ("viscous_asymmetry", "drag", "stribeck", "load_viscous")
-    )
-    if signed:
-        found = ["velocity_sign" if v == "velocity" else v for v in found]
-    return tuple(dict.fromkeys(found))
-
-
-def _parameters(kept: Kept, home: str, written: Sequence[Model]) -> Mapping[str, Value]:
-    """Return amplitudes and shape of a named cause from the written model of its home equation.
-
-    Of a cause that no file holds, the shape alone.
-    """
-    cause = kept.scored.candidate.cause
-    if isinstance(cause, Function):
-        return {}
-    model = next(m for m in written if m.balance == home)
-    own = kept.part.term if kept.part is not None else None
-    for term in model.terms if own is not None else ():
-        if own is not None and _same(term, own):
-            return {
-                p.name: Value(known.value, term.unit(p, model.target), known.ci95)
-                for p in term.parameters
-                for known in [term.values[p.name]]
-            }
-    units = Term(cause.effect, channels=dict(cause.channels))
-    return {
-        p.name: Value(float(x), units.unit(p, model.target), None)
-        for p, x in zip(cause.effect.shape, cause.shape, strict=True)
-    }
-
-
-def _same(one: Term, other: Term) -> bool:
-    """Whether two terms are of one effect at one shape."""
-    shape = one.effect.shape
-    return one.effect.id == other.effect.id and one.numbers(shape) == other.numbers(shape)
 
 
 def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:

@@ -12,14 +12,8 @@ from estimation.causes.folds import Folds, folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import Numbers
-from estimation.causes.search import (
-    Ranking,
-    Scored,
-    assessed,
-    best_of_each,
-    hypothesis,
-    probabilities,
-)
+from estimation.causes.scoring import Scored, assessed, best_of_each, probabilities
+from estimation.causes.search import Ranking, hypothesis
 from estimation.causes.sources import Source
 from estimation.changes.candidates import Moved, SensorGain, claims
 from estimation.channels import unit_of

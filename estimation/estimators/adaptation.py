@@ -11,7 +11,8 @@ da Vinci Research Kit" (2022), where a network of another instrument is trained 
 data.
 
 The stiffnesses of states were chosen on two instruments of the public data set
-MRDLab/mis-tool-characterization, that of networks on one of them, Tool_4_Maryland_L_2.
+MRDLab/mis-tool-characterization, that of networks on one of them, Tool_4_Maryland_L_2; the one of
+changes at other angles also on Tool_4_Maryland_L_Pitch_1 and _Roll_1.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.bank.beyond import Visits
+from estimation.bank.beyond import Visits, cut_to
 from estimation.bank.fitting import Normal, pull
 from estimation.bank.interval import Interval, scaled, with_scores
 from estimation.bank.states import LAGS, Bank
@@ -36,6 +37,13 @@ Adaptable = BankEstimator | NetworkEstimator
 
 POSITION, LOAD, REST = 1e-3, 10.0, 3.0
 """Stiffness of the weights of products of position alone, of those with the load, of the others."""
+
+FLAT = 0.01
+"""Penalty on a change of the estimate at angles that the runs adapted with lack, beyond its change
+at the nearest angle that they have. Without it a polynomial of the angle fitted on one jaw stop
+grows to thousands of mN m on the next."""
+ANGLES, EVERY_ROW = 13, 20
+"""Angles at which that change is computed, and of how many samples one is used."""
 
 NORMAL_95 = 1.96
 """Half widths of 95 % are so many standard deviations of a normal distribution."""
@@ -156,7 +164,8 @@ def adapted_states(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEs
     stiff = stiffness(source.bank)
 
     def pulled(part: Sequence[RunEvidence]) -> FloatArray:
-        return pull([run.normal for run in part], source.weights, source.scale, stiff)
+        flat = FLAT * _change_elsewhere(source, part)
+        return pull([run.normal for run in part], source.weights, source.scale, stiff, flat)
 
     weights = pulled(runs)
     interval = None if source.interval is None else _interval(source.interval, runs, pulled)
@@ -168,46 +177,68 @@ def adapted_states(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEs
     )
 
 
+def _change_elsewhere(source: BankEstimator, runs: Sequence[RunEvidence]) -> FloatArray:
+    """Return the mean square of what weights add at angles that runs lack, shape (size, size).
+
+    Samples of the runs are moved to angles over three times the range of source and runs, and
+    compared with themselves at the nearest angle that the runs have.
+    """
+    rows = np.concatenate([run.rows for run in runs])[::EVERY_ROW]
+    angle = rows[:, 0]
+    low, high = angle.min(), angle.max()
+    lowest, highest = min(low, source.ranges[0, 0]), max(high, source.ranges[1, 0])
+    span = highest - lowest
+    total = np.zeros((source.bank.size, source.bank.size))
+    angles = np.linspace(lowest - span, highest + span, ANGLES)
+    for moved in angles[(angles < low) | (angles > high)]:
+        there, near = rows.copy(), rows.copy()
+        there[:, 0], near[:, 0] = moved, np.clip(moved, low, high)
+        change = source.bank.design(there) - source.bank.design(near)
+        total += change.T @ change / (len(rows) * ANGLES)
+    return total
+
+
 def _interval(
     source: Interval,
     runs: Sequence[RunEvidence],
     pulled: Callable[[Sequence[RunEvidence]], FloatArray],
-) -> Interval:
+) -> Interval | None:
     """Return the source's interval, wider away from the runs adapted with.
 
-    Conditions that no run of the new instrument has cost what unfitted conditions cost on the
+    It is stated at the angles and poses of both the source and these runs; None where they share
+    none. Loads and speeds that no run of the new instrument has cost what unfitted ones cost on the
     source. Where several runs are given, each by weights adapted with the others shows if that is
     enough; the interval is never narrower.
     """
-    visits = Visits([run.places for run in runs], source.beyond)
+    places = [run.places for run in runs]
+    shared = cut_to(source.beyond, np.concatenate(places))
+    if shared is None:
+        return None
+    source = replace(source, beyond=shared)
+    visits = Visits(places, shared)
     found = with_scores(source, visits.scores(np.arange(len(runs))).values)
     ratios = []
     for k, run in enumerate(runs if len(runs) > 1 else []):
         others = [j for j in range(len(runs)) if j != k]
         wide = with_scores(source, visits.scores(np.array(others)).values)
         error = run.design @ pulled([runs[j] for j in others]) - run.truth
-        one_sigma = wide.half_width(run.design, run.places) / NORMAL_95
-        ratios.append(np.nanmean((error / one_sigma) ** 2))
+        square = (NORMAL_95 * error / wide.half_width(run.design, run.places)) ** 2
+        if np.isfinite(square).any():
+            ratios.append(np.nanmean(square))
     return scaled(found, max(float(np.mean(ratios)), 1.0) ** 0.5) if ratios else found
 
 
-def spread_out(source: BankEstimator, runs: Sequence[RunEvidence], count: int) -> list[int]:
+def spread_out(runs: Sequence[RunEvidence], count: int) -> list[int]:
     """Return the runs to adapt with: those that are closest to all the others.
 
     One after another, the run is taken after which the mean score of all runs by those taken is
     least. Only the conditions of the samples are used, not the target.
 
     Args:
-        source: The estimator to be adapted.
         runs: Runs of the new instrument to choose from.
         count: How many, at most all.
-
-    Raises:
-        NetworkError: The source has no interval, so no grid of conditions.
     """
-    if source.interval is None:
-        raise NetworkError("The estimator has no interval, so runs cannot be chosen by it.")
-    visits = Visits([run.places for run in runs], source.interval.beyond)
+    visits = Visits([run.places for run in runs])
     taken: list[int] = []
     for _ in range(min(count, len(runs))):
         left = [k for k in range(len(runs)) if k not in taken]

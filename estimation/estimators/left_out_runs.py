@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.bank.beyond import Visits
+from estimation.bank.beyond import Visits, within
 from estimation.bank.edges import edges
 from estimation.bank.fitting import Pool, Settings, solve
 from estimation.bank.interval import Interval, calibrate, student, with_scores
@@ -47,10 +47,15 @@ def interval_of(
     scale = student(len(runs) - 1, coverage)
     excess, score = [], []
     for level in edges([run.conditions for run in runs], INNER_FOLDS) or _quarters(runs):
-        usual = [np.mean((interval.usual(designs[k]) / scale) ** 2) for k in level]
-        found = [np.mean(error**2) for error in errors(level)]
-        excess.append(float(np.mean(found) - np.mean(usual)))
-        score.append(visits.mean_score(level) - usual_score)
+        rest = [run.places for k, run in enumerate(runs) if k not in level]
+        more = [
+            error[known] ** 2 - (interval.usual(designs[k][known]) / scale) ** 2
+            for k, error in zip(level, errors(level), strict=True)
+            if (known := within(runs[k].places, rest)).any()
+        ]
+        if more:
+            excess.append(float(np.mean([part.mean() for part in more])))
+            score.append(visits.mean_score(level) - usual_score)
     price = max(float(np.mean(excess)), 0.0) / max(float(np.mean(score)), LEAST_SCORE)
     priced = replace(interval, price=scale**2 * price, usual_score=usual_score)
     # few levels can be left out, so the price is less certain than the usual width

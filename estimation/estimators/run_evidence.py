@@ -16,6 +16,7 @@ class RunEvidence:
     """Samples of one run to fit: every fourth valid closing one.
 
     Attributes:
+        rows: Filtered channels, shape (n, channels).
         design: The bank's products, shape (n, size).
         truth: The target without lag, shape (n,).
         normal: The run's share in the normal equations.
@@ -24,6 +25,7 @@ class RunEvidence:
         conditions: What was held constant in the run; the interval grows beyond their levels.
     """
 
+    rows: FloatArray
     design: FloatArray
     truth: FloatArray
     normal: Normal
@@ -52,6 +54,6 @@ class RunEvidence:
         ranges = np.array([judged.min(axis=0), judged.max(axis=0)])
         whole, places = Normal.of(design, truths), coordinates(bank, rows)
         return [
-            cls(design, truth, whole.only(k), ranges, places, conditions or {})
+            cls(rows, design, truth, whole.only(k), ranges, places, conditions or {})
             for k, truth in enumerate(np.ascontiguousarray(truths.T))
         ]

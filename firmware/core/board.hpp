@@ -161,7 +161,10 @@ class Board {
         }
         const bool doubtful = crossing.code == kEncodersDisagree || crossing.code == kEncoderJump ||
                               crossing.code == kEncoderFrozen;
-        if (doubtful) status &= ~static_cast<unsigned>(kReferenced);
+        if (doubtful) {
+            status &= ~static_cast<unsigned>(kReferenced);
+            reference_.forget_index();
+        }
         if (hold) {
             status |= kHolding;
             held_ticks_ = 0;
@@ -305,7 +308,10 @@ class Board {
         if (in_force() || !reference_.at_rest()) return kNotAtRest;
         std::int32_t counts[kEncoders];
         for (std::int32_t& count : counts) count = reader.i32();
-        reference_.set(counts);
+        const std::uint8_t at_index = reader.u8();
+        if (at_index > 1) return kBadValue;
+        if (at_index == 0) reference_.set(counts);
+        if (at_index == 1 && !reference_.set_at_index(counts)) return kNoIndex;
         status_ |= kReferenced;
         return kOk;
     }

@@ -87,6 +87,7 @@ enum Result : std::uint8_t {
     kTooHot = 14,
     kBeyondBoard = 15,
     kTooFast = 16,
+    kNoIndex = 17,
 };
 
 // How a host's limit is held against the board's own: most, also at least one tick,
@@ -193,6 +194,8 @@ struct ReferenceFields {
     std::int32_t max_still_rise = 0;
     std::int32_t jaw_zero = 0;
     std::int32_t max_beyond = 0;
+    std::int32_t probe_within = 0;
+    std::int32_t probe_patience = 0;
     ChoiceFields choice;
 
     // Gives every limit of both, and its sense, to `visit`, in the order of the wire.
@@ -225,6 +228,8 @@ struct ReferenceFields {
         visit(one.max_still_rise, other.max_still_rise, Sense::kMost);
         visit(one.jaw_zero, other.jaw_zero, Sense::kFree);
         visit(one.max_beyond, other.max_beyond, Sense::kMost);
+        visit(one.probe_within, other.probe_within, Sense::kFree);
+        visit(one.probe_patience, other.probe_patience, Sense::kMost);
         ChoiceFields::each(one.choice, other.choice, visit);
     }
 };
@@ -274,8 +279,9 @@ constexpr char kContract[] =
     "motor_per_turn i4, spindle_per_turn i4, jaw_per_turn i4, twist_e6 i4, stretch_e6 i4, "
     "max_twist i4, max_stretch i4, max_spindle_jump i4, max_jaw_jump i4, torque_e3 i4, "
     "max_still_torque i4, max_still_change i4, max_still_rise i4, jaw_zero i4, max_beyond "
-    "i4, stall_ticks i4, saturated_ticks i4, stale_ticks i4, dry_ticks i4, watchdog_us "
-    "i4, safe_state i4, hold_command_e4 i4, hold_ticks i4, seek i4\n"
+    "i4, probe_within i4, probe_patience i4, stall_ticks i4, saturated_ticks i4, "
+    "stale_ticks i4, dry_ticks i4, watchdog_us i4, safe_state i4, hold_command_e4 i4, "
+    "hold_ticks i4, seek i4\n"
     "18 START: version u1, kind u1, sequence u2\n"
     "19 SETPOINTS: version u1, kind u1, sequence u2, session u4, 100 x (target i4, "
     "load_ma i2)\n"
@@ -283,7 +289,8 @@ constexpr char kContract[] =
     "21 DISARM: version u1, kind u1, sequence u2\n"
     "22 PING: version u1, kind u1, sequence u2, session u4, token u8\n"
     "23 TRIP: version u1, kind u1, sequence u2\n"
-    "24 REFERENCE: version u1, kind u1, sequence u2, count_1 i4, count_2 i4, count_3 i4\n"
+    "24 REFERENCE: version u1, kind u1, sequence u2, count_1 i4, count_2 i4, count_3 i4, "
+    "at_index u1\n"
     "25 CLEAR: version u1, kind u1, sequence u2, code u1\n"
     "status: 1 ARMED, 2 SATURATED, 4 QUEUE_DRY, 8 WATCHDOG_TRIPPED, 16 LIMIT_TRIPPED, 32 "
     "HOLDING, 64 REFERENCED, trip << 8\n"
@@ -295,8 +302,8 @@ constexpr char kContract[] =
     "result: 0 OK, 1 UNKNOWN_KIND, 2 WRONG_SIZE, 3 BAD_VALUE, 4 QUEUE_FULL, 5 NOT_ARMED, "
     "6 WRONG_VERSION, 7 NOT_REFERENCED, 8 NOT_AT_REST, 9 WRONG_SESSION, 10 OLD_SEQUENCE, "
     "11 TRIPPED, 12 WRONG_TRIP, 13 ALREADY_ARMED, 14 TOO_HOT, 15 BEYOND_BOARD, 16 "
-    "TOO_FAST\n";
-constexpr std::size_t kArmSize = 236;  // behind the session
+    "TOO_FAST, 17 NO_INDEX\n";
+constexpr std::size_t kArmSize = 244;  // behind the session
 constexpr std::size_t kSetpointSize = 6;
 constexpr std::size_t kMaxSetpoints = 100;
 constexpr std::int64_t kTickUs = 1000;
@@ -345,7 +352,8 @@ constexpr char kContract[] =
     "21 DISARM: version u1, kind u1, sequence u2\n"
     "22 PING: version u1, kind u1, sequence u2, session u4, token u8\n"
     "23 TRIP: version u1, kind u1, sequence u2\n"
-    "24 REFERENCE: version u1, kind u1, sequence u2, count_1 i4, count_2 i4, count_3 i4\n"
+    "24 REFERENCE: version u1, kind u1, sequence u2, count_1 i4, count_2 i4, count_3 i4, "
+    "at_index u1\n"
     "25 CLEAR: version u1, kind u1, sequence u2, code u1\n"
     "status: 1 ARMED, 2 SATURATED, 4 QUEUE_DRY, 8 WATCHDOG_TRIPPED, 16 LIMIT_TRIPPED, 32 "
     "HOLDING, 64 REFERENCED, trip << 8\n"
@@ -357,7 +365,7 @@ constexpr char kContract[] =
     "result: 0 OK, 1 UNKNOWN_KIND, 2 WRONG_SIZE, 3 BAD_VALUE, 4 QUEUE_FULL, 5 NOT_ARMED, "
     "6 WRONG_VERSION, 7 NOT_REFERENCED, 8 NOT_AT_REST, 9 WRONG_SESSION, 10 OLD_SEQUENCE, "
     "11 TRIPPED, 12 WRONG_TRIP, 13 ALREADY_ARMED, 14 TOO_HOT, 15 BEYOND_BOARD, 16 "
-    "TOO_FAST\n";
+    "TOO_FAST, 17 NO_INDEX\n";
 constexpr std::size_t kArmSize = 384;  // behind the session
 constexpr std::size_t kSetpointSize = 12;
 constexpr std::size_t kMaxSetpoints = 50;

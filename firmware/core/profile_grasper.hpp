@@ -67,6 +67,7 @@ class GrasperProfile {
         std::int32_t force[kMotors] = {};
     };
 
+    static bool indexed(const Inputs&) { return false; }  // none is wired
     static std::int32_t& encoder(Inputs& inputs, std::size_t k) { return inputs.motor[k]; }
 
     struct Setpoint {

@@ -7,6 +7,7 @@
 
 #include "control.hpp"
 #include "encoder_pair.hpp"
+#include "end_probe.hpp"
 #include "limits.hpp"
 #include "loop_guard.hpp"
 #include "motor_guard.hpp"
@@ -56,7 +57,10 @@ class ReferenceProfile {
         std::int32_t distal = 0;
         std::int32_t current = 0;
         std::int32_t fsr = 0;
+        bool indexed = false;  // the index of the spindle's encoder came since the last sample
     };
+
+    static bool indexed(const Inputs& inputs) { return inputs.indexed; }
 
     static std::int32_t& encoder(Inputs& inputs, std::size_t k) {
         return k == 0 ? inputs.motor : k == 1 ? inputs.spindle : inputs.jaw;
@@ -95,6 +99,8 @@ class ReferenceProfile {
                            limits_.max_stretch, kJawLateTicks, kJawMeanTicks};
         rest_limits_ = {limits_.torque_e3, limits_.twist_e6 < 0 ? -1 : 1, limits_.max_still_torque,
                         limits_.max_still_change, limits_.max_still_rise};
+        probe_limits_ = {limits_.min_spindle, limits_.max_spindle, limits_.probe_within,
+                         limits_.probe_patience, pull_of(settings)};
     }
 
     const ChoiceFields& choice() const { return limits_.choice; }
@@ -181,7 +187,8 @@ class ReferenceProfile {
 
     Outputs drive(const Setpoint& setpoint, const Inputs& now) {
         const std::int32_t command_e4 =
-            controller_.tick(setpoint.target, now.spindle, now.motor);
+            probe_.drive(probe_limits_, setpoint.target, now.spindle, rest_.still_ticks(),
+                         controller_.tick(setpoint.target, now.spindle, now.motor));
         loop_.drove(setpoint.target, command_e4);
         load_ma_ = setpoint.load_ma;
         return {command_e4, setpoint.load_ma, true};
@@ -206,6 +213,17 @@ class ReferenceProfile {
 
     static std::int32_t late(std::int32_t now, std::int32_t last, std::int64_t ticks) {
         return static_cast<std::int32_t>(now - (std::int64_t{now} - last) / ticks);
+    }
+
+    // The command that overcomes any friction, even where the torque constant is half of what is declared.
+    static std::int32_t pull_of(const Settings& settings) {
+        const ReferenceFields& limits = settings.limits;
+        const std::int64_t made = magnitude(std::int64_t{limits.torque_e3} * limits.loop.full_scale_current);
+        if (made == 0 || limits.max_still_torque == INT32_MAX) return 0;
+        const double most = settings.gains.limit;
+        const double pull = 1e7 * kDoubt * limits.max_still_torque / static_cast<double>(made);
+        const auto size = static_cast<std::int32_t>(pull < most ? pull : most);
+        return settings.gains.kp < 0 ? -size : size;
     }
 
     Crossing check_levels(const Inputs& now) const {
@@ -249,8 +267,9 @@ class ReferenceProfile {
         const Crossing loop =
             loop_.check(limits_.loop, kTickUs, now.spindle, now.motor, now.current, {1, 0, 5});
         if (loop.code != kNoTrip) return loop;
-        return rest_.check(rest_limits_, kTickUs, {now.motor, now.spindle, now.jaw}, now.proximal,
-                           now.current);
+        const Crossing rest = rest_.check(rest_limits_, kTickUs, {now.motor, now.spindle, now.jaw},
+                                          now.proximal, now.current);
+        return rest.code != kNoTrip ? rest : probe_.check(kTickUs, rest_.still_ticks());
     }
 
     // Where the jaw is, the spindle cannot be far beyond its travel, whatever the motor and it count.
@@ -282,6 +301,8 @@ class ReferenceProfile {
     Inputs last_;
     RestLimits rest_limits_;
     RestGuard rest_;
+    ProbeLimits probe_limits_;
+    EndProbe probe_;
     SensorGuard<3> sensors_{3, INT16_MIN, INT16_MAX};
     bool primed_ = false;
 };

@@ -18,7 +18,7 @@ namespace rig {
 constexpr std::uint32_t kBuildHash = RIG_BUILD_HASH;
 
 constexpr std::size_t kEncoders = 3;  // of every profile
-constexpr std::size_t kReferenceSize = 4 * kEncoders;
+constexpr std::size_t kReferenceSize = 4 * kEncoders + 1;
 constexpr std::size_t kTokenSize = 8;
 
 constexpr std::uint32_t crc32(const char* text) {

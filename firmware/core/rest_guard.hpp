@@ -20,6 +20,8 @@ struct RestLimits {
 
 class RestGuard {
   public:
+    std::int64_t still_ticks() const { return still_ticks_; }  // since an encoder counted
+
     Crossing check(const RestLimits& limits, std::int64_t tick_us, const std::int32_t (&counts)[3],
                    std::int32_t torque, std::int32_t current) {
         const std::int64_t made = kFine * within_largest(current) * limits.torque_e3 / 1000;

@@ -20,6 +20,7 @@ class HostBoard {
     virtual void assume_hot() = 0;
     virtual bool limit_to(const std::uint8_t* settings) = 0;
     virtual void stop(bool stopped) = 0;
+    virtual void index() = 0;
     virtual bool in_force() const = 0;
     virtual rig::Trip trip() const = 0;
     virtual void restore(rig::Trip code) = 0;
@@ -30,7 +31,7 @@ class HostBoard {
 };
 
 rig::ReferenceProfile::Inputs inputs_of(const std::int32_t* row, rig::ReferenceProfile) {
-    return {row[0], row[1], row[2], row[3], row[4], row[5], row[6]};
+    return {row[0], row[1], row[2], row[3], row[4], row[5], row[6], false};
 }
 
 rig::GrasperProfile::Inputs inputs_of(const std::int32_t* row, rig::GrasperProfile) {
@@ -42,6 +43,9 @@ rig::GrasperProfile::Inputs inputs_of(const std::int32_t* row, rig::GrasperProfi
     }
     return inputs;
 }
+
+void mark_indexed(rig::ReferenceProfile::Inputs& inputs) { inputs.indexed = true; }
+void mark_indexed(rig::GrasperProfile::Inputs&) {}
 
 void put(const rig::ReferenceProfile::Outputs& outputs, std::int32_t* row) {
     row[0] = outputs.command_e4;
@@ -74,6 +78,7 @@ class ProfileBoard final : public HostBoard {
         return settings.valid();
     }
     void stop(bool stopped) override { stopped_ = stopped; }
+    void index() override { index_ = true; }
     bool in_force() const override { return board_.in_force(); }
     rig::Trip trip() const override { return board_.trip(); }
     void restore(rig::Trip code) override { board_.restore(code); }
@@ -82,7 +87,10 @@ class ProfileBoard final : public HostBoard {
         board_.template receive<rig::NoLock>(data, size);
     }
     void tick(std::uint32_t tick_us, const std::int32_t* inputs, std::int32_t* outputs) override {
-        put(board_.tick(tick_us, inputs_of(inputs, Profile()), stopped_), outputs);
+        auto now = inputs_of(inputs, Profile());
+        if (index_) mark_indexed(now);
+        index_ = false;
+        put(board_.tick(tick_us, now, stopped_), outputs);
     }
     std::size_t transmit(std::uint8_t* out, std::size_t room) override {
         return board_.transmit(out, room);
@@ -91,6 +99,7 @@ class ProfileBoard final : public HostBoard {
   private:
     rig::Board<Profile, kTransmitCapacity> board_;
     bool stopped_ = false;
+    bool index_ = false;
 };
 
 // The guards alone, for a host that holds a board's limits against the samples as they arrive.
@@ -158,6 +167,9 @@ std::int32_t rig_board_limit(void* board, const std::uint8_t* settings) {
 
 // Whether somebody asks for an emergency stop from now on.
 void rig_board_stop(void* board, std::int32_t stopped) { board_of(board)->stop(stopped != 0); }
+
+// The index of the spindle's encoder comes with the next tick.
+void rig_board_index(void* board) { board_of(board)->index(); }
 
 // Whether motors are, or may at any tick be, given current.
 std::int32_t rig_board_in_force(void* board) { return board_of(board)->in_force() ? 1 : 0; }

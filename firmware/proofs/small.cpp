@@ -263,7 +263,8 @@ Cases extreme_inputs(const proofs::Settings& bytes) {
             rig::ReferenceProfile profile;
             profile.begin(settings);
             const rig::ReferenceProfile::Inputs inputs[3] = {
-                {}, {now[0], now[1], now[2], now[3], now[4], now[5], 0}, {now[1], now[2], now[0], now[4], now[5], now[3], 0}};
+                {}, {now[0], now[1], now[2], now[3], now[4], now[5], 0, false},
+                {now[1], now[2], now[0], now[4], now[5], now[3], 0, true}};
             for (const auto& one : inputs) {
                 profile.late(one, 3);
                 profile.warm(one, 3);

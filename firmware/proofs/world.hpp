@@ -245,7 +245,7 @@ class World {
         sense();
         const rig::ReferenceProfile::Inputs inputs = {
             seen_[kMotor],    seen_[kSpindle], seen_[kJaw], seen_[kProximal],
-            seen_[kDistal],   seen_[kCurrent], 0};
+            seen_[kDistal],   seen_[kCurrent], 0, false};
         const unsigned tripped = trip();
         outputs_ = board_.tick(now_us_, inputs, estop);
         answers();

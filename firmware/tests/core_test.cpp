@@ -219,6 +219,7 @@ TEST_CASE("a missing encoder is no rest, and a reference gives the next samples 
     desk.run(1);
     Bytes counts;
     for (std::uint32_t count : {70U, 80U, 90U}) proofs::put(counts, count, 4);
+    counts.push_back(0);  // of the present place
     desk.send(rig::kReference, counts);
     CHECK(desk.result() == rig::kNotAtRest);
     desk.run(150);
@@ -229,6 +230,20 @@ TEST_CASE("a missing encoder is no rest, and a reference gives the next samples 
     desk.run(1);
     rig::Reader reader(desk.sample.data() + 12);
     for (std::uint32_t count : {70U, 80U, 90U}) CHECK(reader.u32() == count);
+    for (int place : {1, 2}) {
+        counts.back() = static_cast<std::uint8_t>(place);
+        desk.send(rig::kReference, counts);
+        CHECK(desk.result() == (place == 1 ? rig::kNoIndex : rig::kBadValue));
+    }
+    counts.back() = 1;
+    desk.inputs.indexed = true;  // here, but an encoder is missing
+    desk.inputs.jaw = rig::kMissing;
+    desk.run(1);
+    desk.inputs.indexed = false;
+    desk.inputs.jaw = 0;
+    desk.run(150);
+    desk.send(rig::kReference, counts);
+    CHECK(desk.result() == rig::kNoIndex);
     reader.u32();
     CHECK(reader.u16() == 5);
     CHECK(reader.u16() == 65536 - 6);

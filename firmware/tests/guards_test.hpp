@@ -167,6 +167,58 @@ TEST_CASE("a current that rises the way the motor turned cannot leave it at rest
     CHECK(stands(0, 90) == 0);
 }
 
+// What a profile does whose spindle stands at 90 of 100 while the target is `target`: the tick of its first pull,
+// the pull, and the tick of its trip; 0 for none. The motor answers each pull after `answers` ticks, or never.
+struct Probed {
+    int pulled = 0;
+    int command = 0;
+    int tripped = 0;
+};
+inline Probed probe(int target, double kp, int answers) {
+    Profile::Settings settings = Profile::Settings::widest();
+    settings.gains = {kp, 0, 0, 0, 500};
+    rig::ReferenceFields& limits = settings.limits;
+    limits.min_spindle = -100, limits.max_spindle = 100;
+    limits.probe_within = 8, limits.probe_patience = 5000;
+    limits.torque_e3 = -1000, limits.loop.full_scale_current = 2000, limits.max_still_torque = 40;
+    limits.loop.max_current_error = INT32_MAX;
+    Profile profile;
+    profile.begin(settings);
+    Probed probed;
+    Inputs inputs;
+    inputs.spindle = 90;
+    int pulls = 0;
+    for (int tick = 1; tick < 1200; ++tick) {
+        inputs.proximal = inputs.distal = inputs.current = tick % 2;
+        if (profile.check(inputs).code == rig::kEncoderFrozen) {
+            probed.tripped = tick;
+            break;
+        }
+        const int command = profile.drive({target, 0}, inputs).command_e4;
+        pulls = command * kp * (target - 89.5) < 0 ? pulls + 1 : 0;
+        if (pulls == 1 && probed.pulled == 0) probed = {tick, command, 0};
+        if (pulls > 0 && pulls == answers) inputs.motor += 2;
+    }
+    return probed;
+}
+
+TEST_CASE("encoders that do not count near an end are asked by a pull away from it, and trip when they are dead") {
+    // 10 counts from the end, 2 more than `within`: 30 ticks and 10 more
+    const Probed dead = probe(95, 1, 0);
+    CHECK(dead.pulled == 41);
+    CHECK(dead.command == -400);  // 2 x 40 of torque, 80 of current, of 2000
+    CHECK(dead.tripped == 51);
+    CHECK(probe(95, -1, 0).command == 400);
+    const Probed at_target = probe(90, 1, 0);
+    CHECK(at_target.pulled == 0);  // and no command either
+    const Probed inward = probe(80, 1, 0);  // 190 counts from the other end
+    CHECK(inward.pulled == 30 + 910 + 1);
+    const Probed alive = probe(95, 1, 10);
+    CHECK(alive.pulled == 41);
+    CHECK(alive.tripped == 0);
+    CHECK(probe(95, 1, 11).tripped == 51);
+}
+
 inline Inputs quiet(int tick) {
     Inputs inputs;
     inputs.proximal = inputs.distal = inputs.current = tick % 2;  // none of them stays

@@ -149,6 +149,18 @@ TEST_CASE("each encoder of a Teensy 4.1 has inputs of the crossbar for itself") 
     CHECK(teensy.sample().jaw == 3000);
 }
 
+TEST_CASE("the index of the spindle is in one sample, and a disturbance of its line is in none") {
+    rig::ReferenceHardware teensy;
+    teensy.begin();
+    board.levels[rig::wiring::kSpindleIndex] = LOW;
+    board.edges[rig::wiring::kSpindleIndex]();
+    CHECK_FALSE(teensy.sample().indexed);
+    board.levels[rig::wiring::kSpindleIndex] = HIGH;
+    board.edges[rig::wiring::kSpindleIndex]();
+    CHECK(teensy.sample().indexed);
+    CHECK_FALSE(teensy.sample().indexed);
+}
+
 TEST_CASE("a torque converter at its ends is a saturated field") {
     rig::ReferenceHardware teensy;
     teensy.begin();

@@ -8,6 +8,7 @@ the host's too, so both are on one time base, each with the residual of its fit.
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ class Companion:
         self.line: ClockLine | None = None
         """From sequence over rate to the host's clock, once there are arrivals enough."""
 
-    @property
+    @cached_property
     def rate_hz(self) -> float:
         """Its nominal rate."""
         return self.device.channels[0].rate_hz

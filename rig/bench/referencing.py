@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
+from drivers.errors import CommandRefusedError
 from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.protocol import Identity
+from drivers.teensy.protocol import Identity, Result
 from rig.bench.holding import holding
 from rig.bench.logger import open_logger
 from rig.configuration.config import Config
@@ -12,6 +13,8 @@ from rig.machines.choose import machine_of
 
 REST_SAMPLES = 300
 """Samples that are read first, so that the board has seen whether a shaft turns."""
+INDEX_SAMPLES = 60_000
+"""Samples in which the index is waited for."""
 SILENT_READS = 5
 READ_S = 0.2
 
@@ -36,12 +39,13 @@ def require_place(config: Config, here_rad: Sequence[float]) -> None:
         )
 
 
-def reference_board(config: Config, here_rad: Sequence[float]) -> Identity:
+def reference_board(config: Config, here_rad: Sequence[float], at_index: bool = False) -> Identity:
     """Reference the board of the configured rig, which stands still and disarmed.
 
     Args:
         config: The rig.
         here_rad: Where it stands: the machine's `here_channels`, rad.
+        at_index: Whether that is where the index of the spindle's encoder is; it is waited for.
 
     Returns:
         The identity of the referenced board.
@@ -61,9 +65,28 @@ def reference_board(config: Config, here_rad: Sequence[float]) -> Identity:
         logger.identify()
         logger.start()
         _read_at_rest(logger)
-        logger.reference(counts)
+        if at_index:
+            _reference_at_index(logger, counts)
+        else:
+            logger.reference(counts)
         logger.stop()
         return logger.identify()
+
+
+def _reference_at_index(logger: TeensyLogger, counts: Sequence[int]) -> None:
+    """Wait until somebody has turned the spindle through its index and let it go."""
+    seen = silent = 0
+    while True:
+        try:
+            logger.reference(counts, at_index=True)
+            return
+        except CommandRefusedError as error:
+            waits = error.result in (Result.NO_INDEX, Result.NOT_AT_REST)
+            if not waits or seen >= INDEX_SAMPLES or silent >= SILENT_READS:
+                raise
+        samples = len(logger.read(READ_S).samples)
+        seen += samples
+        silent += not samples
 
 
 def _read_at_rest(logger: TeensyLogger) -> None:

@@ -49,7 +49,7 @@ UNENDING = 2**62
 READ_TIMEOUT_S = 0.2
 """Longest wait for the next samples, s; shorter than the logger's watchdog, fed in between."""
 
-GATHER_S = 0.008
+GATHER_S = 0.01
 """In real time samples gather this long between two readings, s: a block costs as much as one."""
 
 CLOCK_EVERY_S = 0.25

@@ -25,6 +25,9 @@ StopOption = Annotated[
     Stop | None,
     typer.Option(help="Drive gently against this stop first; --at is where it stands then."),
 ]
+IndexFlag = Annotated[
+    bool, typer.Option("--index", help="Take the place of the encoder's index; --at is its angle.")
+]
 YesFlag = Annotated[bool, typer.Option("--yes", help="The rig stands at its mark; do not ask.")]
 
 
@@ -33,6 +36,7 @@ def reference(
     sim: SimFlag = False,
     at: AtOption = None,
     hard_stop: StopOption = None,
+    index: IndexFlag = False,
     yes: YesFlag = False,
     json: JsonFlag = False,
 ) -> int:
@@ -40,6 +44,7 @@ def reference(
 
     Turn the rig by hand to its mark first. The board refuses while it is armed or a shaft turns.
     With --hard-stop the motor turns it, with no more than the command that holds: keep clear.
+    With --index turn the spindle through its encoder's index and let go; it waits a minute.
     """
     from rig.bench.referencing import reference_board, require_place
     from rig.machines.choose import machine_of
@@ -58,14 +63,16 @@ def reference(
         results(json).print(
             f"It turned {turned_rad:+.3f} rad to the {hard_stop} stop.", markup=False
         )
-    if not yes:
+    if index:
+        typer.echo("Turn the spindle through its index and let go.", err=True)
+    elif not yes:
         how = "The motor is off" if hard_stop else "Turn the rig by hand to it and let go"
         typer.confirm(
             f"The place is {place}. {how}. Does it stand there?",
             abort=True,
             err=True,
         )
-    identity = reference_board(settings, here_rad)
+    identity = reference_board(settings, here_rad, index)
     results(json).print(
         f"{settings.name}: referenced at {place}; board {identity.serial}, start {identity.boot}.",
         markup=False,

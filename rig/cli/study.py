@@ -287,6 +287,10 @@ def intervals(
     instrument: Annotated[
         list[str] | None, typer.Option(help="Instrument to use; may be repeated.")
     ] = None,
+    source: Annotated[
+        list[str] | None,
+        typer.Option(help="One to adapt to all others; may be repeated; the first three."),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     json: JsonFlag = False,
@@ -294,15 +298,18 @@ def intervals(
     """Measure how often intervals hold, on levels left out and on other instruments."""
     from rig.importers.registry import open_campaign
     from rig.studies.instruments import intervals_page as shown
-    from rig.studies.instruments.intervals import run_intervals
+    from rig.studies.instruments.intervals import INSTRUMENTS, run_intervals
     from rig.studies.oneill.source import part_of
 
-    names = instrument or ["Tool_4_Maryland_L_4", "Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"]
+    names = instrument or INSTRUMENTS
     campaigns = {name: open_campaign(part_of(data, name)) for name in names}
     with progress() as bar:
         task = bar.add_task("intervals", total=None)
         study = run_intervals(
-            campaigns, seed, on_step=lambda what: bar.update(task, description=what)
+            campaigns,
+            source or names[:3],
+            seed,
+            on_step=lambda what: bar.update(task, description=what),
         )
     show_result(shown.lead(study), shown.tables(study), out, lambda: shown.markdown(study), json)
     if json:

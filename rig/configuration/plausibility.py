@@ -40,6 +40,11 @@ class PlausibilitySection(BaseModel):
         still_rise_n_m: Farthest the motor's torque may rise, while no encoder counts, above the
             friction it overcame in its last motion.
         beyond_rad: Farthest beyond its travel limit the spindle may be as the jaw's encoder shows.
+        probe_rad: Distance to the end of the travel that the spindle is to turn towards, within
+            which the encoders may not count for 30 ms, or 0.3 s at the target. Then the board pulls
+            away from that end by twice `still_torque_n_m` until they count; after 10 ms without a
+            count they are dead.
+        probe_s_rad: How much longer they may not count, for each radian farther from that end.
         gear_ratio: Motor turns a turn of the spindle; 0 for no comparison.
         gear_stiffness_n_m_rad: Stiffness of the gearhead's twist, at the spindle.
         twist_window_rad: Largest span of what motor and spindle differ by besides that twist, at
@@ -68,6 +73,8 @@ class PlausibilitySection(BaseModel):
     still_change_n_m: Window = 0.02
     still_rise_n_m: Window = 0.032
     beyond_rad: Window = 0.06
+    probe_rad: Window = 0.75
+    probe_s_rad: Window = 2.0
     gear_ratio: Ratio = 35.0
     gear_stiffness_n_m_rad: Window = 5.4
     twist_window_rad: Window = 0.03

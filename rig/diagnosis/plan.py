@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from estimation.causes.findings import IN_SET, SURE
 from estimation.causes.isolability import NOTHING, Isolable, isolability
-from estimation.causes.verdict import IN_SET, SURE
 from estimation.effects import catalogue
 from rig.diagnosis.subject import declared_models, subject
 from rig.errors import UsageError

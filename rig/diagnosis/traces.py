@@ -6,8 +6,9 @@ They are those that the reported errors are made of: the same samples, the same 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from estimation.causes.findings import VARIABLE_OF_ROLE, Kept
 from estimation.causes.functions import Function
-from estimation.causes.verdict import VARIABLE_OF_ROLE, Answer, Kept
+from estimation.causes.verdict import Answer
 from estimation.derived import zero_phase_channels
 from estimation.model import Model
 from estimation.recording import FloatArray
@@ -67,7 +68,7 @@ def traces(answer: Answer) -> Traces:
     """Return the traces of a diagnosis."""
     over = tuple(_channels(kept) for kept in answer.kept)
     wanted: dict[str, list[str]] = {name: [] for name in answer.refits.of}
-    for finding, channels in zip(answer.diagnosis.findings, over, strict=True):
+    for finding, channels in zip(answer.diagnosis.findings, over, strict=False):
         wanted[finding.balance] += channels
     found = {name: _equation(answer, name, channels) for name, channels in wanted.items()}
     return Traces({name: one for name, one in found.items() if one.runs}, over)

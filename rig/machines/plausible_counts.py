@@ -62,7 +62,9 @@ def jump_limit(max_motor_step: int) -> int:
     return min(TOP, JUMP_SPEEDS * max_motor_step)
 
 
-def pair_limits(believed: PlausibilitySection, calibrations: CalibrationSet) -> dict[str, int]:
+def pair_limits(
+    believed: PlausibilitySection, calibrations: CalibrationSet, tick_s: float
+) -> dict[str, int]:
     """Return the limits between motor, spindle and jaw, as far as the rig has them."""
     lines = calibrations.channels
     limits: dict[str, int] = {}
@@ -71,6 +73,8 @@ def pair_limits(believed: PlausibilitySection, calibrations: CalibrationSet) -> 
     if spindle is None:
         return limits
     limits["spindle_per_turn"] = round(2 * math.pi / spindle.slope)
+    limits["probe_within"] = round(abs(believed.probe_rad / spindle.slope))
+    limits["probe_patience"] = round(1e3 * believed.probe_s_rad * abs(spindle.slope) / tick_s)
     limits["max_spindle_jump"] = round(abs(believed.spindle_jump_rad / spindle.slope))
     if motor is not None and proximal is not None and believed.gear_ratio:
         motor_slope = motor.slope / believed.gear_ratio  # spindle angle a motor count

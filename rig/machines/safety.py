@@ -104,7 +104,7 @@ def board_limits(config: Config, calibrations: CalibrationSet, period_s: float =
         stall_current=size("motor_current_a", safety.stall_current_a),
         stall_motion=size("motor_angle_rad", safety.stall_motor_angle_rad),
         **loop_limits(config.plausibility, calibrations, loop, limits.motor_current_a, period_s),
-        **pair_limits(config.plausibility, calibrations),
+        **pair_limits(config.plausibility, calibrations, period_s),
         stall_ticks=ticks_of(safety.stall_s, period_s),
         saturated_ticks=ticks_of(safety.saturated_s, period_s),
         stale_ticks=ticks_of(safety.stale_s, period_s),

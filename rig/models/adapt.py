@@ -88,7 +88,6 @@ def runs_by_rule(source: Adaptable, campaign: Campaign, count: int) -> list[str]
 
     Raises:
         UsageError: It is a network, whose runs must be named, or too few runs are there.
-        NetworkError: The estimator has no interval.
     """
     if not isinstance(source, BankEstimator):
         raise UsageError("Runs are chosen for state estimators only.", fix="Name them with --runs.")
@@ -99,7 +98,7 @@ def runs_by_rule(source: Adaptable, campaign: Campaign, count: int) -> list[str]
             f"{len(usable)} usable runs are there, too few to choose {count} and report on others."
         )
     names = list(usable)
-    return [names[k] for k in spread_out(source, reduced(source, list(usable.values())), count)]
+    return [names[k] for k in spread_out(reduced(source, list(usable.values())), count)]
 
 
 def run_adaptation(

@@ -54,6 +54,29 @@ def test_a_board_that_was_started_is_not_armed_before_it_is_referenced(library: 
         assert logger.identify().referenced
 
 
+def test_the_index_gives_the_reference_once_wherever_the_shaft_stands_then(library: Path) -> None:
+    inputs = STANDS.copy()
+    inputs[:300, :3] += np.outer(np.clip(np.arange(300) - 280, -20, 0), [35, 2, 1])
+    board = FirmwareBoard(ScriptedBench(inputs), BoardStart(simulated=False), library)
+    with TeensyLogger(SimulatedTransport(board, "sim://")) as logger:
+        logger.identify()
+        board.advance(270)  # ten ticks before it stands
+        board.index()
+        logger.start()
+        at_rest(logger)
+        logger.reference([0, 1000, 500], at_index=True)
+        sample = newest(logger)
+        assert [int(sample[name]) for name in ("motor", "spindle", "jaw")] == [
+            350,
+            1020,
+            510,
+        ]
+        assert sample["status"] & STATUS_REFERENCED
+        with pytest.raises(CommandRefusedError, match="through its index") as refused:
+            logger.reference([0, 1000, 500], at_index=True)
+        assert refused.value.result == Result.NO_INDEX
+
+
 def test_a_shaft_that_turns_is_not_referenced(library: Path) -> None:
     turning = STANDS.copy()
     turning[:, 0] += 5 * np.arange(len(turning))

@@ -206,9 +206,37 @@ def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, r
     assert (new.interval.beyond.values >= fitted.interval.beyond.values).all()
     assert new.interval.least >= fitted.interval.least
     assert one.covered(new).mean() > 0.99
-    assert closing_error(new, other(runs[6]))[1].min() > 0
+    width = closing_error(new, other(runs[6]))[1]
+    assert np.isfinite(width).mean() > 0.8
+    assert np.nanmin(width) > 0
     with pytest.raises(NetworkError, match="No closing samples"):
         adapted(fitted, [])
+
+
+def moved(run: Recording, angle_rad: float) -> Recording:
+    """Return a run as if it were made elsewhere along the travel."""
+    return run.with_columns(spindle_angle_rad=run["spindle_angle_rad"] + angle_rad)
+
+
+def test_a_run_at_other_angles_leaves_the_estimates_elsewhere_as_wrong_as_before(fitted, runs):
+    def other(run: Recording) -> Recording:
+        return run.with_columns(**{TARGET: run[TARGET] + 0.02})
+
+    one = evidence(fitted, other(moved(runs[1], -1.3)))
+    assert one is not None
+    new = adapted(fitted, [one])
+    for angle_rad in (0.0, 1.3):
+        run = other(moved(runs[6], angle_rad))
+        before, after = (np.sqrt(np.mean(closing_error(e, run)[0] ** 2)) for e in (fitted, new))
+        assert after < 1.5 * before
+
+
+def test_no_interval_is_stated_at_angles_that_no_run_had(fitted, runs):
+    closing = processed(runs[1], [])["spindle_velocity_rad_s"] > 0.3
+    far = runs[1]["spindle_angle_rad"] + 1.0 > 0.9
+    width = fitted.estimate(moved(runs[1], 1.0)).half_width
+    assert np.isnan(width[far]).all()
+    assert np.isfinite(width[closing & ~far]).mean() > 0.5
 
 
 def test_a_damaged_file_is_refused(fitted, tmp_path):

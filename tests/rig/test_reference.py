@@ -73,6 +73,17 @@ def test_a_place_that_does_not_fit_the_rig_is_refused(
     assert message in capsys.readouterr().err
 
 
+def test_the_index_stands_for_the_mark(
+    restarted: FirmwareBoard, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["reference", "--sim", "--index", "--at", "0.3"]
+    assert main(words) != 0
+    assert "through its index" in capsys.readouterr().err
+    restarted.index()
+    assert main(words) == 0
+    assert played(restarted) < 0.02
+
+
 def driven(restarted: FirmwareBoard, monkeypatch: pytest.MonkeyPatch, *words: str) -> int:
     """Run the command with a hard stop against the board."""
     monkeypatch.setattr(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.reliability import dead_encoders
 from benchmarks.reliability.encoder_faults import (
     FAULTS,
     JAW,
@@ -105,7 +106,7 @@ def test_a_rig_at_rest_whose_encoders_are_dead_trips_before_it_breaks_away(
     machine = machine_of(config)
     limits = machine.board_limits(config, config.calibration_set())
     bench = SimulatedBench(start_count=round(-0.9 * PER_RAD[SPINDLE]))
-    board = FirmwareBoard(DeadFrom(bench, 500), library=library)
+    board = FirmwareBoard(dead_encoders.DeadFrom(bench, 500), library=library)
     host = RawHost(board, machine.profile, machine.gains(config))
     host.command(Kind.START)
     assert host.arm(limits) is Result.OK
@@ -117,27 +118,15 @@ def test_a_rig_at_rest_whose_encoders_are_dead_trips_before_it_breaks_away(
     assert abs(bench.state[SPINDLE_ANGLE] + 0.9) < BEYOND_RAD
 
 
-class DeadFrom:
-    """A simulated rig whose encoders count no more from a tick on."""
-
-    def __init__(self, bench: SimulatedBench, since: int) -> None:
-        self._bench, self._fault, self._tick = bench, frozen(MOTOR, SPINDLE, JAW, since=since), 0
-
-    def advance_with_board(
-        self, ticks: int, tick_address: int, board_address: int, tick_us: int
-    ) -> None:
-        board_tick = TICK_FUNCTION(tick_address)
-
-        def tick(_board: int, now_us: int, inputs: int, outputs: int) -> None:
-            counts = list((ctypes.c_int32 * 7).from_address(inputs))
-            given = (ctypes.c_int32 * 7)(*self._fault(self._tick, counts))
-            board_tick(board_address, now_us, given, outputs)
-            self._tick += 1
-
-        between = TICK_FUNCTION(tick)
-        address = ctypes.cast(between, ctypes.c_void_p).value
-        assert address
-        self._bench.advance_with_board(ticks, address, 0, tick_us)
+# of 320 drawn motions: the farthest beyond before the board asked its encoders, and a coasting one
+@pytest.mark.parametrize(("seed", "slow"), [(9, True), (65, True), (102, True), (1089, False)])
+def test_encoders_that_all_die_on_the_way_let_the_spindle_hardly_beyond(
+    library: Path, seed: int, slow: bool
+) -> None:
+    dead = dead_encoders.ride(seed, slow, library=library)
+    assert dead.trip is Trip.ENCODER_FROZEN
+    assert dead.beyond_rad < BEYOND_RAD
+    assert dead_encoders.ride(seed, slow, dead=False, library=library).trip is Trip.NONE
 
 
 class SmallGrasper:

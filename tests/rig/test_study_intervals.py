@@ -18,7 +18,8 @@ def study():
         for run in campaign()
     ]
     other = [run.with_columns(**{PROXIMAL: run[PROXIMAL] + 0.02}) for run in runs]
-    return run_intervals({"own": Campaign.of(runs), "other": Campaign.of(other)})
+    both = {"own": Campaign.of(runs), "other": Campaign.of(other)}
+    return run_intervals(both, ["own", "other"])
 
 
 def test_each_run_is_held_out_once_and_once_for_each_condition(study):

@@ -54,6 +54,8 @@ class ReferenceHardware : public TeensyLink {
         analogReadResolution(wiring::kAdcBits);
         analogReadAveraging(4);
         encoders_.begin();
+        pinMode(wiring::kSpindleIndex, INPUT_PULLDOWN);
+        attachInterrupt(digitalPinToInterrupt(wiring::kSpindleIndex), on_index, RISING);
         torques_.begin();
         Serial.begin(115200);  // the rate has no effect on USB
     }
@@ -74,6 +76,8 @@ class ReferenceHardware : public TeensyLink {
         counts.current = ready() ? wiring::kDrive.milliampere(analogRead(wiring::kDriveCurrentPin))
                                        : kMissing;
         counts.fsr = analogRead(wiring::kFsrPin);
+        counts.indexed = index_came_;
+        index_came_ = false;
         return counts;
     }
 
@@ -97,6 +101,10 @@ class ReferenceHardware : public TeensyLink {
                (digitalRead(wiring::kDriveReadyPin) == LOW && digitalRead(wiring::kLoadReadyPin) == LOW);
     }
 
+    // A short disturbance is over before the interrupt reads the line.
+    static void on_index() { index_came_ = index_came_ || digitalReadFast(wiring::kSpindleIndex) == HIGH; }
+
+    static inline volatile bool index_came_ = false;
     Counters encoders_;
     wiring::TorquePins torques_;
     ChipWatch watch_;

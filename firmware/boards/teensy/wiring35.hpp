@@ -15,6 +15,7 @@ constexpr char kSerial[] = "TEENSY35";  // the chip's number follows
 // The motor is at pins 3 and 4 (FTM1), the jaw at 29 and 30 (FTM2): the hardware has no others. The
 // spindle's pins are both of port C, whose interrupt priority is raised. All take 5 V.
 constexpr int kSpindleA = 9, kSpindleB = 10;
+constexpr int kSpindleIndex = 5;  // the encoder's output X; open where it has none
 constexpr int kSamplePriority = 32;  // above USB: its interrupts may wait, the sample may not
 constexpr int kEdgePriority = 16;
 

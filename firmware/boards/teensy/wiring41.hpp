@@ -18,6 +18,8 @@ constexpr int kJawA = 7, kJawB = 8;
 static_assert(inputs_are_exclusive({kMotorA, kMotorB, kSpindleA, kSpindleB, kJawA, kJawB}),
               "two encoder pins share an input of the crossbar, or one reaches no decoder");
 
+constexpr int kSpindleIndex = 32;  // the encoder's output X; open where it has none
+
 constexpr int kSamplePriority = 32;  // above USB: its interrupts may wait, the sample may not
 
 constexpr int kProximalPin = 14, kDistalPin = 15, kFsrPin = 16;  // A0, A1, A2

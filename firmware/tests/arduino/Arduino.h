@@ -7,7 +7,8 @@
 #include <deque>
 #include <map>
 
-constexpr int LOW = 0, HIGH = 1, INPUT = 0, OUTPUT = 1, INPUT_PULLUP = 2, CHANGE = 4;
+constexpr int LOW = 0, HIGH = 1, INPUT = 0, OUTPUT = 1, INPUT_PULLUP = 2, INPUT_PULLDOWN = 3;
+constexpr int RISING = 3, CHANGE = 4;
 
 struct FakeBoard {
     std::map<int, int> modes, levels, duties, analog, priorities;

@@ -1,7 +1,7 @@
 """How often the intervals of state estimators hold, where they were not fitted."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,17 @@ from rig.studies.oneill.state_rows import CONDITIONS
 TARGETS = (PROXIMAL, DISTAL, JAW)
 BANK = Bank("motor_current_a")
 FOLDS = 5
+INSTRUMENTS = (
+    *("Tool_4_Maryland_L_4", "Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"),
+    *(f"Tool_4_Maryland_L_{pose}_{k}" for pose in ("Pitch", "Roll") for k in range(1, 6)),
+)
+"""Every instrument and pose of the public data."""
+CHOSEN_ON = tuple(
+    f"Tool_4_Maryland_L_{pose}" for pose in ("Pitch_1", "Pitch_3", "Roll_1", "Roll_3")
+)
+"""Those on which it was chosen where an interval ends and how far one run may change another angle;
+no sentence counts them."""
+LEVELS = {**CONDITIONS, "stop": "jaw_stop_index"}
 COUNTS = (1, 3)
 """Runs adapted with."""
 
@@ -41,7 +52,9 @@ class Held:
         worst_level: Smallest mean share of one fit.
         half_width: Mean half width.
         no_width: Share of the samples for which none is stated.
+        spread: Standard error of `covered` over runs.
         rmse_ratio: Adapted: the error over the median of every other choice of as many runs.
+        worst_ratio: Adapted: the worst of these choices over their median.
     """
 
     instrument: str
@@ -55,7 +68,9 @@ class Held:
     worst_level: float
     half_width: float
     no_width: float
+    spread: float
     rmse_ratio: float = float("nan")
+    worst_ratio: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -70,6 +85,7 @@ class IntervalStudy:
 
 def run_intervals(
     campaigns: Mapping[str, Campaign],
+    sources: Sequence[str],
     seed: int = 0,
     on_step: Callable[[str], None] = lambda what: None,
 ) -> IntervalStudy:
@@ -77,6 +93,7 @@ def run_intervals(
 
     Args:
         campaigns: Runs of each instrument; those with flagged closing samples are left out.
+        sources: Instruments whose estimators are adapted to every other one.
         seed: Seed of the folds.
         on_step: Called with what is done next.
 
@@ -93,6 +110,8 @@ def run_intervals(
         for target, runs in by_target.items():
             on_step(f"{name}, {target}")
             levels += _left_out(name, target, runs, seed)
+            if name not in sources:
+                continue
             source = fit_runs(runs, BANK, target)
             for other, others in evidence.items():
                 if other != name:
@@ -121,10 +140,10 @@ def _splits(runs: Sequence[RunEvidence], seed: int) -> Iterator[tuple[str, NDArr
     """Yield what is left out and its runs."""
     for fold in in_folds(len(runs), FOLDS, seed):
         yield "run", fold
-    for condition in CONDITIONS.values():
-        values = np.array([float(run.conditions[condition]) for run in runs])
+    for condition in LEVELS.values():
+        values = np.array([float(run.conditions.get(condition, 0.0)) for run in runs])
         levels = np.unique(values)
-        for level in levels:
+        for level in levels if len(levels) > 1 else []:
             edge = level in (levels[0], levels[-1])
             yield "edge" if edge else "between", np.flatnonzero(values == level)
 
@@ -143,13 +162,13 @@ def _adapted(label: str, source: BankEstimator, runs: Sequence[RunEvidence], cou
     at_random = [draw.choice(len(runs), count, replace=False) for _ in range(len(runs))]
     choices = [np.array([k]) for k in range(len(runs))] if count == 1 else at_random
     scored = [
-        _on_others(source, runs, choice)
-        for choice in [np.array(spread_out(source, runs, count)), *choices]
+        _on_others(source, runs, choice) for choice in [np.array(spread_out(runs, count)), *choices]
     ]
     errors = [np.sqrt(np.mean([run.square for run in part])) for part in scored]
-    ratio = float(errors[0] / np.median(errors[1:]))
+    usual = np.median(errors[1:])
     left_out = f"{count} run{'s' if count > 1 else ''}"
-    return _held(label, source.target, left_out, scored[:1], ratio)
+    held = _held(label, source.target, left_out, scored[:1])
+    return replace(held, rmse_ratio=errors[0] / usual, worst_ratio=max(errors[1:]) / usual)
 
 
 def _on_others(
@@ -168,9 +187,10 @@ class _Run:
 
 
 def _on_run(fitted: BankEstimator, run: RunEvidence) -> _Run:
-    assert fitted.interval is not None  # noqa: S101  enough runs were fitted
     error = run.design @ fitted.weights - run.truth
-    width = fitted.interval.half_width(run.design, run.places)
+    width = np.full(len(error), np.nan)
+    if fitted.interval is not None:
+        width = fitted.interval.half_width(run.design, run.places)
     stated = np.isfinite(width)
     return _Run(
         float(np.mean(error**2)),
@@ -180,12 +200,10 @@ def _on_run(fitted: BankEstimator, run: RunEvidence) -> _Run:
     )
 
 
-def _held(
-    name: str, target: str, left_out: str, fits: Sequence[Sequence[_Run]], ratio: float = np.nan
-) -> Held:
+def _held(name: str, target: str, left_out: str, fits: Sequence[Sequence[_Run]]) -> Held:
     runs = [run for part in fits for run in part]
-    shares = [run.covered for run in runs if run.covered is not None]
     by_fit = [[run.covered for run in part if run.covered is not None] for part in fits]
+    shares = [share for part in by_fit for share in part] or [np.nan]
     return Held(
         name,
         target,
@@ -195,8 +213,8 @@ def _held(
         float(np.mean(shares)),
         float(np.median(shares)),
         min(shares),
-        min(float(np.mean(part)) for part in by_fit if part),
-        float(np.nanmean([run.half_width for run in runs])),
+        min((float(np.mean(part)) for part in by_fit if part), default=np.nan),
+        float(np.mean([run.half_width for run in runs if run.covered is not None] or [np.nan])),
         float(np.mean([run.no_width for run in runs])),
-        ratio,
+        float(np.std(shares) / np.sqrt(max(len(shares) - 1, 1))),
     )

@@ -8,13 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimation.causes.equations import lay_out
+from estimation.causes.findings import family_probabilities
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.places import places_of
 from estimation.causes.search import Found, search
 from estimation.causes.sources import sources_at
-from estimation.causes.verdict import diagnose, family_probabilities
+from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import FloatArray, Recording
 from tests.estimation.causes.synthetic import motor, recordings
@@ -78,15 +79,42 @@ def test_an_angle_that_follows_the_load_is_not_taken_for_a_cause() -> None:
     assert diagnose(runs, [motor()], split(runs)).verdict == "nothing_missing"
 
 
-def test_a_test_run_decides_itself_where_the_training_runs_do_not() -> None:
+@pytest.mark.parametrize("having", [(1, 2, 5, 6, 7, 10), (0, 3, 5, 8, 9), (2, 4, 7, 11)])
+def test_a_test_run_decides_itself_where_the_training_runs_do_not(having: tuple[int, ...]) -> None:
     plain, rippled = recordings(), recordings(_rippled)
-    having = (1, 2, 5, 6, 7, 10)
     runs = [rippled[k] if k in having else plain[k] for k in range(12)]
     answer = diagnose(runs, [motor()], split(runs))
     (finding,) = answer.findings
     assert finding.family == "ripple.motor"
     assert {*finding.runs_affected} == {f"{k:02d}" for k in having}
     assert any("these test runs themselves" in note for note in answer.notes)
+
+
+def test_a_loss_at_a_spot_that_grows_with_the_load_is_found_with_both_variables() -> None:
+    def spot(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArray:
+        there = np.exp(-0.5 * ((angle - 3.0) / 1.2) ** 2)
+        return 0.3 * load * there * np.tanh(speed / 2.0)
+
+    runs = recordings(spot)
+    finding = diagnose(runs, [motor()], split(runs)).findings[0]
+    assert finding.verdict == "depends_on"
+    assert {*finding.depends_on} == {"velocity_sign", "motor_angle", "load"}
+    assert finding.rmse_after < 0.7 * finding.rmse_before
+
+
+def test_friction_that_jumps_at_random_times_is_found_without_a_name() -> None:
+    random = np.random.default_rng(3)
+
+    def jumping(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArray:
+        level = np.repeat(random.choice([-0.008, 0.008], 8), len(speed) // 8)
+        return level * np.tanh(speed / 2.0)
+
+    runs = recordings(jumping)
+    answer = diagnose(runs, [motor()], split(runs))
+    (finding,) = answer.findings
+    assert finding.family == "unknown"
+    assert finding.depends_on == ("velocity_sign",)
+    assert any("changes within runs" in note for note in answer.notes)
 
 
 def test_the_test_runs_do_not_reach_the_choice(found: Found) -> None:

@@ -1,0 +1,189 @@
+"""The findings of a diagnosis: what is claimed of a cause, and its parameters."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from estimation.causes.candidates import Candidate
+from estimation.causes.functions import Function, names
+from estimation.causes.numbers import Numbers
+from estimation.causes.refit import Part
+from estimation.causes.refits import Refits
+from estimation.causes.scoring import Scored, posterior
+from estimation.causes.unsteady import Unsteady
+from estimation.diagnosis.result import Finding, Value
+from estimation.model import Model, Term
+
+SURE = 0.9
+"""Probability from which a single name is given; below it the verdict is a set."""
+
+IN_SET = 0.95
+"""Probability that a set covers."""
+
+VARIABLE_OF_ROLE: Mapping[str, str] = {
+    "speed": "velocity",
+    "acceleration": "acceleration",
+    "position": "spindle_angle",
+    "output_angle": "spindle_angle",
+    "encoder": "spindle_angle",
+    "stop": "jaw_angle",
+    "tilt": "jaw_angle",
+    "motor_angle": "motor_angle",
+    "load": "load",
+    "reading": "load",
+    "creeping": "load",
+    "current": "current",
+    "drive": "current",
+    "clock": "time",
+    "elapsed": "time",
+    "campaign_clock": "time",
+    "travel": "history",
+    "temperature": "temperature",
+}
+"""Role of an effect to the variable a finding names."""
+
+
+@dataclass(frozen=True)
+class Probability:
+    """A family's share of the posterior in one slot of the leading hypothesis.
+
+    Attributes:
+        family: The family.
+        share: Its probability.
+        best: Its best candidate.
+    """
+
+    family: str
+    share: float
+    best: Scored
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A cause that the test runs confirmed.
+
+    Attributes:
+        scored: The cause.
+        likely: The probabilities of the families in its place.
+        ranked: Every candidate in its place, given the other causes, best first.
+        part: What it adds to its home equation.
+    """
+
+    scored: Scored
+    likely: Sequence[Probability]
+    ranked: Sequence[Scored]
+    part: Part | None = None
+
+
+def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
+    """Return the posterior over families of one slot, each by its best candidate, best first."""
+    best: dict[str, Scored] = {}
+    for scored in ranked:
+        best.setdefault(scored.candidate.cause.family, scored)
+    shares = posterior(list(best.values()), numbers)
+    found = [Probability(f, float(p), best[f]) for f, p in zip(best, shares, strict=True)]
+    return sorted((p for p in found if p.share > 0.0), key=lambda p: -p.share)
+
+
+def named(one: Kept, may_name: bool) -> Finding:
+    """Return the claim of a cause, without its errors."""
+    cause = one.scored.candidate.cause
+    home = cause.place.home
+    lead, others = one.likely[0], _set_of(one.likely)
+    unknown = isinstance(lead.best.candidate.cause, Function)
+    if not may_name:
+        verdict = "something_missing"
+    elif unknown:
+        verdict = "depends_on"
+    else:
+        verdict = "identified" if lead.share >= SURE else "one_of"
+    return Finding(
+        balance=home,
+        also_in=tuple(dict.fromkeys(e.equation for e in cause.place.enters if e.equation != home)),
+        place=cause.place.name,
+        family=lead.family if may_name else "unknown",
+        verdict=verdict,
+        alternatives=tuple(others) if may_name else (),
+        probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]}
+        if may_name
+        else {},
+        depends_on=_variables(lead.best.candidate),
+        confidence=None if unknown or not may_name else round(lead.share, 4),
+        rmse_before=float("nan"),
+        rmse_after=float("nan"),
+        runs_improved=0,
+        runs_total=0,
+    )
+
+
+def unpredicted(found: Unsteady, refits: Refits) -> Finding:
+    """Return the finding of a friction level that changes within runs."""
+    before = refits.test_errors(found.equation)
+    return Finding(
+        balance=found.equation,
+        place=found.equation,
+        family="unknown",
+        verdict="depends_on",
+        depends_on=("velocity" if found.effect.endswith("viscous") else "velocity_sign",),
+        rmse_before=before.rmse,
+        rmse_after=found.fall * before.rmse,
+        runs_improved=sum(found.by_run[name] > 0.0 for name in before.by_run),
+        runs_total=len(before.by_run),
+        runs_affected=tuple(name for name, gain in found.by_run.items() if gain > 0.0),
+    )
+
+
+def parameters_of(kept: Kept, home: str, written: Sequence[Model]) -> Mapping[str, Value]:
+    """Return amplitudes and shape of a named cause from the written model of its home equation.
+
+    Of a cause that no file holds, the shape alone.
+    """
+    cause = kept.scored.candidate.cause
+    if isinstance(cause, Function):
+        return {}
+    model = next(m for m in written if m.balance == home)
+    own = kept.part.term if kept.part is not None else None
+    for term in model.terms if own is not None else ():
+        if own is not None and _same(term, own):
+            return {
+                p.name: Value(known.value, term.unit(p, model.target), known.ci95)
+                for p in term.parameters
+                for known in [term.values[p.name]]
+            }
+    units = Term(cause.effect, channels=dict(cause.channels))
+    return {
+        p.name: Value(float(x), units.unit(p, model.target), None)
+        for p, x in zip(cause.effect.shape, cause.shape, strict=True)
+    }
+
+
+def _set_of(likely: Sequence[Probability]) -> list[str]:
+    """Return the families besides the first that a verdict lists."""
+    some, covered = sum(p.share for p in likely), likely[0].share
+    others: list[str] = []
+    for one in likely[1:]:
+        if covered >= (IN_SET if others else SURE) * some:
+            break
+        covered += one.share
+        others.append(one.family)
+    return others
+
+
+def _variables(candidate: Candidate) -> tuple[str, ...]:
+    cause = candidate.cause
+    if isinstance(cause, Function):
+        return names(cause.place, cause.variables)
+    found = [VARIABLE_OF_ROLE[r] for r, _ in cause.channels if r in VARIABLE_OF_ROLE]
+    if cause.family == "friction.dwell":
+        found = ["dwell" if v == "time" else v for v in found]
+    signed = cause.family.startswith("friction.") and not cause.family.endswith(
+        ("viscous_asymmetry", "drag", "stribeck", "load_viscous")
+    )
+    if signed:
+        found = ["velocity_sign" if v == "velocity" else v for v in found]
+    return tuple(dict.fromkeys(found))
+
+
+def _same(one: Term, other: Term) -> bool:
+    """Whether two terms are of one effect at one shape."""
+    shape = one.effect.shape
+    return one.effect.id == other.effect.id and one.numbers(shape) == other.numbers(shape)

@@ -1,0 +1,115 @@
+"""The candidates next to a hypothesis: on a grid of shapes, refined, relaxed, and on some runs."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.causes.acting import TURNS, on_some_runs, one_run_changed
+from estimation.causes.candidates import (
+    Candidate,
+    Claim,
+    Group,
+    groups_of,
+)
+from estimation.causes.folds import Folds
+from estimation.causes.functions import Function
+from estimation.causes.joint import Joint
+from estimation.causes.scoring import Scored, assessed, best_of_each
+from estimation.causes.sources import RELATIVE, Bend, Source
+
+KNOTS_OF_BEND, BENT = 5, 24
+"""Hat functions of a form's deviation from its equation, and families that are given one."""
+
+REFINED = 8
+"""Families whose shapes are refined after the grid."""
+
+
+def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
+    """Return the best of each name: on the grid, on some of the runs, refined, and relaxed."""
+    everything = assessed(joint, pool, folds)
+    some = best_of_each(assessed(joint, groups_of(joint, on_some_runs(joint, everything)), folds))
+    climbing = some
+    for _ in range(TURNS):
+        flipped = [c for s in climbing for c in one_run_changed(s.candidate)]
+        found = best_of_each(assessed(joint, groups_of(joint, flipped), folds))
+        before = {s.candidate.name: s.score for s in some}
+        climbing = [s for s in found if s.score > before[s.candidate.name]]
+        some = best_of_each([*some, *climbing])
+    best = best_of_each([*everything, *some])
+    near = [c for s in best[:REFINED] for c in _neighbours(s.candidate)]
+    best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
+    bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
+    more = assessed(joint, groups_of(joint, bent), folds)
+    return _by_whole_form(joint, best_of_each([*best, *more]), folds)
+
+
+def _by_whole_form(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list[Scored]:
+    """Return a ranking in which causes that show by their odd part compete by their whole form.
+
+    What follows the noise of a reading is found by its odd part alone. Which of several such causes
+    of one place it is, a delay or a lag, shows in the even part: given that one of them is there,
+    their noise favours neither.
+    """
+    groups: dict[object, list[Scored]] = {}
+    for one in ranked:
+        cause = one.candidate.cause
+        if not isinstance(cause, Function) and cause.odd:
+            groups.setdefault((cause.place.name, one.candidate.acts), []).append(one)
+    changed: dict[object, Scored | None] = {}
+    for group in groups.values():
+        if len(group) < 2 or group[0].score < 0.0:
+            continue
+        near = [c for s in group for c in (s.candidate, *_neighbours(s.candidate))]
+        whole = [replace(Claim(c.cause, c.acts, c.choices), cause=_whole(c.cause)) for c in near]
+        found = best_of_each(assessed(joint, groups_of(joint, whole), folds))
+        of_name = {one.candidate.name: one for one in found}
+        for one in group:
+            known = of_name.get(one.candidate.name)
+            changed[one.candidate.name] = known and replace(
+                one, score=group[0].score + known.score - found[0].score
+            )
+    out = [changed.get(one.candidate.name, one) for one in ranked]
+    return sorted((one for one in out if one is not None), key=lambda one: -one.score)
+
+
+def _whole(cause: Source | Function) -> Source | Function:
+    return cause if isinstance(cause, Function) else replace(cause, odd=False)
+
+
+def _bent(joint: Joint, one: Scored) -> Claim | None:
+    """Return a named effect of one column with a form that deviates from its equation."""
+    candidate, cause = one.candidate, one.candidate.cause
+    if isinstance(cause, Function) or len(candidate.size) != 1:
+        return None
+    signals = [cause.signal(run, cause.place.home) for run in joint.runs]
+    values = np.concatenate([x[:, 0] for x in signals if x is not None])
+    low, high = np.percentile(values, (1.0, 99.0))
+    amplitude = abs(float(one.amplitudes[0] / candidate.size[0]))
+    if not high > low or amplitude == 0.0:
+        return None
+    knots = tuple(float(x) for x in np.linspace(low, high, KNOTS_OF_BEND))
+    bend = Bend(knots, joint.numbers.bend_share * amplitude)
+    return Claim(replace(cause, bend=bend), candidate.acts, candidate.choices)
+
+
+def _neighbours(candidate: Candidate) -> list[Claim]:
+    """Return a named effect at shapes between the points of the grid."""
+    cause = candidate.cause
+    if isinstance(cause, Function):
+        return []
+    out = []
+    for k, parameter in enumerate(cause.effect.shape):
+        values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
+        if parameter.name in ("width", "settled", "order") or values is None or len(values) < 2:
+            continue
+        ratio = values[1] / values[0]
+        for step in (-0.5, -0.25, 0.25, 0.5):
+            moved = (
+                cause.shape[k] + step * (values[1] - values[0])
+                if parameter.linear
+                else cause.shape[k] * ratio**step
+            )
+            shape = (*cause.shape[:k], float(moved), *cause.shape[k + 1 :])
+            out.append(Claim(replace(cause, shape=shape), candidate.acts, candidate.choices))
+    return out

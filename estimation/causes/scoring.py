@@ -1,0 +1,158 @@
+"""The score of a cause next to others, its price, and the probability of each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.causes.blocks import Outcome, block_of, evaluate
+from estimation.causes.candidates import (
+    Candidate,
+    Group,
+)
+from estimation.causes.folds import Folds
+from estimation.causes.functions import Function
+from estimation.causes.joint import Joint
+from estimation.causes.numbers import Numbers
+from estimation.recording import FloatArray
+
+MOST_CHANGE = 2.0
+"""Factor by which the largest linear term of an equation may change next to a cause."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A candidate with its score given a base.
+
+    Attributes:
+        candidate: The candidate.
+        score: Mean of the families of folds, less the price of what was chosen.
+        gain: The same with the price left in.
+        by_family: Score of each family of folds.
+        amplitudes: Its amplitudes on all runs, in the scale of its columns.
+        by_run: Products of its columns with the base's residual, with themselves and with the base,
+            of each run.
+    """
+
+    candidate: Candidate
+    score: float
+    gain: float
+    by_family: FloatArray
+    amplitudes: FloatArray
+    by_run: tuple[FloatArray, FloatArray, FloatArray]
+
+
+def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
+    """Return the score of each candidate given the base; those of a wrong sign are left out."""
+    before, spreads = joint.base_errors(folds), [joint.extrapolated(family) for family in folds]
+    out = []
+    for group in pool:
+        block = block_of(joint, group.laid, group.block)
+        outcome = evaluate(joint, block, folds, group.precision)
+        replaces = _in_readings(joint, group.candidates, outcome)
+        scores, by_family = joint.score(spreads, before, outcome.errors)
+        for k, candidate in enumerate(group.candidates):
+            amplitudes = outcome.amplitudes[k]
+            if replaces[k] or _sign_is_wrong(candidate, amplitudes):
+                continue
+            gain = float(scores[k])
+            score = gain - _price(candidate, joint)
+            by_run = outcome.cross[:, k], outcome.own[:, k], outcome.base[:, k]
+            out.append(Scored(candidate, score, gain, by_family[:, k], amplitudes, by_run))
+    return out
+
+
+def best_of_each(scored: Sequence[Scored]) -> list[Scored]:
+    """Return the best candidate of each name, best first."""
+    best: dict[object, Scored] = {}
+    for one in scored:
+        known = best.get(one.candidate.name)
+        if known is None or one.score > known.score:
+            best[one.candidate.name] = one
+    return sorted(best.values(), key=lambda s: -s.score)
+
+
+def posterior(ranked: Sequence[Scored], numbers: Numbers) -> FloatArray:
+    """Return the probability of each candidate, shape (n,); the rest to one is that of no cause."""
+    scores, gains = np.array([(s.score, s.gain) for s in ranked]).T
+    return probabilities(scores, gains, numbers.sharpness)
+
+
+def probabilities(scores: FloatArray, gains: FloatArray, sharpness: float) -> FloatArray:
+    """Return the probability of each candidate, shape (n,); the rest to one is that of no cause.
+
+    No cause at all has the score zero. What explains nothing has no share: of each weight that of
+    the same candidate without its gain is taken off.
+
+    Args:
+        scores: Of the candidates, shape (n,).
+        gains: Their scores before the price of what was chosen, shape (n,).
+        sharpness: Log odds for one unit of score.
+    """
+    top = float(max(0.0, *scores))
+    explains = -np.expm1(-sharpness * np.maximum(gains, 0.0))
+    weights = np.exp(sharpness * (scores - top)) * explains
+    return np.asarray(weights / (weights.sum() + np.exp(-sharpness * top)))
+
+
+def _in_readings(
+    joint: Joint, candidates: Sequence[Candidate], outcome: Outcome
+) -> NDArray[np.bool_]:
+    """Count errors in the unit of an equation's largest reading, and return who replaces it.
+
+    The residual may be that reading's noise. Who reads the same quantity through another sensor
+    then shares the task with it and halves the noise, with nothing to do with a cause: the factor
+    of the reading becomes smaller, by as much as the noise is less seen. Who reads the reading
+    itself may do so by its slope within runs. And who reads the target itself has no use for the
+    declared terms; a cause comes in addition to them. Shape (n,).
+    """
+    replaces = np.zeros(len(candidates), dtype=np.bool_)
+    for name, slopes in outcome.slopes.items():
+        seen = np.ones(len(candidates))
+        for k, channel in enumerate(joint.linear(name).values()):
+            alone = np.array([{*one.cause.reads} <= {channel} for one in candidates])
+            seen[alone] = slopes[alone, k]
+        if name in outcome.changes:
+            change, channel = outcome.changes[name], joint.largest_linear[name][1]
+            other = np.array([not {*one.cause.reads} <= {channel} for one in candidates])
+            seen = np.where(other, np.minimum(seen, change), seen)
+            replaces |= other & ((change < 1.0 / MOST_CHANGE) | (change > MOST_CHANGE))
+        unit = np.maximum(1.0, np.maximum(seen, 1e-3) ** -2.0)
+        for family in outcome.errors:
+            family[name, "within"][:] *= unit
+    return replaces
+
+
+def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
+    cause = candidate.cause
+    if isinstance(cause, Function) or not cause.is_bounded:
+        return False
+    count = len(cause.parts)  # a bend comes after them
+    return float(np.sum(amplitudes[:count] / candidate.size[:count])) < 0.0
+
+
+def _price(candidate: Candidate, joint: Joint) -> float:
+    """Return the price of what was chosen: the logarithm of how many choices there were.
+
+    The prior probability of a cause is shared by all forms at all places, that of a form by the
+    points of its grid, that of an unknown form by the sets of variables, and that of acting in some
+    of the runs by all choices of them. Each amplitude but the first costs what a parameter costs in
+    the Bayesian information criterion (Schwarz 1978).
+    """
+    numbers = joint.numbers
+    choices, cause = float(np.log(candidate.choices)), candidate.cause
+    samples = numbers.samples_a_run * len(joint.runs)
+    more = 0 if isinstance(cause, Function) else len(cause.parts) - 1
+    changes = isinstance(cause, Function) and "time" in cause.variables
+    chosen = candidate.acts is not None and not candidate.given
+    rare = candidate.is_function + (changes or chosen)
+    if candidate.acts is not None and chosen:
+        count, acting = len(candidate.acts), sum(candidate.acts)
+        choices += float(np.log(count + 1.0)) + sum(
+            float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
+        )
+    amplitudes = more * float(np.log(samples)) / samples
+    return (
+        numbers.cause_cost + numbers.rare_cost * rare + numbers.choice_price * choices + amplitudes
+    )
