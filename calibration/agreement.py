@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.chain import PAIRS, Pair
 from calibration.errors import CalibrationError
 from calibration.history import COVERAGE
-from calibration.sessions.encoder import PAIRS, Pair
 from estimation.recording import FloatArray, Recording
 
 VERIFIED = {"spindle": PAIRS["spindle"]}

@@ -18,17 +18,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.agreement import LEAST_RUNS, fitted
+from calibration.chain import CURRENT, PAIRS
 from calibration.history import deviation
 from calibration.procedure import Measurement
 from calibration.quality import check_change
 from calibration.record import CalibrationRecord
 from calibration.regression import regress
-from calibration.sessions.current import COMMAND, CURRENT, TORQUE, equation
-from calibration.sessions.encoder import PAIRS
+from calibration.sessions.current import COMMAND, TORQUE, equation
 from calibration.sessions.motion import steady
 from estimation.recording import FloatArray, Recording
 
-JAW_TORQUE = "distal_torque_n_m"
+JAW_TORQUE = PAIRS["jaw"].torque
 LEAST_CHANGE_N_M = 0.02
 """Change of the torque that a slope needs."""
 SPAN = (2.5, 97.5)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.chain import CURRENT, GEAR
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError, check_change, check_levels, check_limit
@@ -20,7 +21,7 @@ from calibration.regression import refuse_drift, regress
 from calibration.sessions.motion import moves, need_channel, steady
 from estimation.recording import FloatArray
 
-CURRENT, TORQUE, COMMAND = "motor_current_a", "proximal_torque_n_m", "motor_command_ratio"
+TORQUE, COMMAND = GEAR.torque, "motor_command_ratio"
 LOADS_A = (0.1, 0.3, 0.5, 0.7, 0.9)
 SPEEDS_RAD_S = (0.5, 1.0)
 
@@ -42,7 +43,7 @@ class CurrentSession:
     speeds_rad_s: tuple[float, ...] = SPEEDS_RAD_S
     repeats: int = 1
     motor_constant_n_m_a: float | None = None
-    gear_ratio: float = 35.0
+    gear_ratio: float = GEAR.ratio
     residual_limit: float = 0.1
 
     kind = "current"

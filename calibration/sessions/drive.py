@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.chain import CURRENT
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import check_change, check_levels
@@ -20,7 +21,7 @@ from calibration.regression import Regression, regress
 from calibration.sessions.motion import moves, need_channel, steady
 from estimation.recording import FloatArray
 
-CURRENT, COMMAND = "motor_current_a", "motor_command_ratio"
+COMMAND = "motor_command_ratio"
 LEAST_RUNS = 6
 MOST_LATE = 6
 """Delays tried, samples."""

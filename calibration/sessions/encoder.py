@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.chain import PAIRS, Pair
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError, check_change, check_points
@@ -19,21 +20,6 @@ from calibration.regression import Regression, is_better, regress
 from calibration.sessions.motion import moves, need_channel, steady
 from estimation.recording import FloatArray
 
-
-@dataclass(frozen=True, slots=True)
-class Pair:
-    """An encoder, its reference, and the torque between the two."""
-
-    channel: str
-    reference: str
-    torque: str
-    nominal_ratio: float
-
-
-PAIRS = {
-    "spindle": Pair("spindle_angle_rad", "motor_angle_rad", "proximal_torque_n_m", 1 / 35.0),
-    "jaw": Pair("jaw_angle_rad", "spindle_angle_rad", "distal_torque_n_m", 1.0),
-}
 SPEEDS_RAD_S = (0.3, 0.5)
 """More than one: at one speed, time and angle are collinear."""
 MARKS = 5

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.chain import GEAR
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError, check_change
@@ -22,7 +23,7 @@ from calibration.regression import Regression, is_better, refuse_drift, regress
 from calibration.sessions.motion import moves, need_channel, steady
 from estimation.recording import FloatArray
 
-TORQUE, MOTOR, SPINDLE = "proximal_torque_n_m", "motor_angle_rad", "spindle_angle_rad"
+TORQUE, MOTOR, SPINDLE = GEAR.torque, GEAR.reference, GEAR.channel
 LEAST_TORQUE_N_M = 0.02
 """Below this torque the gear may be anywhere in its backlash, and the sample is excluded."""
 
@@ -48,7 +49,7 @@ class GearboxSession:
     loads_a: tuple[float, ...] = (-0.9, -0.5, 0.5, 0.9)
     speeds_rad_s: tuple[float, ...] = (0.5, 0.7)
     repeats: int = 1
-    gear_ratio: float = 35.0
+    gear_ratio: float = GEAR.ratio
     stiffness_only: bool = False
 
     kind = "gearbox"

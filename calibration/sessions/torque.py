@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.chain import REFERENCE, torque_sensors
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError
@@ -19,7 +20,7 @@ from calibration.torque import (
 from calibration.torque import Step as Load
 from estimation.recording import FloatArray
 
-SENSORS = {"proximal": "proximal_torque_n_m", "distal": "distal_torque_n_m"}
+SENSORS = torque_sensors(REFERENCE)
 """Sensor to its channel; the counts field has the sensor's name."""
 
 MASSES_KG = (0.05, 0.1, 0.15, 0.2, 0.25)

@@ -135,9 +135,11 @@ def compare(
     for name, runs in (("first", a), ("second", b)):
         if len(runs) < LEAST_RUNS:
             raise ChangesError(
-                f"The {name} campaign has {len(runs)} runs, too few to compare.",
+                f"The {name} campaign has {len(runs)} run{'s' * (len(runs) != 1)}, too few to"
+                " compare.",
                 "A change is judged against the differences between runs of one campaign.",
-                f"Record {LEAST_RUNS} runs at least of each.",
+                f"Record {LEAST_RUNS} runs at least of each, or cut a long recording into runs:"
+                " lap_s under [data.runs] of the machine file.",
             )
     named = [*_named(a, A), *_named(b, B)]
     train = [r.name for r in named]

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.chain import CURRENT, PAIRS
 from calibration.fsr_curve import FsrCurve
 from calibration.fsr_memory import FsrMemory
 from calibration.ft import AXES, STANDARD_GRAVITY_M_S2
 from calibration.procedure import Measurement, Result
-from calibration.sessions.current import CURRENT, TORQUE
-from calibration.sessions.encoder import PAIRS
+from calibration.sessions.current import TORQUE
 from calibration.sessions.fsr import SMOOTH, FsrSession
 from calibration.sessions.motion import stands
 from calibration.torque import weight_torque_n_m

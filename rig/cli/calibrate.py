@@ -136,9 +136,12 @@ def current(
         float | None,
         typer.Option(help="Torque constant of the data sheet, N m/A, for the efficiency."),
     ] = None,
-    ratio: Annotated[float, typer.Option(help="Ratio of the gear.")] = 35.0,
+    ratio: Annotated[
+        float | None, typer.Option(help="Ratio of the gear; if none, of the reference rig's file.")
+    ] = None,
 ) -> "Procedure":
     """Motor current against the spindle's torque sensor: constant, friction, driver."""
+    from calibration.chain import GEAR
     from calibration.sessions.current import CurrentSession
 
     return CurrentSession(
@@ -146,7 +149,7 @@ def current(
         speeds_rad_s=tuple(_numbers(speeds_rad_s, "--speeds-rad-s")),
         repeats=repeats,
         motor_constant_n_m_a=motor_constant,
-        gear_ratio=ratio,
+        gear_ratio=ratio or GEAR.ratio,
     )
 
 
@@ -154,17 +157,23 @@ def current(
 def gearbox(
     loads_a: Annotated[str, typer.Option(help="Loads of both signs, A.")] = "-0.9,-0.5,0.5,0.9",
     repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 1,
-    ratio: Annotated[float, typer.Option(help="Ratio of the gear.")] = 35.0,
+    ratio: Annotated[
+        float | None, typer.Option(help="Ratio of the gear; if none, of the reference rig's file.")
+    ] = None,
     stiffness_only: Annotated[
         bool, typer.Option("--stiffness-only", help="Model no backlash.")
     ] = False,
 ) -> "Procedure":
     """Gear: torsional stiffness and backlash."""
+    from calibration.chain import GEAR
     from calibration.sessions.gearbox import GearboxSession
 
     loads = tuple(_numbers(loads_a, "--loads-a"))
     return GearboxSession(
-        loads_a=loads, repeats=repeats, gear_ratio=ratio, stiffness_only=stiffness_only
+        loads_a=loads,
+        repeats=repeats,
+        gear_ratio=ratio or GEAR.ratio,
+        stiffness_only=stiffness_only,
     )
 
 

@@ -7,6 +7,7 @@ from estimation.arm.shared import laid_out
 from estimation.campaign import Campaign
 from estimation.changes.compare import Difference, compare
 from estimation.diagnosis.paths import periods
+from estimation.diagnosis.split import SplitError
 from estimation.model import Model
 from estimation.recording import Recording
 
@@ -27,7 +28,6 @@ def compared(
         seed: Seed of the random choices of runs.
 
     Raises:
-        SplitError: A single path does not repeat itself.
         ChangesError: Too few runs.
         FitError: A declared equation cannot be identified.
     """
@@ -45,4 +45,9 @@ def compared(
 
 def _runs(campaign: Campaign) -> list[Recording]:
     recordings = list(campaign.evidence)
-    return periods(recordings[0]) if len(recordings) == 1 else recordings
+    if len(recordings) != 1:
+        return recordings
+    try:
+        return periods(recordings[0])
+    except SplitError:  # one run, and no path of several periods
+        return recordings

@@ -53,3 +53,9 @@ def test_too_few_runs_are_refused(tmp_path, capsys):
     (tmp_path / "b" / "1.mcap").unlink()
     assert main(["diff", before, after, "--model", str(model)]) == 5
     assert "3 runs, too few to compare" in capsys.readouterr().err
+    for name in ("2", "3"):
+        (tmp_path / "b" / f"{name}.mcap").unlink()
+    assert main(["diff", before, after, "--model", str(model)]) == 5
+    said = capsys.readouterr().err
+    assert "The second campaign has 1 run, too few to compare" in said
+    assert "lap_s under [data.runs]" in said
