@@ -9,11 +9,14 @@ single unusual run is not.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from estimation.model import Model, balance_channels, estimate, settled
 from estimation.recording import Recording
+
+T = TypeVar("T")
 
 SLACK = 0.5
 """Spreads by which a run may be worse than usual without counting."""
@@ -91,7 +94,7 @@ class ResidualWatch:
         self._sum = max(0.0, self._sum + worse - SLACK)
         self._rising = [*self._rising, (recording.name, worse)] if self._sum > 0.0 else []
         if self._sum > LIMIT and self._since is None:
-            self._since = _begin(self._rising)
+            self._since = begin_of(self._rising)
         return Sight(recording.name, error, usual, self._sum, self._since)
 
     def _usual(self) -> tuple[float | None, float]:
@@ -106,8 +109,8 @@ class ResidualWatch:
         return float(np.exp(logs.mean())), float(logs.std(ddof=1))
 
 
-def _begin(rising: Sequence[tuple[str, float]]) -> str:
-    """Return the run at which a step in the error explains most of it, in least squares."""
+def begin_of(rising: Sequence[tuple[T, float]]) -> T:
+    """Return the one of a rising sum at which a step explains most of it, in least squares."""
     errors = np.array([worse for _, worse in rising])
     after = np.cumsum(errors[::-1])[::-1]
     lengths = np.arange(len(errors), 0, -1)

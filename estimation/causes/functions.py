@@ -17,9 +17,6 @@ KNOTS, KNOTS_ALONE, KNOTS_OF_FACTOR = 6, 14, 3
 """Knots of a variable's hat functions: of a function of two variables, of one alone, and of a load
 that is a factor."""
 
-RANKS = 513
-"""Points of the distribution of a variable's values."""
-
 PLAY = 0.06
 """Half width of the play operator that stands for history, share of the travel."""
 
@@ -188,28 +185,13 @@ def _counts(variables: Sequence[str]) -> dict[str, int]:
 def _knots(
     layout: Layout, place: Place, variable: str, width: float, count: int
 ) -> tuple[float, ...]:
-    """Return the knots of a variable: as close by its range as by how many samples are near.
-
-    A form has the more detail where there are more samples, and none is far from a knot.
-    """
+    """Return the knots of a variable, evenly over the range of its values."""
     if variable == "velocity_sign":
         return ()
-    known = layout.runs[0].memo
-    key = ("knots", variable, _channel(layout.runs[0], place, variable, place.home), count)
-    if key not in known:
-        values = [variable_of(run, place, variable, place.home, width) for run in layout.runs]
-        low = min(float(np.percentile(x, 1)) for x in values)
-        high = max(float(np.percentile(x, 99)) for x in values)
-        high = high if high > low else low + 1.0
-        rank = np.linspace(0.0, 1.0, RANKS)
-        at = np.quantile(np.clip(np.concatenate(values), low, high), rank)
-        at[0], at[-1] = low, high
-        grid = np.linspace(low, high, RANKS)
-        even = (grid - low) / (high - low)
-        place_of = 0.5 * even + 0.5 * np.interp(grid, at, rank)
-        known[key] = np.interp(np.linspace(0.0, 1.0, count), place_of, grid)
-    found = known[key]
-    return () if found is None else tuple(map(float, found))
+    inside = [variable_of(run, place, variable, place.home, width) for run in layout.runs]
+    low = min(float(np.percentile(x, 1)) for x in inside)
+    high = max(float(np.percentile(x, 99)) for x in inside)
+    return tuple(map(float, np.linspace(low, high if high > low else low + 1.0, count)))
 
 
 def _hats(values: FloatArray, knots: tuple[float, ...]) -> FloatArray:

@@ -20,6 +20,9 @@ from estimation.recording import FloatArray
 MOST_CHANGE = 2.0
 """Factor by which the largest linear term of an equation may change next to a cause."""
 
+AMPLIFIED = ("_n_m", "_n", "_a")
+"""Endings of readings with an amplifier's noise; that of an encoder is known by its counts."""
+
 
 @dataclass(frozen=True)
 class Scored:
@@ -104,15 +107,17 @@ def _in_readings(
     The residual may be that reading's noise. Who reads the same quantity through another sensor
     then shares the task with it and halves the noise, with nothing to do with a cause: the factor
     of the reading becomes smaller, by as much as the noise is less seen. Who reads the reading
-    itself may do so by its slope within runs. And who reads the target itself has no use for the
-    declared terms; a cause comes in addition to them. Shape (n,).
+    itself, where that has noise of an amplifier, may do so by its slope within runs. And who reads
+    the target itself has no use for the declared terms; a cause comes in addition to them. Shape
+    (n,).
     """
     replaces = np.zeros(len(candidates), dtype=np.bool_)
     for name, slopes in outcome.slopes.items():
         seen = np.ones(len(candidates))
         for k, channel in enumerate(joint.linear(name).values()):
-            alone = np.array([{*one.cause.reads} <= {channel} for one in candidates])
-            seen[alone] = slopes[alone, k]
+            if channel.endswith(AMPLIFIED):
+                alone = np.array([{*one.cause.reads} <= {channel} for one in candidates])
+                seen[alone] = slopes[alone, k]
         if name in outcome.changes:
             change, channel = outcome.changes[name], joint.largest_linear[name][1]
             other = np.array([not {*one.cause.reads} <= {channel} for one in candidates])

@@ -203,6 +203,40 @@ TEST_CASE("samples are numbered from each start on, and a stopped board sends no
     }
 }
 
+TEST_CASE("the place of the index gives the reference once, and not after a trip that doubts an encoder") {
+    rig::ReferenceFields limits = widest();
+    limits.max_spindle_jump = 50;
+    Desk desk(limits);
+    Bytes counts;
+    for (std::uint32_t count : {70U, 80U, 90U}) proofs::put(counts, count, 4);
+    counts.push_back(1);
+    const auto pass_index = [&desk] {
+        desk.inputs.indexed = true;
+        desk.run(1);
+        desk.inputs.indexed = false;
+        desk.inputs.jaw += 3;  // where it stands then is another place
+        desk.run(150);
+    };
+    pass_index();
+    desk.send(rig::kReference, counts);
+    CHECK(desk.result() == rig::kOk);
+    desk.run(1);
+    rig::Reader reader(desk.sample.data() + 12);
+    for (std::uint32_t count : {70U, 80U, 93U}) CHECK(reader.u32() == count);
+    desk.send(rig::kReference, counts);
+    CHECK(desk.result() == rig::kNoIndex);
+    pass_index();
+    desk.arm();
+    desk.ping();
+    desk.run(2);
+    desk.inputs.spindle += 51;
+    desk.run(1);
+    CHECK(desk.board.trip() == rig::kEncoderJump);
+    desk.run(150);
+    desk.send(rig::kReference, counts);
+    CHECK(desk.result() == rig::kNoIndex);
+}
+
 TEST_CASE("a board that is built for one sign of the gain takes no other") {
     const rig::Gains toward{20, 0, 0, 0.3, 2700}, away{-20, 0, 0, 0.3, 2700}, own{1, 0, 0, 0, 3000}, any{0, 0, 0, 0, 3000};
     CHECK(toward.within(own));

@@ -173,6 +173,7 @@ struct Probed {
     int pulled = 0;
     int command = 0;
     int tripped = 0;
+    int channel = -1;
 };
 inline Probed probe(int target, double kp, int answers) {
     Profile::Settings settings = Profile::Settings::widest();
@@ -190,13 +191,15 @@ inline Probed probe(int target, double kp, int answers) {
     int pulls = 0;
     for (int tick = 1; tick < 1200; ++tick) {
         inputs.proximal = inputs.distal = inputs.current = tick % 2;
-        if (profile.check(inputs).code == rig::kEncoderFrozen) {
+        const rig::Crossing crossing = profile.check(inputs);
+        if (crossing.code == rig::kEncoderFrozen) {
+            probed.channel = crossing.channel;
             probed.tripped = tick;
             break;
         }
         const int command = profile.drive({target, 0}, inputs).command_e4;
         pulls = command * kp * (target - 89.5) < 0 ? pulls + 1 : 0;
-        if (pulls == 1 && probed.pulled == 0) probed = {tick, command, 0};
+        if (pulls == 1 && probed.pulled == 0) probed = {tick, command, 0, -1};
         if (pulls > 0 && pulls == answers) inputs.motor += 2;
     }
     return probed;
@@ -208,6 +211,7 @@ TEST_CASE("encoders that do not count near an end are asked by a pull away from 
     CHECK(dead.pulled == 41);
     CHECK(dead.command == -400);  // 2 x 40 of torque, 80 of current, of 2000
     CHECK(dead.tripped == 51);
+    CHECK(dead.channel == 0);
     CHECK(probe(95, -1, 0).command == 400);
     const Probed at_target = probe(90, 1, 0);
     CHECK(at_target.pulled == 0);  // and no command either
@@ -223,6 +227,36 @@ inline Inputs quiet(int tick) {
     Inputs inputs;
     inputs.proximal = inputs.distal = inputs.current = tick % 2;  // none of them stays
     return inputs;
+}
+
+TEST_CASE("a count that is missing is named by its channel") {
+    for (int k = 0; k < 6; ++k) {
+        Profile profile;
+        profile.begin(Profile::Settings::widest());
+        Inputs inputs;
+        std::int32_t* const channels[6] = {&inputs.motor,    &inputs.spindle, &inputs.jaw,
+                                           &inputs.proximal, &inputs.distal,  &inputs.current};
+        *channels[k] = rig::kMissing;
+        const rig::Crossing crossing = profile.check(inputs);
+        CHECK(crossing.code == rig::kSensorMissing);
+        CHECK(crossing.channel == k);
+    }
+}
+
+TEST_CASE("the shortest time of a watch is a tick, and a safe state is one of two") {
+    Profile::Settings settings = Profile::Settings::widest();
+    rig::ChoiceFields& choice = settings.limits.choice;
+    choice.watchdog_us = rig::kMaxWatchdogUs;
+    choice.hold_command_e4 = 0;
+    choice.seek = 0;
+    for (int ticks : {0, 1}) {
+        choice.stall_ticks = ticks;
+        CHECK(settings.valid() == (ticks == 1));
+    }
+    for (int state : {0, 1, 2}) {
+        choice.safe_state = state;
+        CHECK(settings.valid() == (state < 2));
+    }
 }
 
 // The tick at which a profile with these limits trips over these readings, or 0; and over what.

@@ -83,7 +83,8 @@ WORDS: dict[Trip, tuple[str, str]] = {
     ),
     Trip.FOLLOWING_ERROR: (
         "The motion stayed too far behind its target",
-        "Look for what blocks the drive or lets it slip; see [plausibility] following_rad.",
+        "Look for what blocks the drive or lets it slip. A motor whose winding is hot has less"
+        " torque at the same current: let it cool; see [plausibility] following_rad.",
     ),
     Trip.CURRENT_MISMATCH: (
         "The measured current is not the commanded one",

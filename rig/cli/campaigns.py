@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.shipped import complete_campaign
+from rig.cli.refit import show_refit
+from rig.cli.shipped import complete_campaign, complete_model
 from rig.output.console import JsonFlag, emit_json, remarks, results, show_table
 
 if TYPE_CHECKING:
@@ -36,6 +37,19 @@ def campaigns(
     diagnose: Annotated[
         bool, typer.Option("--diagnose", help="Diagnose the one campaign found, and keep the page.")
     ] = False,
+    refit: Annotated[
+        str | None,
+        typer.Option(
+            "--refit",
+            metavar="MODEL",
+            help="Fit a model on each campaign found, and show how its parameters change.",
+            autocompletion=complete_model,
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(help="Number of processes of --refit.")] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler for --refit.")
+    ] = None,
     most: Annotated[int, typer.Option("--most", help="Rows of a table, the newest first.")] = 40,
     rebuild: Annotated[
         bool, typer.Option("--rebuild", help="Read every log again into the index.")
@@ -64,6 +78,11 @@ def campaigns(
     )
     named = _named(whole, terms or [], root) if diagnose or open_ or compare else []
     found = named or search.search(whole, terms or [])
+    if refit is not None:
+        show_refit(
+            [campaign for campaign in found if campaign.runs], root, refit, workers, scheduler, json
+        )
+        return
     if diagnose:
         _diagnose(_only(found).folder)
         return

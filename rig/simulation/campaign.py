@@ -16,11 +16,15 @@ from rig.protocols.protocol import RunPlan, load_protocol
 from rig.protocols.trajectory import SAMPLE_RATE_HZ
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import HiddenEffect, table
+from rig.simulation.parameters import PlantParameters
 from rig.simulation.play import play
 
 
 def simulate_reference_campaign(
-    seed: int = 0, protocol: str = "reference", effects: Sequence[HiddenEffect] = ()
+    seed: int = 0,
+    protocol: str = "reference",
+    effects: Sequence[HiddenEffect] = (),
+    parameters: PlantParameters | None = None,
 ) -> Campaign:
     """Return a campaign of the simulated rig.
 
@@ -28,6 +32,7 @@ def simulate_reference_campaign(
         seed: Seed of the sensors' noise; each run has its own, made of this and its number.
         protocol: Protocol file or the name of a shipped one.
         effects: Hidden effects switched on in every run.
+        parameters: Of the simulated rig; the reference rig's by default.
 
     Raises:
         UsageError: The protocol does not exist, or no such effect.
@@ -35,12 +40,21 @@ def simulate_reference_campaign(
     plans = load_protocol(protocol).plans()
     table(effects)  # an unknown name is refused now
     return Campaign(
-        tuple(Run(p.name, partial(_simulate, p, seed, i, effects)) for i, p in enumerate(plans))
+        tuple(
+            Run(p.name, partial(_simulate, p, seed, i, effects, parameters))
+            for i, p in enumerate(plans)
+        )
     )
 
 
-def _simulate(plan: RunPlan, seed: int, index: int, effects: Sequence[HiddenEffect]) -> Recording:
-    bench = SimulatedBench(effects=effects, seed=seed * 100_003 + index)
+def _simulate(
+    plan: RunPlan,
+    seed: int,
+    index: int,
+    effects: Sequence[HiddenEffect],
+    parameters: PlantParameters | None,
+) -> Recording:
+    bench = SimulatedBench(parameters, effects=effects, seed=seed * 100_003 + index)
     motion = motion_of(plan, float(plan.target_angle_rad[0]))
     columns = play(bench, motion.target_angle_rad, motion.load_command_a)
     run = slice(motion.first, motion.last)

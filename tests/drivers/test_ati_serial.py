@@ -54,6 +54,7 @@ def test_a_frame_carries_the_gauges_in_the_published_order() -> None:
     wire = protocol.encode_frames(np.array([[0x0100, 0x0201, 0x0302, 0x0403, 0x0504, 0x0605]]))
     assert wire[:12].hex(" ", 2) == "0100 0302 0504 0201 0403 0605"
     assert wire[12] == sum(wire[:12]) & 0x7F
+    assert len(wire) == 13
 
 
 def test_it_reads_its_calibration_and_puts_it_in_force() -> None:
@@ -73,6 +74,17 @@ def test_it_reads_its_calibration_and_puts_it_in_force() -> None:
     assert np.allclose(got, expected)
     device.close()
     assert not fake.server.streaming
+
+
+def test_each_calibration_is_read_192_registers_behind_the_one_before() -> None:
+    """Source: the register addresses of the public KIT driver."""
+    cable = FaultyTransport(SimulatedTransport(AtiSerialFake()))
+    asked: list[bytes] = []
+    cable.outgoing = lambda data: asked.append(data) or data
+    with pytest.raises(DriverError):  # the fake has one only
+        AtiSerial(cable, calibration=3).identify()
+    registers = [data[2:6].hex() for data in asked if data[:2] == b"\x0a\x03"]
+    assert registers[0] == "02630068"
 
 
 def test_a_stream_left_on_by_another_program_is_ended_first() -> None:

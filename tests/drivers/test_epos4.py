@@ -380,6 +380,7 @@ def test_options_that_are_no_drives(options: dict[str, float]) -> None:
     [
         (0x0200, State.NOT_READY),
         (0x0240, State.SWITCH_ON_DISABLED),
+        (0x0270, State.SWITCH_ON_DISABLED),
         (0x0231, State.READY),
         (0x0233, State.SWITCHED_ON),
         (0x0637, State.OPERATION_ENABLED),
@@ -390,6 +391,17 @@ def test_options_that_are_no_drives(options: dict[str, float]) -> None:
 )
 def test_a_statusword_says_a_state(word: int, state: State) -> None:
     assert protocol.state_of(word) is state
+
+
+def test_process_data_and_codes_are_those_of_the_specification() -> None:
+    """Source: CiA 301, network states; CiA 402, controlwords; the TPDO's mapping."""
+    feedback = protocol.Feedback(0x0637, -2, 258)
+    data = bytes.fromhex("3706 feffffff 0201")
+    assert protocol.encode_feedback(feedback) == data
+    assert protocol.decode_feedback(data) == feedback
+    assert (protocol.STOPPED, protocol.OPERATIONAL, protocol.PRE_OPERATIONAL) == (0x04, 0x05, 0x7F)
+    words = (protocol.SHUTDOWN, protocol.ENABLE_OPERATION, protocol.DISABLE_VOLTAGE)
+    assert (*words, protocol.FAULT_RESET) == (0x06, 0x0F, 0x00, 0x80)
 
 
 @given(st.integers(0, 2**16 - 1))

@@ -42,8 +42,13 @@ def test_messages_come_back_and_a_changed_byte_is_no_message() -> None:
 
 def test_it_identifies_itself_and_streams_in_si() -> None:
     fake = Ft300Fake()
-    device = Ft300(SimulatedTransport(fake))
+    cable = FaultyTransport(SimulatedTransport(fake))
+    asked: list[bytes] = []
+    cable.outgoing = lambda data: asked.append(data) or data
+    device = Ft300(cable)
     identity = device.identify()
+    registers = [data[2:6].hex() for data in asked if data[:2] == b"\x09\x03"]
+    assert registers == ["01f40003", "01fe0004"]  # as in Robotiq's own driver
     assert (identity.model, identity.serial, identity.firmware) == (
         "FT 300",
         "FTS-1234",

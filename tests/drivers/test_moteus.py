@@ -64,6 +64,19 @@ def test_the_documented_lines() -> None:
             protocol.decode_line(line)
 
 
+def test_modes_faults_and_sizes_are_the_documented_ones() -> None:
+    """Source: "Register reference", 0x000 and 0x00f; ISO 11898-1 for the sizes of CAN FD."""
+    modes = (protocol.STOPPED, protocol.FAULT, protocol.POSITION_MODE, protocol.TIMEOUT)
+    assert modes == (0, 1, 10, 11)
+    assert set(protocol.PREPARING) == {2, 3, 4}
+    words = {32: "calibrated", 33: "driver", 34: "too high", 38: "hot", 40: "too low"}
+    assert all(word in protocol.FAULTS[code] for code, word in words.items())
+    assert protocol.send_line(2, b"\x01").startswith(b"can send 8002 ")
+    sizes = [0, *range(1, 9), 12, 16, 20, 24, 32, 48, 64]
+    for size in range(65):
+        assert len(protocol.padded(bytes(size))) == min(fits for fits in sizes if fits >= size)
+
+
 def test_a_torque_command_holds_the_documented_registers() -> None:
     """Source: "Register reference", 0x020 to 0x027; padding 0x50 to a size of CAN-FD."""
     command = protocol.torque_command(0.05, 0.2, 0.1)
