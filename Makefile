@@ -79,7 +79,7 @@ REMAKE ?=
 results: $(VENV)/.developing firmware
 	$(BIN)/python -m benchmarks.results $(if $(REMAKE),--remake $(REMAKE))
 
-# an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, killed recorders,
+# an hour of virtual time, ten minutes on a pty, one on a CAN bus, injected faults, dying encoders, killed recorders,
 # listening sockets;
 # SOAK="soak --virtual 60" for one part or less of it
 SOAK ?=

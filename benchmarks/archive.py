@@ -33,7 +33,7 @@ from rig.output.table import TextTable, to_page
 from rig.simulation.campaign import simulate_reference_campaign
 from rig.simulation.parameters import PlantParameters
 
-SIZES, RUNS = (20, 40, 80), 3
+SIZES, RUNS = (12, 24, 48), 2
 DAY_NS = 86_400_000_000_000
 START_NS = 1_750_000_000_000_000_000
 CHANGED_AT = {"torque_constant_n_m_a": (0.4, 0.93), "motor_friction_n_m": (0.7, 1.3)}
@@ -45,7 +45,7 @@ FOUND_AS = {
     "torque_constant_n_m_a": "motor.torque_constant.gain",
     "motor_friction_n_m": "friction.coulomb.friction",
 }
-QUERY = ("SIM-TOOL-1", "date>=2025-06-25", "load_command_a>=0.5")
+QUERY = ("SIM-TOOL-1", "date>=2025-06-20", "load_command_a>=0.5")
 
 
 def write_archive(root: Path, count: int, runs: int) -> float:

@@ -37,6 +37,10 @@ def __getattr__(name: str) -> Any:
     return getattr(import_module("rig.library"), name)
 
 
+def __dir__() -> list[str]:
+    return __all__  # what a notebook completes
+
+
 def _check_rooms() -> None:
     """Raise ImportError where another package has the name of one of the project's."""
     home = Path(__file__).parents[1]

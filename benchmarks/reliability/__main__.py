@@ -1,16 +1,18 @@
 """Measure how reliable the rig is and write the table.
 
-`python -m benchmarks.reliability [soak pty canopen faults kills network fuzz] [--virtual S]
-[--real S] [--canopen S] [--faults N] [--kills N]`: the parts named, all if none. Each part's
-figures are kept in `build/reliability.json`, and the table is written from all that are there. A
-part that was not measured in this checkout keeps the rows it has in the table; one that never was
-says so. A run with less than a part's goal is a short one: its figures and its table stay apart, in
-`build/reliability-short.*`, and the committed table is not touched. Fuzzing goes on where it
-stopped, so its rows are written when the plan is done, or when a decoder has failed.
+`python -m benchmarks.reliability [soak pty canopen faults encoders kills network fuzz]
+[--virtual S] [--real S] [--canopen S] [--faults N] [--rides N] [--kills N]`: the parts named,
+all if none. Each part's figures are kept in `build/reliability.json`, and the table is written from
+all that are there. A part that was not measured in this checkout keeps the rows it has in the
+table; one that never was says so. A run with less than a part's goal is a short one: its figures
+and its table stay apart, in `build/reliability-short.*`, and the committed table is not touched.
+Fuzzing goes on where it stopped, so its rows are written when the plan is done, or when a decoder
+has failed.
 """
 
 import argparse
 import json
+import math
 import re
 import sys
 from dataclasses import asdict
@@ -19,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.reliability import faults, fuzz, kills, listening, soak
+from benchmarks.reliability import dead_encoders, faults, fuzz, kills, listening, soak
+from drivers.teensy.protocol import Trip
 from estimation.files import write_text_atomic
 from rig.output.provenance import Provenance
 
@@ -28,12 +31,13 @@ STATE = Path("build/reliability.json")
 TABLE = Path("docs/results/reliability.md")
 SHORT_STATE = Path("build/reliability-short.json")
 SHORT_TABLE = Path("build/reliability-short.md")
-PARTS = ("soak", "pty", "canopen", "faults", "kills", "network", "fuzz")
+PARTS = ("soak", "pty", "canopen", "faults", "encoders", "kills", "network", "fuzz")
 OF_PART = {
     "soak": r"firmware core, ",
     "pty": r"firmware process ",
     "canopen": r"EPOS4 fake ",
     "faults": r"\d+ faults |samples mis-stamped|crashes|\d+ trips: |\d+ dead hosts ",
+    "encoders": r"\d+ motions with all encoders ",
     "kills": r"\d+ recorders killed",
     "network": r"listening ",
     "fuzz": r"fuzzed decoders",
@@ -42,10 +46,12 @@ OF_PART = {
 _GOALS_S = {"soak": 3600, "pty": 600, "canopen": 60}
 _FULL = {"soak": ("virtual", 3600), "pty": ("real", 600), "canopen": ("canopen", 60)} | {
     "faults": ("faults", 1000),
+    "encoders": ("rides", 640),
     "kills": ("kills", 200),
 }
 """By part, the option that says how much of it is measured, and its goal."""
 SAFE_S, WATCHDOG_S = 0.020, 0.052
+FARTHEST_RAD = math.radians(5.0)
 
 
 def main() -> int:
@@ -56,6 +62,7 @@ def main() -> int:
     parser.add_argument("--real", type=float, default=600.0, help="real seconds on a pty")
     parser.add_argument("--canopen", type=float, default=60.0, help="real seconds on a CAN bus")
     parser.add_argument("--faults", type=int, default=1000, help="faults injected")
+    parser.add_argument("--rides", type=int, default=640, help="motions whose encoders die")
     parser.add_argument("--kills", type=int, default=200, help="recorders killed")
     options = parser.parse_intermixed_args()
     unknown = set(options.parts) - set(PARTS)
@@ -122,6 +129,19 @@ def _faults(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def _encoders(options: argparse.Namespace) -> dict[str, Any]:
+    """Half of the motions begin in the last 0.4 rad and are slow; a quarter as many are sound."""
+    dead = [dead_encoders.ride(k // 2, slow=k % 2 == 0) for k in range(options.rides)]
+    sound = [dead_encoders.ride(k, dead=False).trip for k in range(options.rides // 4)]
+    return {
+        "count": len(dead),
+        "farthest_rad": max(ride.beyond_rad for ride in dead),
+        "beyond": sum(ride.beyond_rad > FARTHEST_RAD for ride in dead),
+        "sound": len(sound),
+        "false": sum(trip is Trip.ENCODER_FROZEN for trip in sound),
+    }
+
+
 def _kills(options: argparse.Namespace) -> dict[str, Any]:
     killed = kills.kill_many(options.kills)
     lost_s = [one.lost_s for one in killed]
@@ -139,6 +159,7 @@ _MEASURES = {
         soak.soak("canopen_virtual", o.canopen, "EPOS4 fake on a virtual CAN bus, real time")
     ),
     "faults": _faults,
+    "encoders": _encoders,
     "kills": _kills,
     "network": lambda o: listening.measure(),
     "fuzz": lambda o: {},  # its own command measures it; here it is only reported
@@ -155,6 +176,7 @@ def written(figures: dict[str, Any], earlier: str) -> str:
         "pty": _soak_rows(figures.get("pty"), "pty"),
         "canopen": _soak_rows(figures.get("canopen"), "canopen"),
         "faults": _fault_rows(figures.get("faults")),
+        "encoders": _encoder_rows(figures.get("encoders")),
         "kills": _kill_rows(figures.get("kills")),
         "network": _network_rows(figures.get("network")),
         "fuzz": _fuzz_rows(tallies),
@@ -264,6 +286,25 @@ def _fault_rows(f: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
             f"{1e3 * f['slowest_silent_s']:.1f} ms",
             "the watchdog's 50 ms and a tick or two",
             f["slowest_silent_s"] <= WATCHDOG_S,
+        ),
+    ]
+
+
+def _encoder_rows(e: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
+    if e is None:
+        return [("encoders that all die", "not measured", "", "**no**")]
+    return [
+        _row(
+            f"{e['count']} motions with all encoders dying on the way: beyond the travel",
+            f"{e['beyond']} by more than 5 degrees; farthest {e['farthest_rad']:.3f} rad",
+            "none by more than 5 degrees",
+            e["beyond"] == 0,
+        ),
+        _row(
+            f"{e['sound']} motions with all encoders sound: taken for dead",
+            str(e["false"]),
+            "0",
+            e["false"] == 0,
         ),
     ]
 

@@ -112,5 +112,5 @@ def ride(seed: int, slow: bool = True, dead: bool = True, library: Path | None =
         if logger.trip().code is Trip.NONE and block is not None:
             logger.queue(block, np.zeros(BLOCK, np.int32))
         logger.read(BLOCK * 1e-3)
-        beyond_rad = max(beyond_rad, abs(bench.state[SPINDLE_ANGLE]) - travel_rad)
+        beyond_rad = max(beyond_rad, abs(float(bench.state[SPINDLE_ANGLE])) - travel_rad)
     return Ride(beyond_rad, logger.trip().code)

@@ -242,7 +242,7 @@ def _library(path: Path | None) -> ctypes.CDLL:
     """Return the loaded library.
 
     Raises:
-        FirmwareMissingError: It is missing.
+        FirmwareMissingError: It is missing, or a build of other sources.
     """
     path = path or firmware_library()
     if path is None or not path.is_file():
@@ -251,7 +251,14 @@ def _library(path: Path | None) -> ctypes.CDLL:
             "It has not been built, or this is an installation without the firmware's source.",
             "Run: make -C firmware (needs g++).",
         )
-    return _load(path, path.stat().st_mtime_ns)
+    try:
+        return _load(path, path.stat().st_mtime_ns)
+    except (AttributeError, OSError) as error:
+        raise FirmwareMissingError(
+            f"The firmware library {path} does not fit this program.",
+            f"It is a build of other sources: {error}.",
+            "Run: make -C firmware (needs g++).",
+        ) from error
 
 
 @cache

@@ -10,7 +10,7 @@ import typer
 from rig.cli.help import GroupedHelp
 from rig.cli.study_arm import StateFolder, arm_studies, resumable
 from rig.cli.study_machines import machine_studies
-from rig.output.console import JsonFlag, emit_json, progress, results, show_result
+from rig.output.console import JsonFlag, emit_json, progress, show_result
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -43,7 +43,6 @@ def oneill(
         Path | None,
         typer.Option(help="Measured data: a folder or archive. Without it, a simulated campaign."),
     ] = None,
-    report: Annotated[Path | None, typer.Option(help="Folder for the HTML report.")] = None,
     out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of splits and of the simulation.")] = 0,
     networks: Annotated[
@@ -75,7 +74,6 @@ def oneill(
     By default it fits Table I's linear models, in seconds. --networks trains the paper's networks,
     which takes long; after an interruption it resumes. --states and --kinds take minutes.
     """
-    from rig.output.render import write_report
     from rig.studies.oneill import page as shown
     from rig.studies.oneill.source import open_reference
     from rig.studies.oneill.study import run_study
@@ -83,8 +81,8 @@ def oneill(
     source = _simulated(seed) if data is None else open_reference(data)
     with progress() as bar:
         task = bar.add_task("runs", total=len(source.campaign))
-        result = run_study(source, seed=seed, on_run=lambda name: bar.advance(task))
-    campaign = source.campaign.exclude(result.study.left_out)
+        study = run_study(source, seed=seed, on_run=lambda name: bar.advance(task))
+    campaign = source.campaign.exclude(study.left_out)
     deep = None
     if networks:
         from rig.studies.oneill.networks import Training
@@ -100,11 +98,11 @@ def oneill(
     every_kind = _fit_kinds(campaign, seed) if kinds else ()
     more = shown.More(deep, physical, every_kind)
     lines = [
-        *shown.lead(result.study, more),
+        *shown.lead(study, more),
         f"Data: {source.name}.",
-        *shown.all_notes(result.study, more),
+        *shown.all_notes(study, more),
     ]
-    tables = shown.all_tables(result.study, more)
+    tables = shown.all_tables(study, more)
 
     def markdown() -> str:
         placed = [
@@ -112,15 +110,12 @@ def oneill(
             for caption, path in drawn
             if out is not None
         ]
-        return shown.markdown(result.study, more, placed)
+        return shown.markdown(study, more, placed)
 
     show_result(lines, tables, out, markdown, json)
-    if report is not None:
-        page = write_report(report / "oneill.html", shown.page(result, more))
-        results(json).print(f"Report: {page}", markup=False)
     if json:
         found = {"networks": deep, "states": physical, "kinds": every_kind or None}
-        emit_json(asdict(result.study) | {k: v for k, v in found.items() if v is not None})
+        emit_json(asdict(study) | {k: v for k, v in found.items() if v is not None})
 
 
 def _train(campaign: "Campaign", data: Path | None, training: "Training") -> "NetworkStudy":

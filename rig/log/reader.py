@@ -172,7 +172,10 @@ def _map(path: Path) -> memoryview:
     try:
         with path.open("rb") as file:
             if os.fstat(file.fileno()).st_size == 0:
-                raise NotALogError(f"{path} is empty.")
+                raise NotALogError(
+                    f"{path} is empty.",
+                    fix="Omit it: delete it, or --skip-bad (fit, diagnose, view).",
+                )
             return memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
     except OSError as error:
         raise UsageError(

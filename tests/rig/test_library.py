@@ -60,6 +60,10 @@ def test_importing_loads_neither_numpy_nor_a_command():
     assert done.stdout.strip() == "[]"
 
 
+def test_a_notebook_completes_the_calls():
+    assert {"read", "fit", "diagnose", "predict", "to_pandas"} <= set(dir(rig))
+
+
 def test_every_name_is_there_and_documented():
     for name in rig.__all__:
         value = getattr(rig, name)

@@ -20,9 +20,6 @@ from rig.output.render import write_report
 from rig.output.table import TextTable, to_markdown, to_rich
 from rig.reports.diagnosis_words import meaning, sizes_of
 from rig.reports.first_look import first_look
-from rig.studies.oneill.page import page
-from rig.studies.oneill.source import Source
-from rig.studies.oneill.study import run_study
 from tests.estimation.synthetic import campaign
 from tests.rig.browser import chromium
 
@@ -68,39 +65,33 @@ def pages() -> dict[str, str]:
     runs = campaign(lambda angle, speed, load: 2e-3 * np.sin(7 * angle))
     model = fit(read(Path("motor")), runs)
     return {
-        "study": page(run_study(Source(runs, "a <b> & c", measured=False))),
         "first_look": first_look(
-            model, runs, largest_structure(model, runs), "Nine runs were made.", Provenance.now(1)
+            model, runs, largest_structure(model, runs), "Made of a <b> & c.", Provenance.now(1)
         ),
     }
 
 
-NAMES = pytest.mark.parametrize("name", ["study", "first_look"])
-
-
-@NAMES
-def test_a_page_is_well_formed_and_complete(pages, name):
-    found = Page(pages[name])
+def test_a_page_is_well_formed_and_complete(pages):
+    found = Page(pages["first_look"])
     assert found.open == []
     assert found.counts["svg"] == found.counts["figure"] == 3
-    assert found.counts["table"] == {"study": 3, "first_look": 2}[name]
+    assert found.counts["table"] == 2
     assert len(found.ids) == len(set(found.ids))
-    assert "seed" in pages[name]
+    assert "seed" in pages["first_look"]
 
 
-@NAMES
-def test_a_page_refers_to_nothing_outside_itself(pages, name):
-    found = Page(pages[name])
-    assert not re.search(r"https?:|//\w|@import|\bsrc=", pages[name])
+def test_a_page_refers_to_nothing_outside_itself(pages):
+    found = Page(pages["first_look"])
+    assert not re.search(r"https?:|//\w|@import|\bsrc=", pages["first_look"])
     assert "script" not in found.counts
     assert all(reference.startswith("#") for reference in found.references)
-    targets = {*re.findall(r"url\((#[^)]*)\)", pages[name]), *found.references}
+    targets = {*re.findall(r"url\((#[^)]*)\)", pages["first_look"]), *found.references}
     assert targets
     assert {t.removeprefix("#") for t in targets} <= set(found.ids)
 
 
 def test_text_is_escaped(pages):
-    assert "a &lt;b&gt; &amp; c" in pages["study"]
+    assert "a &lt;b&gt; &amp; c" in pages["first_look"]
 
 
 def test_the_screening_page_describes_the_residual_and_no_more(pages):
@@ -111,9 +102,8 @@ def test_the_screening_page_describes_the_residual_and_no_more(pages):
     assert "friction.coulomb, width" in text
 
 
-@NAMES
-def test_a_browser_opens_a_page_without_an_error(pages, name, tmp_path):
-    path = write_report(tmp_path / f"{name}.html", pages[name])
+def test_a_browser_opens_a_page_without_an_error(pages, tmp_path):
+    path = write_report(tmp_path / "page.html", pages["first_look"])
     messages: list[str] = []
     with chromium() as browser:
         opened = browser.new_page()

@@ -14,19 +14,19 @@ from rig.errors import DataError
 from rig.studies.oneill import page as shown
 from rig.studies.oneill import source as data
 from rig.studies.oneill.source import Source, open_reference
-from rig.studies.oneill.study import Result, run_study
+from rig.studies.oneill.study import Study, run_study
 from tests.estimation.synthetic import campaign
 
 pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
-def result() -> Result:
+def result() -> Study:
     return run_study(Source(campaign(), "analytic rig", measured=False), seed=3)
 
 
-def rows(result: Result) -> dict[tuple[str, str], float]:
-    return {(row.surrogate, row.protocol): row.score.rmse for row in result.study.rows}
+def rows(result: Study) -> dict[tuple[str, str], float]:
+    return {(row.surrogate, row.protocol): row.score.rmse for row in result.rows}
 
 
 def test_every_surrogate_is_fitted_by_every_protocol(result):
@@ -35,7 +35,7 @@ def test_every_surrogate_is_fitted_by_every_protocol(result):
     assert found["current", "run-wise"] > found["current", "random"] > 0
     assert found["command", "lopo"] == pytest.approx(found["current", "lopo"])  # proportional here
     assert found["gearbox", "authors"] > 3 * found["current", "authors"]
-    row = next(r for r in result.study.rows if r.protocol == "authors" and r.surrogate == "current")
+    row = next(r for r in result.rows if r.protocol == "authors" and r.surrogate == "current")
     assert row.gain_unit == "N m/A"
     assert row.gain == pytest.approx(0.94, rel=0.1)
 
@@ -43,7 +43,7 @@ def test_every_surrogate_is_fitted_by_every_protocol(result):
 def test_a_run_with_flagged_closing_samples_is_left_out_with_the_reason():
     runs = list(campaign())
     runs[4] = runs[4].with_stretch(Stretch(2.0, 6.0, Flag.SUSPECT, "runaway of the motor"))
-    found = run_study(Source(Campaign.of(runs), "x", measured=False)).study
+    found = run_study(Source(Campaign.of(runs), "x", measured=False))
     assert found.left_out == {"11": "runaway of the motor"}
     assert len(found.runs) == 8
     assert any("Run 11 left out: runaway" in note for note in shown.notes(found))
@@ -57,7 +57,7 @@ def test_what_is_missing_is_said_and_too_little_is_refused():
         )
         for r in runs
     ]
-    found = run_study(Source(Campaign.of(bare), "x", measured=False)).study
+    found = run_study(Source(Campaign.of(bare), "x", measured=False))
     assert {row.surrogate for row in found.rows} == {"current", "gearbox"}
     assert any("no command" in note for note in found.notes)
     assert any("lopo" in note for note in found.notes)  # no conditions either
@@ -68,8 +68,8 @@ def test_what_is_missing_is_said_and_too_little_is_refused():
 
 
 def test_markdown_states_counts_rows_and_provenance(result):
-    text = shown.markdown(result.study)
-    assert f"{result.study.closing_samples:,} closing samples; the paper states 260,581" in text
+    text = shown.markdown(result)
+    assert f"{result.closing_samples:,} closing samples; the paper states 260,581" in text
     (line,) = [row for row in text.splitlines() if row.startswith("| linear: current |")]
     assert line.endswith("| 10.06 | 23.26 | 12.26 | 0.97 | 0.97 |")
     assert "14.17 (command), 14.24 (current)" in text
@@ -110,12 +110,12 @@ def command_line() -> typer.Typer:
     return app
 
 
-def test_the_command_writes_tables_report_and_json(tmp_path, monkeypatch):
+def test_the_command_writes_tables_and_json(tmp_path, monkeypatch):
     monkeypatch.setattr(
         data, "open_reference", lambda path: Source(campaign(), "analytic rig", measured=False)
     )
     words = ["study", "oneill", "--data", str(tmp_path), "--json", "--seed", "5"]
-    words += ["--report", str(tmp_path / "r"), "--out", str(tmp_path / "d" / "oneill.md")]
+    words += ["--out", str(tmp_path / "d" / "oneill.md")]
     done = CliRunner().invoke(command_line(), words, catch_exceptions=False)
     assert done.exit_code == 0
     found = json.loads(done.stdout)
@@ -124,16 +124,15 @@ def test_the_command_writes_tables_report_and_json(tmp_path, monkeypatch):
     assert len(found["rows"]) == 15
     assert "Table I: proximal torque" in done.stderr
     assert (tmp_path / "d" / "oneill.md").read_text().startswith("# Grip torque and jaw angle")
-    assert (tmp_path / "r" / "oneill.html").read_text().startswith("<!DOCTYPE html>")
 
 
 @pytest.mark.measured
 def test_measured_data_gives_the_published_numbers(measured_data):
     found = run_study(open_reference(measured_data))
     rmse = {key: 1e3 * value for key, value in rows(found).items()}
-    assert found.study.measured
-    assert found.study.closing_samples == 308_117
-    assert list(found.study.left_out) == ["07"]
+    assert found.measured
+    assert found.closing_samples == 308_117
+    assert list(found.left_out) == ["07"]
     for surrogate, published in (("command", 14.17), ("current", 14.24), ("gearbox", 43.14)):
         assert rmse[surrogate, "authors"] == pytest.approx(published, abs=0.01)
     assert rmse["command", "run-wise"] == pytest.approx(14.05, abs=0.05)

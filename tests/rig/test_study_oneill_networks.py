@@ -143,13 +143,11 @@ def test_the_command_says_what_it_could_not_train(tmp_path, monkeypatch):
     app.add_typer(study_app)
     words = ["study", "oneill", "--data", str(tmp_path), "--networks", "--minutes", "0", "--json"]
     words += ["--state", str(tmp_path / "s"), "--out", str(tmp_path / "d.md")]
-    words += ["--report", str(tmp_path / "r")]
     done = CliRunner().invoke(app, words, catch_exceptions=False)
     assert done.exit_code == 0
     assert json.loads(done.stdout)["networks"]["rows"] == []
     assert "Not run" in done.stderr
     assert "Not run" in (tmp_path / "d.md").read_text()
-    assert "Not run" in (tmp_path / "r" / "oneill.html").read_text()
 
 
 @torch_only

@@ -1,24 +1,18 @@
-"""The study of O'Neill et al. 2018 as tables for any medium, as Markdown and as a page."""
+"""The study of O'Neill et al. 2018 as tables for any medium and as Markdown."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from markupsafe import Markup
-
-from estimation.closing import SPEED, is_closing
-from rig.output import figures
-from rig.output.render import render
 from rig.output.table import TextTable, to_markdown
 from rig.studies.coverage import coverage
-from rig.studies.oneill import fits, goals
+from rig.studies.oneill import goals
 from rig.studies.oneill import networks_page as networks
 from rig.studies.oneill import states_page as states
 from rig.studies.oneill import tables as paper
 from rig.studies.oneill.kinds import FILTERS, KindRow
 from rig.studies.oneill.networks import NetworkStudy
 from rig.studies.oneill.states import StateStudy
-from rig.studies.oneill.study import PROTOCOLS, Result, Study
+from rig.studies.oneill.study import PROTOCOLS, Study
 
 TITLE = "Grip torque and jaw angle from motor current: O'Neill et al. 2018, made again"
 
@@ -159,66 +153,4 @@ def all_tables(study: Study, more: More) -> list[TextTable]:
         *([kinds_table(more.kinds)] if more.kinds else []),
         *(states.tables(more.states) if more.states is not None else []),
         coverage("oneill"),
-    ]
-
-
-def page(result: Result, more: More = NOTHING_MORE) -> str:
-    """Return the study, and what goes beyond where there is any, as a page of HTML."""
-    study = result.study
-    return render(
-        "study.html",
-        {
-            "title": TITLE,
-            "lead": " ".join(lead(study, more)),
-            "source": study.source,
-            "notes": all_notes(study, more),
-            "tables": all_tables(study, more),
-            "figures": _figures(result),
-            "provenance": study.provenance,
-        },
-    )
-
-
-def _figures(result: Result) -> list[tuple[str, Markup]]:
-    run = result.example
-    channel = fits.SURROGATES[result.surrogate]
-    sensor = 1e3 * run[fits.TARGET]
-    estimate = 1e3 * result.line(run[channel])
-    time_caption = (
-        f"Run {run.name}, the run of median error: sensor, and the line through the"
-        f" {result.surrogate} fitted on all other runs. Shaded: closing samples."
-    )
-    columns = result.held_out.columns
-    error = 1e3 * (columns[fits.ESTIMATE] - columns[fits.TARGET])
-    variables = {
-        "spindle angle, rad": "spindle_angle_rad",
-        "spindle speed, rad/s": SPEED,
-        "torque at the jaw, mN m": "distal_torque_n_m",
-    }
-    panels = [
-        figures.Panel(label, columns[name] * (1e3 if "mN m" in label else 1.0), error)
-        for label, name in variables.items()
-        if name in columns
-    ]
-    against_caption = (
-        "Error of the run-wise estimate: mean and the middle 90 % of the closing samples."
-    )
-    by_run = {name: 1e3 * value for name, value in result.study.rmse_by_run_n_m.items()}
-    median = float(np.median(list(by_run.values())))
-    return [
-        (
-            time_caption,
-            figures.over_time(
-                run.time_s,
-                {"sensor": sensor, "estimate": estimate},
-                "proximal torque, mN m",
-                time_caption,
-                is_closing(run),
-            ),
-        ),
-        (against_caption, figures.against(panels, "error, mN m", against_caption)),
-        (
-            "Run-wise RMSE of each run.",
-            figures.bars(by_run, "RMSE, mN m", "Run-wise RMSE of each run.", ("median", median)),
-        ),
     ]

@@ -7,21 +7,18 @@ exactly. So the paper's errors are printed next to ours, and are not expected to
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from estimation.campaign import Campaign, CampaignError, Split, Table
 from estimation.channels import unit_of
-from estimation.closing import SPEED, processed
 from estimation.derived import measured_channels
-from estimation.recording import Recording
 from estimation.scores import Score, rmse
 from estimation.units import evaluate
 from rig.errors import DataError
 from rig.output.provenance import Provenance
 from rig.studies.oneill import fits
-from rig.studies.oneill.fits import LinearFit
 from rig.studies.oneill.source import Source
 
 PAPER_SAMPLES = 260_581
@@ -122,31 +119,12 @@ class Study:
     provenance: Provenance
 
 
-@dataclass(frozen=True)
-class Result:
-    """The study, and the samples its figures are drawn from.
-
-    Attributes:
-        study: The results.
-        surrogate: Surrogate of the figures.
-        held_out: Closing samples of all runs with the run-wise estimate.
-        example: The run of median error, processed, all its samples.
-        line: The fit, on all other runs' samples, that estimates the example.
-    """
-
-    study: Study
-    surrogate: str
-    held_out: Table
-    example: Recording
-    line: LinearFit
-
-
 def run_study(
     source: Source,
     *,
     seed: int = 0,
     on_run: Callable[[str], None] = lambda name: None,
-) -> Result:
+) -> Study:
     """Do the study.
 
     Args:
@@ -160,9 +138,7 @@ def run_study(
     """
     campaign, remarks = source.campaign, list(source.notes)
     surrogates = _surrogates(campaign, remarks)
-    context = ["spindle_angle_rad", "distal_torque_n_m"]
-    there = set(next(iter(campaign)).columns)
-    names = [fits.TARGET, *surrogates.values(), *(c for c in context if c in there)]
+    names = [fits.TARGET, *surrogates.values()]
     closing = fits.closing_campaign(campaign, names, on_run=lambda run: on_run(run.name))
     kept, left_out = without_flagged(closing)
     splits = _splits(kept, seed, remarks)
@@ -173,10 +149,8 @@ def run_study(
             _split_row(surrogate, channel, protocol, parts) for protocol, parts in splits.items()
         ]
     shown = "current" if "current" in surrogates else next(iter(surrogates))
-    table = _held_out(splits["run-wise"], surrogates[shown], names)
-    by_run = _rmse_by_run(table)
-    median_run = sorted(by_run, key=lambda name: by_run[name])[len(by_run) // 2]
-    study = Study(
+    by_run = _rmse_by_run(_held_out(splits["run-wise"], surrogates[shown]))
+    return Study(
         schema="rig.study.oneill/1",
         source=source.name,
         measured=source.measured,
@@ -192,8 +166,6 @@ def run_study(
         rmse_by_run_n_m=by_run,
         provenance=Provenance.now(seed),
     )
-    example, line = _example(campaign, kept, median_run, surrogates[shown])
-    return Result(study, shown, table, example, line)
 
 
 def _surrogates(campaign: Campaign, notes: list[str]) -> dict[str, str]:
@@ -266,14 +238,13 @@ def _whole_rows(
 
 
 def _split_row(surrogate: str, channel: str, protocol: str, splits: list[Split]) -> Row:
-    table = _held_out(splits, channel, [])
+    table = _held_out(splits, channel)
     score = fits.score_table(table)
     return Row(surrogate, protocol, len(table.names), None, _gain_unit(channel), None, score)
 
 
-def _held_out(splits: list[Split], channel: str, others: list[str]) -> Table:
-    wanted = [channel, *others] if not others else [channel, *others, SPEED]
-    return fits.held_out(splits, wanted, fits.linear_fitter(channel))
+def _held_out(splits: list[Split], channel: str) -> Table:
+    return fits.held_out(splits, [channel], fits.linear_fitter(channel))
 
 
 def _gain_unit(channel: str) -> str:
@@ -284,14 +255,3 @@ def _rmse_by_run(table: Table) -> dict[str, float]:
     estimate, truth = table.columns[fits.ESTIMATE], table.columns[fits.TARGET]
     parts = {name: table.run == index for index, name in enumerate(table.names)}
     return {n: rmse(estimate[p], truth[p]) for n, p in sorted(parts.items()) if p.any()}
-
-
-def _example(
-    campaign: Campaign, kept: Campaign, name: str, channel: str
-) -> tuple[Recording, LinearFit]:
-    """Return one whole run and the line fitted on the others."""
-    (run,) = campaign.select([name]).runs
-    others = kept.select(set(kept.names) - {name}).concatenate([channel, fits.TARGET])
-    line = fits.fit_line(others.columns[channel], others.columns[fits.TARGET])
-    example = processed(run.recording(), [fits.TARGET, channel])
-    return replace(example, name=name), line
