@@ -55,7 +55,8 @@ class Stream:
             Shape (n,), in `model.unit`; NaN where a needed channel is not finite.
         """
         channels = self._source.step(time_s, measured)
-        self.at_rest = any(bool(abs(channels[k][-1]) < v) for k, v in self._rest.items())
+        if np.size(time_s):  # an empty batch changes nothing
+            self.at_rest = any(bool(abs(channels[k][-1]) < v) for k, v in self._rest.items())
         rows = np.column_stack([channels[name] for name in self.model.channels])
         return np.array([self._one(row) for row in rows.tolist()])
 
