@@ -105,7 +105,8 @@ class HeldOut:
             return dict.fromkeys(order, 1.0)
         states = [*known.values()]
         changes = sum(a != b for a, b in itertools.pairwise(states))
-        change = min(0.5, changes / max(1, len(states) - 1))
+        # a change at one time of the campaign does not come and go
+        change = 0.0 if candidate.acts is None else min(0.5, changes / max(1, len(states) - 1))
         out: dict[str, float] = {}
         for k, name in enumerate(order):
             if name in known:
@@ -117,7 +118,7 @@ class HeldOut:
                 math.prod(1.0 - change if x == state else change for x in (*before, *after))
                 for state in (True, False)
             )
-            out[name] = acting / (acting + not_acting)
+            out[name] = acting / (acting + not_acting) if acting + not_acting else 0.5
         return out
 
     def gains(self, before: Sequence[Candidate], cause: Candidate) -> "Gains":

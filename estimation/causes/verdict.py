@@ -143,8 +143,10 @@ def _judged(
         earlier = [k.scored.candidate for k in kept]
         acts_in, settled = held_out.acts_in(earlier, one.scored.candidate)
         if settled:
-            counted = one.scored.candidate.acts is not None
-            refits.open |= set() if counted else {*settled}
+            uncounted = refits.open | {*settled}
+            counted = one.scored.candidate.acts is not None or uncounted >= {*sealed.confirm}
+            if not counted:
+                refits.open = uncounted
             notes.append(
                 f"{', '.join(settled)}: the training runs do not show whether {cause.family} acts"
                 " there; "
