@@ -19,6 +19,9 @@ from estimation.recording import FloatArray
 KNOTS = 12
 """Hat functions over a run; a block is half as long as they are apart."""
 
+MOST = 0.75
+"""Share of the runs, and of the test runs, in which the error is lower: not by chance in some."""
+
 RIDGE = 0.01
 """Prior precision of an amplitude, of the mean information on one."""
 
@@ -53,6 +56,8 @@ def unsteady(held_out: HeldOut, numbers: Numbers) -> Unsteady | None:
     by_run = np.array([_gain(errors[found], np.arange(len(test)) == k) for k in range(len(test))])
     evidence = 0.5 * numbers.samples_a_run * float(by_run[test].sum())
     if _gain(errors[found], ~test) < price or evidence < np.log(numbers.kept_evidence):
+        return None
+    if min(np.mean(by_run[test] > 0.0), np.mean(by_run > 0.0)) < MOST:
         return None
     names = [run.name for run in held_out.layout.runs]
     fall = float(np.exp(-0.5 * _gain(errors[found], test)))
