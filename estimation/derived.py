@@ -250,7 +250,10 @@ def zero_phase_channels(
     """
     names = list(dict.fromkeys(names))
     signals = signals or reference()
+    clocks = {name: recording[name] for name in names if name == CAMPAIGN_TIME}
     wanted = [name for name in names if name not in CLOCKS]
+    if not wanted:
+        return replace(recording, columns=clocks)
     measured = {name: recording[name] for name in measured_channels(wanted, signals)}
     filtered = filter_recording(replace(recording, columns=measured), low_pass)
     period_s = 1.0 / recording.sample_rate_hz
@@ -269,9 +272,7 @@ def zero_phase_channels(
         signals,
     )
     columns = {name: values[ticks] for name, values in derived.items()}
-    if CAMPAIGN_TIME in names:
-        columns[CAMPAIGN_TIME] = recording[CAMPAIGN_TIME]
-    return replace(filtered, columns=columns)
+    return replace(filtered, columns=columns | clocks)
 
 
 def _on_time(values: FloatArray, name: str, recording: Recording, signals: Signals) -> FloatArray:

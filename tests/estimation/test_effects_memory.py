@@ -10,6 +10,7 @@ import pytest
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.verdict import diagnose
+from estimation.derived import zero_phase_channels
 from estimation.diagnosis.split import split
 from estimation.effects import effect
 from estimation.fitting import fit
@@ -170,6 +171,11 @@ def test_a_campaign_whose_starts_are_known_has_a_clock_of_its_own():
     assert np.ptp(timed[0]["campaign_time_s"]) == pytest.approx(recordings[0].duration_s)
     unknown = Campaign.of([*recordings[:3], started(recordings[3], None)])
     assert all("campaign_time_s" not in recording for recording in unknown.timed())
+
+
+def test_the_time_of_the_campaign_alone_is_a_channel():
+    (run,) = Campaign.of([started(runs()[0], 0.0)]).timed()
+    assert zero_phase_channels(run, ["campaign_time_s"])["campaign_time_s"][0] >= 0.0
 
 
 def test_a_model_of_warm_up_is_fitted_on_the_campaign_and_runs_live():
