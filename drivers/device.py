@@ -175,7 +175,7 @@ class Drive(Device, Protocol):
         ...
 
     def arm(self) -> None:
-        """Put the motor in force, its command 0."""
+        """Energise the motor, its command 0."""
         ...
 
     def command(self, ratio: float) -> None:

@@ -203,7 +203,7 @@ class PolledDrive(PolledDevice):
         self._armed = self._may_be_armed = False
 
     def energise(self) -> None:
-        """Put the motor in force, without current."""
+        """Energise the motor, without current."""
         raise NotImplementedError
 
     def release(self) -> None:
@@ -215,7 +215,7 @@ class PolledDrive(PolledDevice):
         raise NotImplementedError
 
     def arm(self) -> None:
-        """Put the motor in force, its command 0, watched by the drive itself.
+        """Energise the motor, its command 0, watched by the drive itself.
 
         Raises:
             DriverError: The drive has an error, or does not get into operation.
@@ -226,7 +226,7 @@ class PolledDrive(PolledDevice):
         self.put_in_force()
 
     def put_in_force(self) -> None:
-        """Put the motor of a well drive in force; errors as `arm`."""
+        """Energise the motor of a healthy drive; errors as `arm`."""
         self._may_be_armed = True
         self.zero()
         self.energise()

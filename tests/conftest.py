@@ -22,8 +22,8 @@ from hypothesis import settings
 
 from drivers.teensy.core import firmware_library
 
-# compiled code is slow the first time, and a deadline is a wall clock in disguise; examples are
-# differ from run to run, so half of the usual hundred find as much over a day
+# compiled code is slow the first time, and a deadline is a wall clock in disguise; examples
+# differ from run to run, so half of the usual hundred are enough
 settings.register_profile("quick", deadline=None, max_examples=50)
 settings.load_profile("quick")
 

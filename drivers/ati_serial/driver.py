@@ -1,4 +1,4 @@
-"""The driver of a digital F/T: its calibration is read and put in force, then it streams."""
+"""The driver of a digital F/T: its calibration is read and activated, then it streams."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -124,7 +124,7 @@ class AtiSerial(StreamedSensor):
         return DeviceIdentity(f"ATI digital F/T {found.part_number}".strip(), found.serial, "")
 
     def prepare(self) -> None:
-        """Put the calibration's gains and offsets in force."""
+        """Activate the calibration's gains and offsets."""
         assert self._calibration is not None  # noqa: S101
         active = self._calibration.gains + self._calibration.offsets
         self._set_lock(protocol.UNLOCK)

@@ -101,7 +101,7 @@ class Dynamixel(PolledDrive):
         return DeviceIdentity(f"Dynamixel {name}", "", str(firmware))
 
     def energise(self) -> None:
-        """Put the motor in force in current control, its goal 0, watched by the drive.
+        """Energise the motor in current control, its goal 0, watched by the drive.
 
         Raises:
             DriverError: The drive has a hardware error, or does not hold what was written.

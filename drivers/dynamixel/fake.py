@@ -78,7 +78,7 @@ class DynamixelFake:
 
     @property
     def in_force(self) -> bool:
-        """Whether its motor is in force."""
+        """Whether its motor is energised."""
         return bool(self.table[protocol.TORQUE_ENABLE.address])
 
     @property

@@ -130,7 +130,7 @@ class Epos4(PolledDrive):
         super().start()
 
     def arm(self) -> None:
-        """Put the power stage in force with a target torque of 0.
+        """Energise the power stage with a target torque of 0.
 
         Raises:
             DriveFaultError: The drive has a fault; `clear_fault` first.
@@ -142,7 +142,7 @@ class Epos4(PolledDrive):
         self.put_in_force()
 
     def energise(self) -> None:
-        """Put the power stage in force."""
+        """Energise the power stage."""
         self._power.enable()
         self._cycle.drop_late()
 

@@ -28,7 +28,7 @@ class PowerStage:
         self._node = node
 
     def enable(self) -> None:
-        """Put the motor in force in cyclic torque, its target torque 0.
+        """Energise the motor in cyclic torque, its target torque 0.
 
         Raises:
             DriveFaultError: The drive has a fault.

@@ -3,7 +3,7 @@
 The reactions decide how the motor stops when the host is gone or the drive finds a fault. Both are
 set to "voltage off". The other choice of 0x6007 and the other two of 0x605E brake along a ramp, by
 the drive's position and velocity controllers; these are not used in cyclic torque and may never
-have been tuned, and a motor that brakes is in force for as long as the ramp takes.
+have been tuned, and a motor that brakes is energised for as long as the ramp takes.
 
 Source: objects 0x6007, 0x605E and 0x1029 with their values as transcribed from maxon's firmware
 specification in the public library `Imcab/EposLib`; re-mapping order of CiA 301.

@@ -99,7 +99,7 @@ class Moteus(PolledDrive):
         return DeviceIdentity(f"moteus {model:#06x}", text, f"{firmware:#08x}")
 
     def energise(self) -> None:
-        """Put the motor in force with no torque; it measures its current sensors first.
+        """Energise the motor without torque; it measures its current sensors first.
 
         Raises:
             DriverError: It does not get into operation.

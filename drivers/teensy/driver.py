@@ -113,7 +113,7 @@ class TeensyLogger:
         return identity
 
     def arm(self, gains: Sequence[Any] | NDArray[np.float64], limits: ArmLimits) -> None:
-        """Put the controllers in force. The motors stay currentless until the first setpoint.
+        """Switch the controllers on. The motors stay currentless until the first setpoint.
 
         The board offers a number with which it is armed; only this logger, which arms with it, can
         then move it or keep it armed.

@@ -110,6 +110,6 @@ def _state(port: str, profile: Profile) -> str:
         return "it sends no samples"
     if int(samples["status"][-1]) & (STATUS_ARMED | STATUS_HOLDING):
         raise SafetyTripError(
-            f"The board at {port} is armed.", "Its motors are in force.", "Run: rig stop"
+            f"The board at {port} is armed.", "Its motors are energised.", "Run: rig stop"
         )
     return "it is disarmed"

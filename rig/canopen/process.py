@@ -113,7 +113,7 @@ class CanopenProcess:
             self._socket.setblocking(False)
 
     def close(self) -> None:
-        """Let go: the process disarms the drive, where it may be in force, and ends.
+        """Let go: the process disarms the drive, where it may be energised, and ends.
 
         Raises:
             DriverError: The drive has not confirmed that it is disarmed.

@@ -27,7 +27,7 @@ def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fal
     if not meant:
         raise UsageError(
             "Nothing was stopped: no rig is configured.",
-            "The motors of a rig that is running may be in force. Cut their supply by hand.",
+            "The motors of a running rig may be energised. Cut their supply by hand.",
             ONE_OF,
         )
     stopped = [_stopped(path, json) for path in meant]

@@ -145,7 +145,7 @@ class LogicLink:
         identity = device.identify()
         device.start()
         self.bench = DriveBench(device)
-        self.bench.release()  # an earlier program may have left it in force
+        self.bench.release()  # an earlier program may have left it energised
         serial = identity.serial or identity.model.split()[-1]
         self._board = FirmwareBoard(self.bench, BoardStart(f"{device.name.upper()}-{serial}"))
         self.bench.board = self._board
