@@ -15,8 +15,7 @@ VERSION = 1
 QUEUE_CAPACITY = 2000
 """Setpoints the board holds: two seconds of motion at 1 kHz."""
 WATCHDOG_US = 250_000
-"""Board time without a valid host frame after which an armed board goes to its safe state, unless
-the host sets another time."""
+"""Board time without a valid host frame until an armed board is safe, unless the host sets it."""
 MIN_WATCHDOG_US, MAX_WATCHDOG_US = 5_000, 1_000_000
 MISSING = -(2**31)
 """Count of a sensor that gave nothing: a whole number's NaN."""
@@ -302,17 +301,16 @@ def encode_reference(sequence: int, counts: Sequence[int], at_index: bool = Fals
 
 def encode_hello_reply(sequence: int, identity: Identity) -> bytes:
     """Return the payload of the answer to a hello, with this program's firmware version."""
-    own = identity
-    numbers = (own.protocol_hash, FIRMWARE_VERSION, own.build_hash)
-    state = (own.boot, own.status, own.offer)
-    fields = (VERSION, Kind.HELLO_REPLY, sequence, *numbers, own.serial.encode()[:24], *state)
+    numbers = (identity.protocol_hash, FIRMWARE_VERSION, identity.build_hash)
+    state = (identity.serial.encode()[:24], identity.boot, identity.status, identity.offer)
+    fields = (VERSION, Kind.HELLO_REPLY, sequence, *numbers, *state)
     return np.array(fields, HELLO_REPLY_DTYPE).tobytes()
 
 
 def encode_ack(ack: Ack) -> bytes:
     """Return the payload of an acknowledgement."""
-    result = (ack.command, ack.result, ack.status, ack.queue_free)
-    return np.array((VERSION, Kind.ACK, ack.sequence, *result), ACK_DTYPE).tobytes()
+    fields = (ack.sequence, ack.command, ack.result, ack.status, ack.queue_free)
+    return np.array((VERSION, Kind.ACK, *fields), ACK_DTYPE).tobytes()
 
 
 def encode_trip_report(
@@ -328,8 +326,8 @@ def encode_trip_report(
     """
     value, limit, tick_us, late_us = numbers
     whole = [max(MISSING, min(number, TOP)) for number in (value, limit)]
-    late_us = min(late_us, 2**32 - 1)
-    fields = (VERSION, Kind.TRIP_REPORT, sequence, code, channel, *whole, tick_us, late_us)
+    whole += [tick_us, min(late_us, 2**32 - 1)]
+    fields = (VERSION, Kind.TRIP_REPORT, sequence, code, channel, *whole)
     return np.array(fields, TRIP_REPORT_DTYPE).tobytes()
 
 

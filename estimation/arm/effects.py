@@ -6,6 +6,8 @@ gripper: the wrist carries the load of its motor, so its torque improves the ide
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -76,78 +78,91 @@ def of_joints(arm: Arm) -> list[ArmEffect]:
 
 def _of_joint(arm: Arm, k: int) -> list[ArmEffect]:
     joint = arm.joints[k]
-    label, name = f"J{k + 1}", joint.name
-
-    def on(values: Callable[[Motion], list[FloatArray]]) -> Callable[[Motion], FloatArray]:
-        return lambda m: on_joint(np.column_stack(values(m)), k, row_count(arm))
-
-    effects = [
-        ArmEffect(
-            f"presliding {label}",
+    name, effect = joint.name, partial(_effect, arm, k)
+    return [
+        effect(
+            "presliding",
             f"elastic slip in the {name}",
-            on(lambda m: _slips(m.position[:, [k]], joint)),
+            lambda m: _slips(m.position[:, [k]], joint),
             dissipative=True,
         ),
-        ArmEffect(
-            f"Stribeck friction {label}",
+        effect(
+            "Stribeck friction",
             f"friction of the {name} that falls with speed",
-            on(lambda m: [_sign(m, k, joint) * _slow(m, k, joint)]),
+            lambda m: [_sign(m, k, joint) * _slow(m, k, joint)],
             dissipative=True,
         ),
-        ArmEffect(
-            f"curved spring {label}",
+        effect(
+            "curved spring",
             f"elastic torque of the {name} in square and cube of position",
-            on(lambda m: [m.position[:, k] ** p for p in (2, 3)]),
+            lambda m: [m.position[:, k] ** p for p in (2, 3)],
         ),
-        ArmEffect(
-            f"uneven spring {label}",
+        effect(
+            "uneven spring",
             f"elastic torque of the {name} that swings four times a turn (prismatic: range)",
-            on(lambda m: _four_a_turn(m.position[:, k], joint)),
+            lambda m: _four_a_turn(m.position[:, k], joint),
         ),
-        ArmEffect(
-            f"curved friction {label}",
+        effect(
+            "curved friction",
             f"friction of the {name} in the signed square of speed",
-            on(lambda m: [m.velocity[:, k] * np.abs(m.velocity[:, k])]),
+            lambda m: [m.velocity[:, k] * np.abs(m.velocity[:, k])],
         ),
-        ArmEffect(
-            f"one-sided friction {label}",
+        effect(
+            "one-sided friction",
             f"friction of the {name} that differs with direction",
-            on(lambda m: [np.abs(_sign(m, k, joint)), np.abs(m.velocity[:, k])]),
+            lambda m: [np.abs(_sign(m, k, joint)), np.abs(m.velocity[:, k])],
         ),
-        ArmEffect(
-            f"friction by position {label}",
+        effect(
+            "friction by position",
             f"Coulomb friction of the {name} that changes along its range",
-            on(lambda m: [_sign(m, k, joint) * m.position[:, k] ** p for p in (1, 2)]),
+            lambda m: [_sign(m, k, joint) * m.position[:, k] ** p for p in (1, 2)],
         ),
-        ArmEffect(
-            f"friction along the track {label}",
+        effect(
+            "friction along the track",
             f"tight and loose spots of the {name}: Coulomb friction, linear between knots",
-            on(lambda m: [_sign(m, k, joint)[:, None] * _track(m.position[:, k], joint)]),
+            lambda m: [_sign(m, k, joint)[:, None] * _track(m.position[:, k], joint)],
             damping=TRACK_DAMPING,
         ),
-        ArmEffect(
-            f"late torque {label}",
+        effect(
+            "late torque",
             f"a delay between motion and torque of the {name}",
-            on(lambda m: [np.gradient(m.acceleration[:, k], m.period_s)]),
+            lambda m: [np.gradient(m.acceleration[:, k], m.period_s)],
         ),
+        *_repeated(arm, k),
     ]
-    effects += [
-        ArmEffect(
-            f"creep {time:g} s {label}",
-            f"a damper behind a spring in the {name}",
-            on(lambda m, time=time: [creep(m.velocity[:, k], time, m.period_s)]),  # type: ignore[misc]
-            dissipative=True,
-        )
-        for time in CREEP_S
+
+
+Columns = Callable[[Motion], list[FloatArray]]
+
+
+def _effect(arm: Arm, k: int, kind: str, what: str, values: Columns, **more: Any) -> ArmEffect:
+    """Return an effect on one joint."""
+
+    def on(motion: Motion) -> FloatArray:
+        return on_joint(np.column_stack(values(motion)), k, row_count(arm))
+
+    return ArmEffect(f"{kind} J{k + 1}", what, on, **more)
+
+
+def _repeated(arm: Arm, k: int) -> list[ArmEffect]:
+    """Return the effects of a joint that are tried at several times or orders."""
+    joint, effect = arm.joints[k], partial(_effect, arm, k)
+    name = joint.name
+
+    def creeping(time: float) -> Columns:
+        return lambda m: [creep(m.velocity[:, k], time, m.period_s)]
+
+    def swinging(order: int) -> Columns:
+        return lambda m: _swing(order * m.position[:, k])
+
+    damper = f"a damper behind a spring in the {name}"
+    effects = [
+        effect(f"creep {time:g} s", damper, creeping(time), dissipative=True) for time in CREEP_S
     ]
+    ripple = f"torque ripple or eccentric gear of the {name}"
     if joint.kind == "revolute":
         effects += [
-            ArmEffect(
-                f"ripple {order} a turn {label}",
-                f"torque ripple or eccentric gear of the {name}",
-                on(lambda m, order=order: _swing(order * m.position[:, k])),  # type: ignore[misc]
-            )
-            for order in RIPPLE_ORDERS
+            effect(f"ripple {order} a turn", ripple, swinging(order)) for order in RIPPLE_ORDERS
         ]
     return effects
 

@@ -78,11 +78,14 @@ def fill_links(
         table: Shape (n, bodies, columns), zero where it is written.
     """
     q, v, a = (np.ascontiguousarray(x, dtype=np.float64) for x in motion)
-    _fill(tree.parents, tree.prismatic, tree.turns, tree.places, tree.gravity, q, v, a, to, table)
+    frames = tree.parents, tree.prismatic, tree.turns, tree.places
+    _fill(frames, tree.gravity, (q, v, a), to, table)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _fill(parents, prismatic, turns, places, gravity, q, v, a, to, table):  # type: ignore[no-untyped-def]
+def _fill(frames, gravity, motion, to, table):  # type: ignore[no-untyped-def]
+    parents, prismatic, turns, places = frames
+    q, v, a = motion
     bodies = len(parents)
     # the last row is the base, which rises against gravity: a parent of -1 points there
     spin, turning = np.zeros((bodies + 1, 3)), np.zeros((bodies + 1, 3))
@@ -115,18 +118,8 @@ def _fill(parents, prismatic, turns, places, gravity, q, v, a, to, table):  # ty
             w, t, r = _moved(prismatic[i], v[sample, i], a[sample, i], w, t, r)
             for k in range(3):
                 spin[i, k], turning[i, k], rising[i, k] = w[k], t[k], r[k]
-            _row(
-                (0.0, 0.0, axes[i, i, 2]),
-                (0.0, 0.0, levers[i, i, 2]),
-                w,
-                t,
-                r,
-                to,
-                i,
-                table,
-                sample,
-                i,
-            )
+            axis, lever = (0.0, 0.0, axes[i, i, 2]), (0.0, 0.0, levers[i, i, 2])
+            _row(axis, lever, (w, t, r), to[i], table[sample, i])
             j = p
             while j >= 0:
                 axis = (axes[p, j, 0], axes[p, j, 1], axes[p, j, 2])
@@ -135,7 +128,7 @@ def _fill(parents, prismatic, turns, places, gravity, q, v, a, to, table):  # ty
                 axis = _back(turn, axis)
                 for k in range(3):
                     axes[i, j, k], levers[i, j, k] = axis[k], lever[k]
-                _row(axis, lever, w, t, r, to, i, table, sample, j)
+                _row(axis, lever, (w, t, r), to[i], table[sample, j])
                 j = parents[j]
 
 
@@ -173,25 +166,26 @@ def _moved(slides, v, a, w, t, r):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, inline="always")
-def _row(u, c, w, t, r, to, i, table, sample, j):  # type: ignore[no-untyped-def]
-    """Write what each parameter of link i does on joint j: axis u . moment + lever c . force."""
-    if to[i, 0] >= 0:
-        table[sample, j, to[i, 0]] = c[0] * r[0] + c[1] * r[1] + c[2] * r[2]
+def _row(u, c, motion, to, row):  # type: ignore[no-untyped-def]
+    """Write what each parameter of a link does on a joint: axis u . moment + lever c . force."""
+    w, t, r = motion
+    if to[0] >= 0:
+        row[to[0]] = c[0] * r[0] + c[1] * r[1] + c[2] * r[2]
     cw = c[0] * w[0] + c[1] * w[1] + c[2] * w[2]
     ww = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
     # force of a first moment l: t x l + w x (w x l); its moment: l x r
     ct, ru = _cross(c, t), _cross(r, u)
     for k in range(3):
-        if to[i, 1 + k] < 0:
+        if to[1 + k] < 0:
             continue
-        table[sample, j, to[i, 1 + k]] = ct[k] + cw * w[k] - ww * c[k] + ru[k]
-    if to[i, 4] < 0:
+        row[to[1 + k]] = ct[k] + cw * w[k] - ww * c[k] + ru[k]
+    if to[4] < 0:
         return
     # moment of an inertia L: L t + w x L w
     s = _cross(u, w)
-    table[sample, j, to[i, 4]] = u[0] * t[0] + s[0] * w[0]
-    table[sample, j, to[i, 5]] = u[0] * t[1] + u[1] * t[0] + s[0] * w[1] + s[1] * w[0]
-    table[sample, j, to[i, 6]] = u[1] * t[1] + s[1] * w[1]
-    table[sample, j, to[i, 7]] = u[0] * t[2] + u[2] * t[0] + s[0] * w[2] + s[2] * w[0]
-    table[sample, j, to[i, 8]] = u[1] * t[2] + u[2] * t[1] + s[1] * w[2] + s[2] * w[1]
-    table[sample, j, to[i, 9]] = u[2] * t[2] + s[2] * w[2]
+    row[to[4]] = u[0] * t[0] + s[0] * w[0]
+    row[to[5]] = u[0] * t[1] + u[1] * t[0] + s[0] * w[1] + s[1] * w[0]
+    row[to[6]] = u[1] * t[1] + s[1] * w[1]
+    row[to[7]] = u[0] * t[2] + u[2] * t[0] + s[0] * w[2] + s[2] * w[0]
+    row[to[8]] = u[1] * t[2] + u[2] * t[1] + s[1] * w[2] + s[2] * w[1]
+    row[to[9]] = u[2] * t[2] + s[2] * w[2]

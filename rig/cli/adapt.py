@@ -7,6 +7,7 @@ import typer
 
 from rig.cli.left_out import say_left_out
 from rig.cli.new_file import require_new
+from rig.cli.options import FormatOption, JsonFile, SeedOption
 from rig.output.console import JsonFlag, emit_json, progress, results, to_json
 
 
@@ -23,14 +24,10 @@ def adapt(
     scratch: Annotated[
         bool, typer.Option(help="Also fit on the other instrument's runs alone, in folds.")
     ] = True,
-    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
-    format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
-    ] = None,
+    seed: SeedOption = 0,
+    format_: FormatOption = None,
     json: JsonFlag = False,
-    json_out: Annotated[
-        Path | None, typer.Option("--json-out", help="File for the result as JSON.")
-    ] = None,
+    json_out: JsonFile = None,
 ) -> None:
     """Adapt an estimator with some runs and report its error on the runs not used."""
     from estimation.estimator import load

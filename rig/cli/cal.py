@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.help import GroupedHelp
+from rig.cli.options import LedgerOption, SeedOption
 from rig.cli.rig_options import ConfigOption, SimFlag
 from rig.output.console import JsonFlag, emit_json, results, stages
 
@@ -227,11 +228,9 @@ def check(
 @cal_app.command()
 def diagnose(
     record: Hash,
-    seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
+    seed: SeedOption = 0,
     store: StoreOption = None,
-    ledger: Annotated[
-        Path | None, typer.Option(help="Path of the held-out-data usage log.")
-    ] = None,
+    ledger: LedgerOption = None,
     json: JsonFlag = False,
 ) -> None:
     """Run the diagnosis on the raw logs of a calibration."""

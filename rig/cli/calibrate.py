@@ -10,6 +10,7 @@ import typer
 
 from rig.cli.calibrate_check import check
 from rig.cli.help import GroupedHelp
+from rig.cli.options import SimulationSeed
 from rig.cli.rig_options import ConfigOption, SimFlag
 from rig.output.console import JsonFlag
 
@@ -71,7 +72,7 @@ class Keeping:
             "--yes", "-y", help="Ask no questions; on the simulated rig, simulated hands act."
         ),
     ] = False
-    seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None
+    seed: SimulationSeed = None
     json: JsonFlag = False
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.options import FormatOption
 from rig.cli.rig_options import ConfigOption, SimFlag
 from rig.cli.shipped import complete_recordings
 from rig.output.console import JsonFlag, emit_json, results
@@ -27,9 +28,7 @@ def check(
             help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
         ),
     ],
-    format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
-    ] = None,
+    format_: FormatOption = None,
     config: ConfigOption = None,
     sim: SimFlag = False,
     json: JsonFlag = False,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.options import SchedulerOption, WorkersOption
 from rig.cli.refit import show_refit
 from rig.cli.shipped import complete_campaign, complete_model
 from rig.output.console import JsonFlag, emit_json, remarks, results, show_table
@@ -46,10 +47,8 @@ def campaigns(
             autocompletion=complete_model,
         ),
     ] = None,
-    workers: Annotated[int, typer.Option(help="Number of processes of --refit.")] = 1,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler for --refit.")
-    ] = None,
+    workers: WorkersOption = 1,
+    scheduler: SchedulerOption = None,
     most: Annotated[int, typer.Option("--most", help="Rows of a table, the newest first.")] = 40,
     rebuild: Annotated[
         bool, typer.Option("--rebuild", help="Read every log again into the index.")
@@ -62,20 +61,8 @@ def campaigns(
     --diagnose, names of folders select these alone.
     """
     from rig.campaigns import search
-    from rig.campaigns.index import campaigns as all_campaigns
-    from rig.campaigns.index import default_index
-    from rig.errors import UsageError
 
-    if not root.is_dir():
-        raise UsageError(
-            f"There is no folder {root}.",
-            "Recordings are listed from there.",
-            "Name the folder with --root, or record a campaign: rig record.",
-        )
-    working = remarks()
-    whole = all_campaigns(
-        root, default_index(root), rebuild, lambda folder: working.print(f"reading {folder} ...")
-    )
+    whole = _indexed(root, rebuild)
     named = _named(whole, terms or [], root) if diagnose or open_ or compare else []
     found = named or search.search(whole, terms or [])
     if refit is not None:
@@ -92,17 +79,40 @@ def campaigns(
     if json:
         emit_json({"campaigns": found})
         return
-    screen = results(json)
     if compare and found:
-        show_table(screen, _side_by_side(found, root))
+        show_table(results(json), _side_by_side(found, root))
         return
+    _list(found, root, runs, most, len(whole))
+
+
+def _indexed(root: Path, rebuild: bool) -> "Sequence[IndexedCampaign]":
+    """Return all campaigns of a folder, from the index; what is new there is read."""
+    from rig.campaigns.index import campaigns as all_campaigns
+    from rig.campaigns.index import default_index
+    from rig.errors import UsageError
+
+    if not root.is_dir():
+        raise UsageError(
+            f"There is no folder {root}.",
+            "Recordings are listed from there.",
+            "Name the folder with --root, or record a campaign: rig record.",
+        )
+    working = remarks()
+    return all_campaigns(
+        root, default_index(root), rebuild, lambda folder: working.print(f"reading {folder} ...")
+    )
+
+
+def _list(found: Sequence["IndexedCampaign"], root: Path, runs: bool, most: int, of: int) -> None:
+    """Print the campaigns found, of so many in all."""
+    screen = results(False)
     count = sum(len(campaign.runs) for campaign in found)
     if found:
         table = _by_run(found, root, most) if runs else _by_campaign(found[:most], root)
         show_table(screen, table)
         if len(table.rows) < (count if runs else len(found)):
             screen.print(f"Older ones are not shown; --most shows more than {most} rows.")
-    screen.print(f"{len(found)} of {len(whole)} campaigns, {count} runs.")
+    screen.print(f"{len(found)} of {of} campaigns, {count} runs.")
 
 
 def _named(

@@ -6,7 +6,18 @@ from typing import Annotated
 import typer
 
 from rig.cli.left_out import SkipBad, say_left_out
-from rig.cli.machine_option import MachineOption, ModelOption
+from rig.cli.options import (
+    EquationOption,
+    FormatOption,
+    JsonFile,
+    LedgerOption,
+    MachineOption,
+    ModelOption,
+    QuickFlag,
+    SchedulerOption,
+    SeedOption,
+    WorkersOption,
+)
 from rig.cli.shipped import complete_recordings
 from rig.output.console import JsonFlag, emit_json, plain, results, stages
 
@@ -20,11 +31,9 @@ def diagnose(
     ],
     model: ModelOption = None,
     machine: MachineOption = None,
-    balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
+    balance: EquationOption = None,
     json_: JsonFlag = False,
-    json_out: Annotated[
-        Path | None, typer.Option("--json-out", help="File for the diagnosis as JSON.")
-    ] = None,
+    json_out: JsonFile = None,
     report: Annotated[
         Path | None,
         typer.Option(help="Folder of the HTML report; of a folder of logs, diagnosis in it."),
@@ -32,19 +41,14 @@ def diagnose(
     model_out: Annotated[
         Path | None, typer.Option(help="File of the models with the identified effects.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the split and of everything random.")] = 0,
-    workers: Annotated[int, typer.Option(help="Number of processes; 1 is this one.")] = 1,
-    quick: Annotated[bool, typer.Option("--quick", help="Propose no next experiment.")] = False,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(help="Address of a Dask scheduler."),
-    ] = None,
+    seed: SeedOption = 0,
+    workers: WorkersOption = 1,
+    quick: QuickFlag = False,
+    scheduler: SchedulerOption = None,
     protocol_out: Annotated[
         Path | None, typer.Option(help="Protocol file of the next experiment.")
     ] = None,
-    ledger: Annotated[
-        Path | None, typer.Option(help="Path of the held-out-data usage log.")
-    ] = None,
+    ledger: LedgerOption = None,
     plan: Annotated[
         bool,
         typer.Option(
@@ -53,9 +57,7 @@ def diagnose(
         ),
     ] = False,
     skip_bad: SkipBad = False,
-    format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
-    ] = None,
+    format_: FormatOption = None,
 ) -> None:
     """Identify the effect that the declared model lacks, and confirm it on held-out test runs."""
     if plan:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.left_out import say_left_out
-from rig.cli.machine_option import MachineOption, ModelOption
+from rig.cli.options import EquationOption, FormatOption, MachineOption, ModelOption, SeedOption
 from rig.output.console import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
@@ -18,14 +18,12 @@ def diff(
     b: Annotated[Path, typer.Argument(help="Recordings of the second campaign.")],
     model: ModelOption = None,
     machine: MachineOption = None,
-    balance: Annotated[str | None, typer.Option(help="Only this equation, such as motor.")] = None,
+    balance: EquationOption = None,
     on: Annotated[
         Path | None, typer.Option(help="Recordings of a third campaign, to predict.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the random choices of runs.")] = 0,
-    format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
-    ] = None,
+    seed: SeedOption = 0,
+    format_: FormatOption = None,
     json_: JsonFlag = False,
 ) -> None:
     """Find what changed between two campaigns of one machine, with intervals over runs.

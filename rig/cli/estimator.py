@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.help import GroupedHelp
+from rig.cli.options import FormatOption, TablesFile
 from rig.output.console import JsonFlag, emit_json, progress, show_result
 
 estimator_app = typer.Typer(
@@ -26,10 +27,8 @@ def compare(
     first: Annotated[Path, typer.Argument(help="Estimator of rig fit or rig adapt.")],
     second: Annotated[Path, typer.Argument(help="Another one of the same channel.")],
     on: Annotated[Path, typer.Option("--on", help="Recordings: a file, folder or archive.")],
-    format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
-    ] = None,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    format_: FormatOption = None,
+    out: TablesFile = None,
     json: JsonFlag = False,
 ) -> None:
     """Compare two estimators on the same runs: which is better, and where."""

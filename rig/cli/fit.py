@@ -1,13 +1,14 @@
 """`rig fit`: fit a declared model on a campaign."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rig.cli.left_out import SkipBad, say_left_out
-from rig.cli.machine_option import MachineOption
 from rig.cli.new_file import require_new
+from rig.cli.options import FormatOption, MachineOption, SeedOption
 from rig.cli.shipped import complete_model, complete_recordings, model_names
 from rig.output.console import JsonFlag, emit_json, progress, results
 
@@ -129,7 +130,7 @@ def fit(
         Path | None, typer.Option("--out", "-o", help="File of the fitted model.")
     ] = None,
     folds: Annotated[int, typer.Option(help="Folds of the error on runs not fitted on.")] = 5,
-    seed: Annotated[int, typer.Option(help="Seed of folds and bootstrap.")] = 0,
+    seed: SeedOption = 0,
     target: Annotated[
         str, typer.Option(help="Channel to estimate; with --model states or network.")
     ] = "proximal_torque_n_m",
@@ -140,9 +141,7 @@ def fit(
         bool, typer.Option("--live", help="Fit for use live; with --model states.")
     ] = False,
     skip_bad: SkipBad = False,
-    format_: Annotated[
-        str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
-    ] = None,
+    format_: FormatOption = None,
     json_: JsonFlag = False,
 ) -> None:
     """Fit a declared model on all runs and report its error on runs it was not fitted on.
@@ -150,8 +149,6 @@ def fit(
     `--model grasper` fits the force at each axis of a 3-DOF grasper, in one file.
     """
     from estimation import model_file
-    from estimation.cross_validation import held_out_error
-    from estimation.fitting import fit as fit_model
     from rig.machines.recordings import open_recordings
     from rig.output.table import to_rich
     from rig.reports.first_look import held_out_sentence, parameter_table
@@ -166,19 +163,7 @@ def fit(
     if model == "network":
         fit_network(campaign, target, surrogate, folds, seed, out, json_)
         return
-    models = declared_models(model, machine)
-    folds = min(folds, len(campaign.evidence))
-    done = []
-    with progress() as bar:
-        task = bar.add_task("fits", total=2 * len(models))
-        for declared in models:
-            bar.update(task, description=declared.name)
-            fitted = _dated(fit_model(declared, campaign, seed=seed))
-            bar.advance(task)
-            several = len(campaign.evidence) > 1
-            error = held_out_error(declared, campaign, folds=folds, seed=seed) if several else None
-            done.append((fitted, error))
-            bar.advance(task)
+    done = _fitted(declared_models(model, machine), campaign, folds, seed)
     for fitted, error in done:
         screen.print(to_rich(parameter_table(fitted)))
         one = "One run: there is no error on runs that it was not fitted on."
@@ -189,6 +174,27 @@ def fit(
     if json_:
         told = [_told(fitted, error, out) for fitted, error in done]
         emit_json(told[0] if len(told) == 1 else {"models": told, "out": out})
+
+
+def _fitted(
+    models: "Sequence[Model]", campaign: "Campaign", folds: int, seed: int
+) -> "list[tuple[Model, HeldOutError | None]]":
+    """Return each model fitted, and its error on runs left out; none of a single run."""
+    from estimation.cross_validation import held_out_error
+    from estimation.fitting import fit as fit_model
+
+    folds, several = min(folds, len(campaign.evidence)), len(campaign.evidence) > 1
+    done = []
+    with progress() as bar:
+        task = bar.add_task("fits", total=2 * len(models))
+        for declared in models:
+            bar.update(task, description=declared.name)
+            fitted = _dated(fit_model(declared, campaign, seed=seed))
+            bar.advance(task)
+            error = held_out_error(declared, campaign, folds=folds, seed=seed) if several else None
+            done.append((fitted, error))
+            bar.advance(task)
+    return done
 
 
 def declared_models(model: str | None, machine: Path | None) -> "list[Model]":

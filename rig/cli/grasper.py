@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.help import GroupedHelp
+from rig.cli.options import SeedOption
 from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
@@ -52,7 +53,7 @@ def record(
         float, typer.Option(min=0.5, max=2.0, help="d2/d1 as built; 1 decouples the jaws.")
     ] = 1.0,
     runs: Annotated[int, typer.Option(min=3, help="Number of runs.")] = 12,
-    seed: Annotated[int, typer.Option(help="Seed of motions, springs and noise.")] = 0,
+    seed: SeedOption = 0,
     json: JsonFlag = False,
 ) -> None:
     """Record the simulated wrist with the coupling of its pulleys, one log per run.

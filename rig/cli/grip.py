@@ -1,12 +1,16 @@
 """`rig grip`: hold a grip torque by the estimate from motor current."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, results
+
+if TYPE_CHECKING:
+    from rig.live.grip import Held
 
 REACHED_RATIO = 0.1
 """The mean estimate of the second half is this near to the torque, as a share of it."""
@@ -28,8 +32,6 @@ def grip(
     sensor, which nothing is controlled by, is further from the torque than the estimate's interval,
     or the torque was not reached: the load motor cannot give it, or the time was too short.
     """
-    import numpy as np
-
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
     from rig.errors import UsageError
@@ -53,6 +55,16 @@ def grip(
                 f"sensor {period.sensor_n_m * 1e3:6.1f} mN m  load {period.load_a:.3f} A",
                 markup=False,
             )
+    return _judge(held, torque, estimator.usual_half_width, most_a, json)
+
+
+def _judge(
+    held: Sequence["Held"], torque: float, allowed: float | None, most_a: float, json: bool
+) -> int:
+    """Print whether a torque was held and the sensor agrees; return the exit code."""
+    import numpy as np
+
+    screen = results(json)
     if not held:
         screen.print("The estimate was never within what it was fitted on: no load was asked for.")
         if json:
@@ -61,13 +73,12 @@ def grip(
     late = held[len(held) // 2 :]
     estimate_n_m = float(np.mean([period.estimate_n_m for period in late]))
     sensor_n_m = float(np.mean([period.sensor_n_m for period in late]))
-    allowed = estimator.usual_half_width
     has_load = late[-1].load_a < most_a
     is_reached = has_load and abs(estimate_n_m - torque) <= REACHED_RATIO * torque
     if not has_load:
         screen.print(f"The load is at its most, {most_a:g} A: the torque was not reached.")
     elif not is_reached:
-        screen.print(f"The torque was not reached in {duration:g} s; give it a longer --duration.")
+        screen.print("The torque was not reached; give it a longer --duration.")
     agrees = allowed is None or abs(sensor_n_m - torque) <= allowed
     shown = "unknown" if allowed is None else f"{allowed * 1e3:.1f} mN m"
     screen.print(

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.options import PlainFlag
 from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, remarks, results
 
@@ -31,7 +32,7 @@ def live(
     lever_mm: Annotated[
         float | None, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
     ] = None,
-    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the display.")] = False,
+    plain: PlainFlag = False,
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder of recordings started by a key.")
     ] = Path("logs"),
@@ -66,20 +67,12 @@ def live(
     from rig.errors import ExitCode, UsageError
     from rig.live.estimator import HalfWidths, estimators_of, shown_channels
     from rig.live.joint_forces import with_joint_forces
-    from rig.live.keys import (
-        OF_SESSION,
-        DisplayKeys,
-        in_a_line,
-        in_a_list,
-        no_keys,
-        pressed_keys,
-    )
-    from rig.live.model_status import with_model_status
+    from rig.live.keys import OF_SESSION, DisplayKeys, no_keys, pressed_keys
     from rig.live.options import ShowOptions
     from rig.live.run import show
     from rig.live.session_blocks import session_blocks
     from rig.live.until import until
-    from rig.live.watching import watched
+    from rig.live.watching import with_status
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
 
@@ -94,7 +87,6 @@ def live(
     plans = load_protocol(protocol).any_plans() if protocol else []
     model_path = model or settings.model_path
     estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
-    models = [estimator.model for estimator in estimators if estimator.model is not None]
     page = _page(host, web_port) if web else None
     with pressed_keys() as pressed:
         keys = DisplayKeys(pressed) if pressed else None
@@ -106,11 +98,7 @@ def live(
             lambda: (keys or no_keys)() + (page.pressed() if page else ""),
             out,
         )
-        blocks = with_joint_forces(blocks)
-        if estimators:
-            blocks = with_model_status(blocks, estimators)
-        if len(models) == 1:
-            blocks = watched(blocks, models[0])
+        blocks = with_status(with_joint_forces(blocks), estimators)
         if foxglove:
             from rig.live.foxglove import LAYOUT, published
 
@@ -123,10 +111,7 @@ def live(
             plain=plain,
             json=json_,
             half_widths=HalfWidths(estimators),
-            footer=in_a_line(OF_SESSION) if keys else "Ctrl-C quits",
-            help=in_a_list(OF_SESSION),
-            keys=keys,
-        )
+        ).with_keys(keys, OF_SESSION)
         if page:
             from rig.live.web import shown_on
 

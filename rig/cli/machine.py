@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.new_file import require_new
+from rig.cli.options import FormatOption
 from rig.cli.shipped import complete_machine, machine_names
 from rig.output.console import JsonFlag, emit_json, results
 
@@ -50,9 +51,7 @@ def show(file: FileArgument, json_: JsonFlag = False) -> None:
 def check(
     file: FileArgument,
     data: Annotated[Path | None, typer.Argument(help="Recordings of the machine.")] = None,
-    format_: Annotated[
-        str | None, typer.Option("--format", help="Format of DATA; detected by default.")
-    ] = None,
+    format_: FormatOption = None,
     json_: JsonFlag = False,
 ) -> int:
     """Check what can be identified of a machine, and what would be needed.

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.options import SimulationSeed
 from rig.cli.rig_options import ConfigOption, SimFlag, announced, chosen_rig
 from rig.cli.shipped import complete_protocol, protocol_names
 from rig.output.console import JsonFlag, emit_json, progress, remarks, results
@@ -34,7 +35,7 @@ def record(
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Resume the campaign in this folder.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the simulated rig.")] = None,
+    seed: SimulationSeed = None,
     model: Annotated[
         Path | None,
         typer.Option("--model", "-m", help="Fitted model to monitor for a change of the rig."),

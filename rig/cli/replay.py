@@ -1,13 +1,13 @@
 """`rig replay LOG`: the live display on a recording, with any model."""
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.machine_option import MachineOption
+from rig.cli.options import FormatOption, MachineOption, PlainFlag
 from rig.output.console import JsonFlag, remarks, results
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def replay(
     speed: Annotated[
         float, typer.Option(help="Speed relative to real time; 0 is as fast as possible.")
     ] = 1.0,
-    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the display.")] = False,
+    plain: PlainFlag = False,
     json_: JsonFlag = False,
     lever_mm: Annotated[
         float, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
@@ -37,9 +37,7 @@ def replay(
         bool, typer.Option("--any-instrument", help="Allow a model of another instrument.")
     ] = False,
     machine: MachineOption = None,
-    format_: Annotated[
-        str | None, typer.Option("--format", help="Format of LOG; detected by default.")
-    ] = None,
+    format_: FormatOption = None,
     core: Annotated[
         bool,
         typer.Option("--core", help="Run the firmware's core again on a simulated log; compare."),
@@ -54,21 +52,18 @@ def replay(
     Draws on a terminal, writes a line every 0.5 s elsewhere. With --json, one object per line:
     a frame every 0.1 s, a summary last. Ctrl-C quits with exit code 130. In a terminal, keys:
     space pauses, + and - change the speed, f skips 5 s, c shows the next channel, ? explains the
-    keys, q quits. With --core nothing is
-    shown: the exit code is 1 when a sample is not the same, bit for bit.
+    keys, q quits. With --core nothing is shown: exit code 1 when a sample differs in any bit.
     """
     if core:
         return _core(log, config, json_)
-    from rig.configuration.model_in_use import model_in_use
     from rig.errors import ExitCode, UsageError
     from rig.live.estimator import HalfWidths, shown_channels
     from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
-    from rig.live.keys import DisplayKeys, in_a_line, in_a_list, pressed_keys
-    from rig.live.model_status import with_model_status
+    from rig.live.keys import DisplayKeys, pressed_keys
     from rig.live.options import ShowOptions
     from rig.live.replay import OF_REPLAY, Pace, replay_blocks
     from rig.live.run import show
-    from rig.live.watching import watched
+    from rig.live.watching import with_status
     from rig.machines.recordings import open_recordings
 
     if not 0 <= speed < math.inf:
@@ -77,10 +72,7 @@ def replay(
             fix="Give --speed 1 for real time, 10 for ten times that, 0 for no waiting.",
         )
     recording = _choose(open_recordings(log, machine, format_), run, quiet=json_)
-    path = model or model_in_use(recording.rig)
-    if path is not None and path != model and not json_:
-        remarks().print(f"Estimate of the model in use, {path.name}.", soft_wrap=True)
-    estimators = _estimators(path, recording, any_instrument) if path else []
+    estimators = _estimators(recording, model, any_instrument, quiet=json_)
     usual = JOINTS if of_joints(recording.columns) else ("distal_torque_n_m",)
     options = ShowOptions(
         title=f"rig replay {recording.name}",
@@ -90,19 +82,12 @@ def replay(
         plain=plain,
         json=json_,
     )
-    models = [estimator.model for estimator in estimators if estimator.model is not None]
     with pressed_keys() as pressed:
         keys = DisplayKeys(pressed) if pressed else None
         pace = Pace(speed or None, keys) if keys else None
-        blocks = with_joint_forces(replay_blocks(recording, estimators, speed or None, pace=pace))
-        if estimators:
-            blocks = with_model_status(blocks, estimators)
-        if len(models) == 1:
-            blocks = watched(blocks, models[0])
-        if keys:
-            shown = in_a_line(OF_REPLAY), in_a_list(OF_REPLAY)
-            options = replace(options, footer=shown[0], help=shown[1], keys=keys)
-        summary = show(blocks, options, results(json_))
+        blocks = replay_blocks(recording, estimators, speed or None, pace=pace)
+        blocks = with_status(with_joint_forces(blocks), estimators)
+        summary = show(blocks, options.with_keys(keys, OF_REPLAY), results(json_))
     return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
 
 
@@ -157,11 +142,22 @@ def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
         )
 
 
-def _estimators(path: Path, recording: "Recording", any_instrument: bool) -> "list[ModelEstimator]":
-    """Read a model file and begin the streams of its estimates at the recording's rate."""
+def _estimators(
+    recording: "Recording", model: Path | None, any_instrument: bool, quiet: bool
+) -> "list[ModelEstimator]":
+    """Begin the estimates of a model at the recording's rate: of the named one, else that in use.
+
+    None without a model.
+    """
     from estimation.estimators.instrument import require_own
+    from rig.configuration.model_in_use import model_in_use
     from rig.live.estimator import estimators_of
 
+    path = model or model_in_use(recording.rig)
+    if path is None:
+        return []
+    if model is None and not quiet:
+        remarks().print(f"Estimate of the model in use, {path.name}.", soft_wrap=True)
     estimators = estimators_of(path, recording.sample_rate_hz)
     if not any_instrument:
         require_own(estimators[0].instrument, recording)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.help import GroupedHelp
+from rig.cli.options import FiguresFolder, SeedOption, TablesFile, WorkersOption
 from rig.cli.study_arm import StateFolder, arm_studies, resumable
 from rig.cli.study_machines import machine_studies
 from rig.output.console import JsonFlag, emit_json, progress, show_result
@@ -43,8 +44,8 @@ def oneill(
         Path | None,
         typer.Option(help="Measured data: a folder or archive. Without it, a simulated campaign."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of splits and of the simulation.")] = 0,
+    out: TablesFile = None,
+    seed: SeedOption = 0,
     networks: Annotated[
         bool, typer.Option("--networks", help="Also train the networks: long, can be resumed.")
     ] = False,
@@ -55,15 +56,13 @@ def oneill(
         bool,
         typer.Option("--kinds", help="Also fit every kind of estimator on the same folds."),
     ] = False,
-    figures: Annotated[
-        Path | None, typer.Option(help="Folder for the figures of --states, as SVG.")
-    ] = None,
+    figures: FiguresFolder = None,
     minutes: Annotated[
         float | None,
         typer.Option(help="Start no network after this time, min; tables list the rest."),
     ] = None,
     every: Annotated[int, typer.Option(min=1, help="Train on every n-th closing sample.")] = 8,
-    workers: Annotated[int, typer.Option(min=1, help="Networks trained in parallel.")] = 1,
+    workers: WorkersOption = 1,
     state: Annotated[
         Path | None, typer.Option(help="Folder of trained networks; a cache folder by default.")
     ] = None,
@@ -91,28 +90,16 @@ def oneill(
         limit = float("inf") if minutes is None else minutes
         training = Training(kept, every=every, seed=seed, workers=workers, minutes=limit)
         deep = _train(campaign, data, training)
-    physical: StateStudy | None = None
-    drawn: list[tuple[str, Path]] = []
-    if states:
-        physical, drawn = _fit_states(campaign, data, seed, figures)
+    physical, drawn = _fit_states(campaign, data, seed, figures) if states else (None, [])
     every_kind = _fit_kinds(campaign, seed) if kinds else ()
     more = shown.More(deep, physical, every_kind)
-    lines = [
-        *shown.lead(study, more),
-        f"Data: {source.name}.",
-        *shown.all_notes(study, more),
-    ]
-    tables = shown.all_tables(study, more)
+    lines = [*shown.lead(study, more), f"Data: {source.name}.", *shown.all_notes(study, more)]
 
     def markdown() -> str:
-        placed = [
-            (caption, os.path.relpath(path, out.parent))
-            for caption, path in drawn
-            if out is not None
-        ]
+        placed = [(name, os.path.relpath(at, out.parent)) for name, at in drawn] if out else []
         return shown.markdown(study, more, placed)
 
-    show_result(lines, tables, out, markdown, json)
+    show_result(lines, shown.all_tables(study, more), out, markdown, json)
     if json:
         found = {"networks": deep, "states": physical, "kinds": every_kind or None}
         emit_json(asdict(study) | {k: v for k, v in found.items() if v is not None})
@@ -176,10 +163,10 @@ def zhao(
     spread: Annotated[
         float, typer.Option(min=0, max=0.3, help="Spread of hidden parameters.")
     ] = 0.1,
-    workers: Annotated[int, typer.Option(min=1, help="Number of parallel processes.")] = 1,
+    workers: WorkersOption = 1,
     state: StateFolder = None,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
-    figures: Annotated[Path | None, typer.Option(help="Folder for the figures.")] = None,
+    out: TablesFile = None,
+    figures: FiguresFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Reproduce Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016, simulated."""
@@ -216,11 +203,11 @@ def zhao(
 @study_app.command()
 def loop(
     data: Annotated[Path, typer.Option(help="Folder or archive of the reference rig's runs.")],
-    seed: Annotated[int, typer.Option(help="Seed of the split and of the permutations.")] = 0,
+    seed: SeedOption = 0,
     task: Annotated[
         list[int] | None, typer.Option(help="Only this row of the table, from 1; may be repeated.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    out: TablesFile = None,
     json: JsonFlag = False,
 ) -> None:
     """Add effects to the paper's linear models, confirmed on held-out test runs."""
@@ -250,8 +237,8 @@ def instruments(
         list[str] | None, typer.Option(help="Instrument to adapt to; may be repeated.")
     ] = None,
     networks: Annotated[bool, typer.Option(help="Train networks too: minutes.")] = True,
-    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
+    seed: SeedOption = 0,
+    out: TablesFile = None,
     json: JsonFlag = False,
 ) -> None:
     """Adapt one instrument's estimators to others, with one run or three."""
@@ -286,8 +273,8 @@ def intervals(
         list[str] | None,
         typer.Option(help="One to adapt to all others; may be repeated; the first three."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
+    seed: SeedOption = 0,
+    out: TablesFile = None,
     json: JsonFlag = False,
 ) -> None:
     """Measure how often intervals hold, on levels left out and on other instruments."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.options import TablesFile, WorkersOption
 from rig.output.console import JsonFlag, emit_json, progress, show_result
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ StateFolder = Annotated[
 
 Arms = Annotated[int, typer.Option(min=1, help="Simulated arms of each family, from seed 0.")]
 
-TablesFile = Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")]
+TablesFile = TablesFile
 
 FigureFolder = Annotated[Path | None, typer.Option("--figures", help="Folder for the figures.")]
 
@@ -123,7 +124,7 @@ def excitation(
     trajectory: Annotated[
         Path | None, typer.Option(help="File for one period of the best one, as text at 200 Hz.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
+    out: TablesFile = None,
     json: JsonFlag = False,
 ) -> None:
     """Design an arm's excitation within its limits at every instant, compared with the thesis'."""
@@ -147,7 +148,7 @@ def excitation(
 @arm_studies.command()
 def wrench(
     seeds: Arms = 2,
-    workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
+    workers: WorkersOption = 1,
     state: StateFolder = None,
     out: TablesFile = None,
     figures: FigureFolder = None,
@@ -169,7 +170,7 @@ def wrench(
 @arm_studies.command()
 def delsol(
     seeds: Arms = 2,
-    workers: Annotated[int, typer.Option(min=1, help="Arms at once.")] = 1,
+    workers: WorkersOption = 1,
     state: StateFolder = None,
     out: TablesFile = None,
     figures: FigureFolder = None,
@@ -191,7 +192,7 @@ def delsol(
 @arm_studies.command()
 def zhang(
     seeds: Arms = 2,
-    workers: Annotated[int, typer.Option(min=1, help="Arms at once, each on one core.")] = 1,
+    workers: WorkersOption = 1,
     state: StateFolder = None,
     out: TablesFile = None,
     figures: FigureFolder = None,
@@ -224,7 +225,7 @@ def payload(
     height_error_m: Annotated[
         float, typer.Option(min=0.0, help="Standard error of that height, m.")
     ] = 0.01,
-    out: Annotated[Path | None, typer.Option(help="File for the table in Markdown.")] = None,
+    out: TablesFile = None,
     json: JsonFlag = False,
 ) -> None:
     """Find a mass added to an arm's insertion axis from its joints' torque."""

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from rig.cli.options import SeedOption, TablesFile
 from rig.output.console import JsonFlag, emit_json, progress, show_result
 
 machine_studies = typer.Typer(rich_markup_mode=None)
@@ -20,8 +21,8 @@ def machines(
             " machine-NAME.tar.xz; what is not there is left out.",
         ),
     ],
-    out: Annotated[Path | None, typer.Option(help="File for the tables in Markdown.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the splits.")] = 0,
+    out: TablesFile = None,
+    seed: SeedOption = 0,
     json: JsonFlag = False,
 ) -> None:
     """Diagnose machines that other people built, and compare with what they published."""

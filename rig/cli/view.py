@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.left_out import SkipBad, say_left_out
-from rig.cli.machine_option import MachineOption
+from rig.cli.options import FormatOption, MachineOption
 from rig.cli.shipped import complete_recordings
 from rig.output.console import JsonFlag, emit_json, remarks, results
 
@@ -31,9 +31,7 @@ def view(
         typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
     ] = None,
     machine: MachineOption = None,
-    format_: Annotated[
-        str | None, typer.Option("--format", help="Format of PATH; detected by default.")
-    ] = None,
+    format_: FormatOption = None,
     skip_bad: SkipBad = False,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Page to write; by default NAME.view.html.")

@@ -57,83 +57,54 @@ def menu(room: Room) -> list[Protocol]:
     every = {"loads_a": loads, "jaw_starts_rad": starts}
     half = {"amplitude_rad": round(0.5 * travel, 4)}
     ten = {"duration_s": 10.0}
+    low, middle, high = loads[0], loads[len(loads) // 2], loads[-1]
+    levels = [round(share * travel, 4) for share in (0, 0.5, 1, 0.5, 0)]
+    tiny, small = (round(share * room.travel_rad, 4) for share in (0.04, 0.06))
+    sine, speeds = {"kind": "sine", **ten}, [0.12, 0.3, 0.8, 1.5]
+    staircase = {"kind": "speed_staircase", "speeds_rad_s": speeds, "pause_s": 0.1}
+    climb = {"kind": "load_staircase", "loads_a": [low, high, middle, low], "hold_s": 3.0}
+    faster = {"kind": "chirp", "low_hz": 0.2, "high_hz": 4.0}
+    rests = {"kind": "dwell", "dwells_s": [0.2, 4.0, 1.0, 0.2, 2.0]}
     entries: list[tuple[str, str, dict[str, object]]] = [
         (
             "grasps",
             "the plain grasps again, at three loads",
-            {"kind": "sine", "frequencies_hz": [0.3], **half, **ten, **every},
+            {**sine, "frequencies_hz": [0.3], **half, **every},
         ),
         (
             "speeds",
             "constant speeds from slow to fast, both ways, at three loads",
-            {
-                "kind": "speed_staircase",
-                "speeds_rad_s": [0.12, 0.3, 0.8, 1.5],
-                "travel_rad": travel,
-                "pause_s": 0.1,
-                **every,
-            },
+            {**staircase, "travel_rad": travel, **every},
         ),
         (
             "reversals",
             "tiny motions to and fro, at three loads",
-            {
-                "kind": "sine",
-                "frequencies_hz": [0.8],
-                "amplitude_rad": round(0.04 * room.travel_rad, 4),
-                **ten,
-                **every,
-            },
+            {**sine, "frequencies_hz": [0.8], "amplitude_rad": tiny, **every},
         ),
         (
             "holds",
             "steps that are held, at three loads",
-            {
-                "kind": "step_hold",
-                "levels_rad": [round(share * travel, 4) for share in (0, 0.5, 1, 0.5, 0)],
-                "hold_s": 2.5,
-                **every,
-            },
+            {"kind": "step_hold", "levels_rad": levels, "hold_s": 2.5, **every},
         ),
         (
             "loads",
             "grasps while the load climbs and falls",
-            {
-                "kind": "load_staircase",
-                "loads_a": [loads[0], loads[-1], loads[len(loads) // 2], loads[0]],
-                "hold_s": 3.0,
-                "frequencies_hz": [0.15, 0.3, 0.5],
-                "jaw_starts_rad": starts,
-                **half,
-            },
+            {**climb, "frequencies_hz": [0.15, 0.3, 0.5], "jaw_starts_rad": starts, **half},
         ),
         (
             "free",
             "slow and fast sweeps without load",
-            {
-                "kind": "sine",
-                "frequencies_hz": [0.1, 0.25, 0.5],
-                "loads_a": [0.0],
-                "jaw_starts_rad": starts,
-                **half,
-                **ten,
-            },
+            {**sine, "frequencies_hz": [0.1, 0.25, 0.5], **every, "loads_a": [0.0], **half},
         ),
         (
             "chirp",
             "small grasps that become faster and faster",
-            {
-                "kind": "chirp",
-                "low_hz": 0.2,
-                "high_hz": 4.0,
-                "amplitude_rad": round(0.06 * room.travel_rad, 4),
-                **every,
-            },
+            {**faster, "amplitude_rad": small, **every},
         ),
         (
             "dwells",
             "moves after rests of different length",
-            {"kind": "dwell", "dwells_s": [0.2, 4.0, 1.0, 0.2, 2.0], "travel_rad": travel, **every},
+            {**rests, "travel_rad": travel, **every},
         ),
     ]
     return [

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rig.errors import UsageError
-from rig.live.keys import DisplayKeys
+from rig.live.keys import DisplayKeys, in_a_line, in_a_list
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,3 +46,11 @@ class ShowOptions:
                 "The force at the jaw tip is the torque over the lever arm.",
                 "Give a positive --lever-mm, for example 12.",
             )
+
+    def with_keys(
+        self, keys: DisplayKeys | None, words: Mapping[str, tuple[str, str]]
+    ) -> "ShowOptions":
+        """Return the options of a display with keys, each with its word and what it does."""
+        if keys is None:
+            return self
+        return replace(self, footer=in_a_line(words), help=in_a_list(words), keys=keys)

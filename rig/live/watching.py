@@ -1,6 +1,6 @@
 """Blocks of a stream with one more line: whether the model still fits what is measured."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +10,27 @@ from estimation.model import Model
 from estimation.recording import Recording
 from estimation.watch import ResidualWatch, Sight
 from rig.live.block import DeviceStatus, SampleBlock
+from rig.live.estimator import ModelEstimator
+from rig.live.model_status import with_model_status
 
 PIECE_S = 5.0
 """A stream has no runs; its pieces of this length stand for them."""
 
 PIECE_SPREAD = 0.25
 """Pieces of one run differ more than runs do."""
+
+
+def with_status(
+    blocks: Iterator[SampleBlock], estimators: Sequence[ModelEstimator]
+) -> Iterator[SampleBlock]:
+    """Yield blocks as they come, with the state of the models that estimate on them.
+
+    A single declared model is also watched by the error of its equation.
+    """
+    models = [estimator.model for estimator in estimators if estimator.model is not None]
+    if estimators:
+        blocks = with_model_status(blocks, estimators)
+    return watched(blocks, models[0]) if len(models) == 1 else blocks
 
 
 def watched(blocks: Iterator[SampleBlock], model: Model) -> Iterator[SampleBlock]:

@@ -190,7 +190,7 @@ def test_command_writes_plain_lines_and_says_which_run(logs, capsys):
 
 
 def test_command_runs_a_model(logs, capsys, monkeypatch):
-    monkeypatch.setattr("rig.cli.replay._estimators", lambda *_: [Smoothed()])
+    monkeypatch.setattr("rig.cli.replay._estimators", lambda *_, **__: [Smoothed()])
     path = logs(recording())
     assert command(path, "--json", "--speed", "0", "--model", "model.json") == 0
     frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
