@@ -1,12 +1,14 @@
 """Calibrate the numbers of a diagnosis on campaigns drawn at random, and write the results page.
 
-`python -m benchmarks.diagnosis.calibrate` searches the training runs of drawn campaigns whose seeds
-are kept for calibration, with a cause and without. `sharpness` and `cause_cost` are those with the
-best mean log probability of the truth: of the true family, or of no cause. Resumes where it
-stopped.
+`python -m benchmarks.diagnosis.calibrate` diagnoses drawn campaigns whose seeds are kept for
+calibration, with a cause and without. `sharpness` and `cause_cost` are judged by the mean log
+probability of the truth in the training runs: of the true family, or of no cause. The page also
+states how often a clean campaign has a finding in the end, and how often stated confidences are
+right. Resumes where it stopped.
 """
 
 import argparse
+import itertools
 import json
 import math
 import sys
@@ -16,15 +18,14 @@ from datetime import date
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import beta
 
 from benchmarks.rigs import CALIBRATE, draw
 from estimation import model_file
 from estimation.campaign import Campaign
-from estimation.causes.equations import lay_out, on_one_clock
-from estimation.causes.instruments import add_instruments
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.scoring import probabilities
-from estimation.causes.search import search
+from estimation.causes.verdict import answer
 from estimation.diagnosis.split import split
 from estimation.files import write_text_atomic
 from estimation.model import Model
@@ -42,6 +43,9 @@ COSTS = (0.04, 0.06, 0.08, 0.1, 0.13, 0.16, 0.2)
 LEAST = 1e-3
 """Probability that a truth which was not considered is given."""
 
+LEVELS = (0.0, 0.5, 0.8, 0.95, 1.01)
+"""Bounds of the classes of stated confidence."""
+
 PAGE = Path("docs/results/diagnosis-numbers.md")
 
 
@@ -53,11 +57,13 @@ class Searched:
         name: The case.
         candidates: Family, score and gain of the best of each in the first place.
         families: True families; none in a clean campaign.
+        findings: Family and confidence of each finding in the end, 0 of an unknown form.
     """
 
     name: str
     candidates: Sequence[tuple[str, float, float]]
     families: Sequence[str]
+    findings: Sequence[tuple[str, float]]
 
     def probability(self, sharpness: float, cost: float) -> float:
         """Return the probability of the truth at other numbers than the shipped ones."""
@@ -104,21 +110,20 @@ def _searched(out: Path, kind: str, seed: int, models: Sequence[Model]) -> Searc
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         case = draw(seed, kind, gear_ratio=GEAR_RATIO)
-        recordings = on_one_clock(list(Campaign.of(case.recordings).evidence))
-        train = split(recordings).discover
-        layout = lay_out(models, recordings, train)
-        add_instruments(layout, train)
-        found = search(layout.select(train))
+        recordings = list(Campaign.of(case.recordings).evidence)
+        whole = answer(recordings, models, split(recordings))
+        found = whole.found
         ranked = found.conditional[0] if found.conditional else found.first
         best = {c.candidate.cause.family: c for c in reversed(ranked)}
         families = [family for group in case.truth.families for family in group]
         content = {
             "candidates": [(name, c.score, c.gain) for name, c in best.items()],
             "families": families,
+            "findings": [(f.family, f.confidence or 0.0) for f in whole.diagnosis.findings],
         }
         write_text_atomic(path, json.dumps(content))
     content = json.loads(path.read_text())
-    return Searched(path.stem, content["candidates"], content["families"])
+    return Searched(path.stem, **content)
 
 
 def _page(done: Sequence[Searched], seed: int) -> str:
@@ -131,7 +136,10 @@ def _page(done: Sequence[Searched], seed: int) -> str:
         f"| {s:g} | " + " | ".join(f"{log_score(done, s, c):.3f}" for c in COSTS) + " |"
         for s in SHARPNESS
     )
-    false = sum(any(score > 0.0 for _, score, _ in case.candidates) for case in clean)
+    early = sum(any(score > 0.0 for _, score, _ in case.candidates) for case in clean)
+    false = sum(bool(case.findings) for case in clean)
+    bound = float(beta.ppf(0.95, false + 1, len(clean) - false)) if clean else 1.0
+    stated = [(c, f in case.families) for case in named for f, c in case.findings if c]
     return f"""# The numbers of a diagnosis
 
 Written by `python -m benchmarks.diagnosis.calibrate` at commit {commit(Path.cwd())},
@@ -145,9 +153,27 @@ cause_cost {best[1]:g}. Shipped: {DEFAULT.sharpness:g}, {DEFAULT.cause_cost:g}.
 |{" --- |" * (1 + len(COSTS))}
 {rows}
 
-With the shipped numbers the training runs of {false} of {len(clean)} clean campaigns show a cause,
-before the test runs are opened.
+With the shipped numbers the training runs of {early} of {len(clean)} clean campaigns show a cause.
+After the test runs {false} have a finding: below {100.0 * bound:.1f} % of such campaigns, at 95 %.
+
+How often the family that a finding names is the true one:
+
+{_reliability(stated)}
 """
+
+
+def _reliability(stated: Sequence[tuple[float, bool]]) -> str:
+    rows = ["| confidence | findings | mean stated | right |", "| --- | --- | --- | --- |"]
+    for low, high in itertools.pairwise(LEVELS):
+        inside = [one for one in stated if low <= one[0] < high]
+        if inside:
+            mean, right = np.mean(inside, axis=0)
+            span = f"{low:g} to {min(high, 1.0):g}"
+            rows.append(f"| {span} | {len(inside)} | {mean:.3f} | {right:.3f} |")
+    if stated:
+        mean, right = np.mean(stated, axis=0)
+        rows.append(f"| all | {len(stated)} | {mean:.3f} | {right:.3f} |")
+    return "\n".join(rows)
 
 
 if __name__ == "__main__":
