@@ -54,11 +54,13 @@ def places_of(layout: Layout) -> list[Place]:
     found = []
     angles = _angles(layout)
     for equation in layout.equations.values():
-        found.append(_own(layout, equation, angles))
+        own = _related(layout, equation, angles)
+        found.append(_own(layout, equation, own, angles))
         if any(t.effect.id == "motor.torque_constant" for t in equation.terms):
-            found.append(_actuator(equation, angles))
-    found += [p for n in layout.measured for p in _behind(layout, n, angles)]
-    found += [p for n in layout.measured if (p := _sensor(layout, n, angles)) is not None]
+            found.append(_actuator(equation, own))
+    sensors = [n for n in layout.measured if n not in _computed(layout)]
+    found += [p for n in sensors for p in _behind(layout, n, angles)]
+    found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
     return found
 
 
@@ -79,6 +81,41 @@ def _angles(layout: Layout) -> list[str]:
     names = [n for n in measured_channels(read, _signals(layout)) if n.endswith(ANGLES)]
     names = [n for n in names if n in layout.measured]
     return sorted(names, key=lambda n: -max(float(np.ptp(r.channels[n])) for r in layout.runs))
+
+
+def groups_apart(layout: Layout) -> int:
+    """Return the number of groups of equations that share no reading, as the joints of an arm."""
+    groups: list[set[str]] = []
+    for equation in layout.equations.values():
+        read = _read(equation) - {"time_s"}
+        shared = [g for g in groups if g & read]
+        groups = [g for g in groups if not g & read] + [read.union(*shared)]
+    return len(groups)
+
+
+def _related(layout: Layout, equation: Equation, angles: Sequence[str]) -> list[str]:
+    """Return the angles that equations relate to those an equation reads: of the same shafts.
+
+    Every angle, where it reads none.
+    """
+    read = [_read(e) & {*angles} for e in layout.equations.values()]
+    known: set[str] = set()
+    grown = _read(equation) & {*angles}
+    while grown > known:
+        known = grown
+        grown = known.union(*(r for r in read if r & known))
+    return [a for a in angles if a in known] or list(angles)
+
+
+def _read(equation: Equation) -> set[str]:
+    model = equation.model
+    return {*measured_channels([equation.target, *model.channels], model.signals)}
+
+
+def _computed(layout: Layout) -> set[str]:
+    """Return the channels that an arm's links were fitted for: no sensor reads them."""
+    terms = [t for e in layout.equations.values() for t in e.terms]
+    return {c for t in terms if t.effect.id.startswith("arm.links") for c in t.channels.values()}
 
 
 def _signals(layout: Layout) -> Signals:
@@ -143,7 +180,10 @@ def _effort(equation: Equation) -> str:
     return equation.target
 
 
-def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
+def _own(
+    layout: Layout, equation: Equation, angles: Sequence[str], everywhere: Sequence[str]
+) -> Place:
+    """Return the place of an equation, by the angles of its shafts and those of all."""
     angle = _own_angle(equation, angles)
     roles = _motion(angle) | _shared(angles, _position(angles, angle))
     effort = _effort(equation)
@@ -152,7 +192,7 @@ def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
         roles |= {"travel": (effort,)}
     if equation.of_angle:
         roles |= {"travel": (effort, *roles["travel"])}  # what bends has the history of its load
-        roles |= {"other_angle": _unrelated(layout, equation, angles)}
+        roles |= {"other_angle": _unrelated(layout, equation, everywhere)}
         bends = [t.sign for t in equation.terms if t.effect.id == "compliance.link"]
         like = "stretch" if -1 in bends else "gearbox"
         enters = (Entry(equation.name, 1.0),)
@@ -163,13 +203,8 @@ def _own(layout: Layout, equation: Equation, angles: Sequence[str]) -> Place:
 
 def _unrelated(layout: Layout, equation: Equation, angles: Sequence[str]) -> tuple[str, ...]:
     """Return the angles that no equation relates to those of an equation: of other joints."""
-    read = [
-        set(measured_channels([e.target, *e.model.channels], e.model.signals))
-        for e in layout.equations.values()
-    ]
-    own = set(
-        measured_channels([equation.target, *equation.model.channels], equation.model.signals)
-    )
+    own = _read(equation)
+    read = [_read(e) for e in layout.equations.values()]
     related = set().union(*(r for r in read if r & own & set(angles)))
     return tuple(a for a in angles if a not in related)
 

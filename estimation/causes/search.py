@@ -14,10 +14,12 @@ from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import DEFAULT, Numbers
+from estimation.causes.places import groups_apart
 from estimation.causes.ranking import competing
 from estimation.causes.scoring import Scored
 
 MOST_CAUSES = 3
+"""Causes of one group of equations that share readings."""
 
 
 @dataclass(frozen=True)
@@ -116,8 +118,8 @@ def _starts(ranked: Sequence[Scored]) -> list[Scored]:
 
 def _chain(ranking: Ranking, start: Scored) -> list[Scored]:
     """Return a set of causes, extended one at a time while another one is worth its price."""
-    causes = [start]
-    while len(causes) < MOST_CAUSES:
+    causes, most = [start], MOST_CAUSES * groups_apart(ranking.joint.layout)
+    while len(causes) < most:
         ranked = ranking.next_to(causes)
         if not ranked or ranked[0].score < 0.0:
             break

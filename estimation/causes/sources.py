@@ -118,10 +118,10 @@ class Source:
 
     @property
     def side(self) -> int:
-        """Sign of a loss that its amplitudes are bounded for: an actuator's, and lost motion."""
+        """Sign of a loss that its amplitudes are bounded for: an actuator's, and a deflection's."""
         if self.place.kind == "actuator":
             return next(iter(self.effect.balances.values()), 1)
-        if self.place.kind == "deflection" and self.effect.id.startswith(LOOPS):
+        if self.place.kind == "deflection":
             return self.effect.balances.get(self.place.like, 1)
         return 1
 

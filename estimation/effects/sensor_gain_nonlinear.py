@@ -3,16 +3,19 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+import numpy as np
+
 from estimation.effects.effect import Parameter, Pointwise
 
 
 class NonlinearGain(Pointwise):
-    """The quadratic and cubic terms of a reading, as in the certificate of a sensor.
+    """The quadratic and cubic terms of a reading, and a gain that grows with its size.
 
-    Equation: error = a reading^2 + b reading^3, a and b in the target's unit per power of the
-    reading. Non-linearity of the target appears through the model's prediction of it, non-linearity
-    of a regressor directly: motor by the projected load or the current, gearbox by the proximal
-    torque, cable by the distal torque, stretch by the distal torque or the spindle's angle.
+    Equation: error = a reading^2 + b reading^3 + c reading |reading|; a, b and c in the target's
+    unit per power of the reading. Non-linearity of the target appears through the model's
+    prediction of it, non-linearity of a regressor directly: motor by the projected load or the
+    current, gearbox by the proximal torque, cable by the distal torque, stretch by the distal
+    torque or the spindle's angle.
 
     Check: load the sensor with reference weights over its whole range, with both signs.
 
@@ -25,11 +28,12 @@ class NonlinearGain(Pointwise):
     amplitudes = (
         Parameter("square", "target / reading / reading", "quadratic term"),
         Parameter("cube", "target / reading / reading / reading", "cubic term"),
+        Parameter("sided", "target / reading / reading", "signed square: gain by the load's size"),
     )
     told_apart_by = "reference weights over the sensor's whole range, both signs"
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return the square and the cube."""
+        """Return the square, the cube and the signed square."""
         reading = inputs["reading"]
         square = reading * reading
-        return square, square * reading
+        return square, square * reading, reading * np.abs(reading)

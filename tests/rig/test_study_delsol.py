@@ -19,7 +19,6 @@ pytestmark = pytest.mark.long
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 
-@pytest.mark.xfail(strict=False, reason="the diagnosis does not name the pull of the hoses")
 def test_the_command_finds_the_hoses_and_does_better_than_the_paper(tmp_path, monkeypatch):
     done = delsol.one_arm(0)
     monkeypatch.setattr(delsol, "one_arm", lambda number: done)

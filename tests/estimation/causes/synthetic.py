@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from scipy import signal
 
 from estimation import model_file
 from estimation.model import Model
@@ -57,3 +58,44 @@ def _run(k: int, lost: Effect | None, random: np.random.Generator, spring: bool)
         conditions={"load_command_a": 0.1 * (1 + k % 3)},
         started_at_ns=int(1e9 * 20 * k) + 1,
     )
+
+
+def gearbox() -> Model:
+    """Return the shipped equation of the gearbox."""
+    return model_file.read(Path("gearbox"))
+
+
+def geared(slow: float = 0.0, bend: float = 0.0, runs: int = 12, seed: int = 0) -> list[Recording]:
+    """Return runs of motor and gearbox against a load of both signs that moves in steps.
+
+    Args:
+        slow: Compliance that acts late, by .6 s, over the gear's own.
+        bend: Gain of the torque's reading that grows with its size, at the largest load.
+        runs: How many.
+        seed: Of the noise.
+    """
+    random = np.random.default_rng(seed)
+    out = []
+    for one in recordings(runs=runs, seed=seed):
+        levels = random.uniform(-0.12, 0.12, 8)
+        steps = np.repeat(levels, len(one.time_s) // 8)
+        load, lag = _lagging(steps, 0.05), _lagging(_lagging(steps, 0.05), 0.6)
+        motor_angle = one["motor_angle_rad"]
+        speed = np.gradient(motor_angle, one.time_s)
+        lost = 2e-5 * np.gradient(speed, one.time_s) + 1e-4 * speed + 0.02 * np.tanh(speed / 2.0)
+        twist = (load + slow * (lag - load)) / 50.0
+        reading = load + bend * load * np.abs(load) / 0.12 + random.normal(0, 1e-4, len(load))
+        columns = {
+            "motor_current_a": (load + lost) / 1.2 + random.normal(0, 2e-3, len(load)),
+            "proximal_torque_n_m": reading,
+            "spindle_angle_rad": motor_angle / 35.0 - twist + random.normal(0, 1e-5, len(load)),
+        }
+        out.append(one.with_columns(**columns))
+    return out
+
+
+def _lagging(values: FloatArray, time_s: float) -> FloatArray:
+    """Return what follows values with a time constant, settled at the start."""
+    share = 1.0 - np.exp(-1.0 / (RATE_HZ * time_s))
+    start = signal.lfiltic([share], [1.0, share - 1.0], [values[0]])
+    return np.asarray(signal.lfilter([share], [1.0, share - 1.0], values, zi=start)[0])

@@ -18,7 +18,7 @@ from estimation.causes.sources import sources_at
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import FloatArray, Recording
-from tests.estimation.causes.synthetic import motor, recordings
+from tests.estimation.causes.synthetic import gearbox, geared, motor, recordings
 
 
 def _asymmetric(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArray:
@@ -100,6 +100,19 @@ def test_a_loss_at_a_spot_that_grows_with_the_load_is_found_with_both_variables(
     assert finding.verdict == "depends_on"
     assert {*finding.depends_on} == {"velocity_sign", "motor_angle", "load"}
     assert finding.rmse_after < 0.7 * finding.rmse_before
+
+
+def test_a_gear_that_yields_late_is_identified() -> None:
+    runs = geared(slow=0.3)
+    (finding,) = diagnose(runs, [motor(), gearbox()], split(runs)).findings
+    assert finding.family == "transmission.relaxation"
+    assert finding.rmse_after < 0.6 * finding.rmse_before
+
+
+def test_a_torque_sensor_with_a_gain_that_grows_to_both_sides_is_identified() -> None:
+    runs = geared(bend=0.1)
+    (finding,) = diagnose(runs, [motor(), gearbox()], split(runs)).findings
+    assert finding.family == "sensor.gain_nonlinear"
 
 
 def test_friction_that_jumps_at_random_times_is_found_without_a_name() -> None:
