@@ -30,7 +30,7 @@ EQUATION ?= gearbox
 demo-real: setup
 	@test -n "$(DATA)" || { echo "name the recordings: make demo-real DATA=FOLDER; public ones:" \
 	"git clone https://github.com/MRDLab/mis-tool-characterization" >&2; exit 2; }
-	$(BIN)/rig diagnose "$(DATA)" $(if $(EQUATION),--balance $(EQUATION)) --quick \
+	$(BIN)/rig diagnose "$(DATA)" $(if $(EQUATION),--equation $(EQUATION)) --quick \
 	  --report logs/demo-real --ledger logs/demo-real/looks.jsonl
 	@echo "Open the page:"; echo "  $(BIN)/python -m webbrowser logs/demo-real/diagnosis.html"
 

@@ -56,7 +56,7 @@ def run() -> int:
     target = Path(sys.argv[3]) if len(sys.argv) > 3 else TARGET
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        words = ["diagnose", str(recordings), "--balance", equation, "--quick"]
+        words = ["diagnose", str(recordings), "--equation", equation, "--quick"]
         words += ["--report", place, "--ledger", str(folder / "log.jsonl")]
         code = main(words)
         if code == 0:

@@ -64,10 +64,10 @@ def live(
     """
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
-    from rig.errors import ExitCode, UsageError
+    from rig.errors import UsageError
     from rig.live.estimator import HalfWidths, estimators_of, shown_channels
     from rig.live.joint_forces import with_joint_forces
-    from rig.live.keys import OF_SESSION, DisplayKeys, no_keys, pressed_keys
+    from rig.live.keys import OF_SESSION, display_keys, no_keys
     from rig.live.options import ShowOptions
     from rig.live.run import show
     from rig.live.session_blocks import session_blocks
@@ -88,8 +88,7 @@ def live(
     model_path = model or settings.model_path
     estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
     page = _page(host, web_port) if web else None
-    with pressed_keys() as pressed:
-        keys = DisplayKeys(pressed) if pressed else None
+    with display_keys() as keys:
         blocks = session_blocks(
             settings,
             lambda: open_logger(settings, pace=pace or None),
@@ -117,7 +116,7 @@ def live(
 
             blocks = shown_on(page, blocks, options)
         summary = show(until(blocks, duration), options, results(json_))
-    return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
+    return summary.exit_code
 
 
 def _page(host: str | None, port: int) -> "PageServer":

@@ -31,7 +31,7 @@ FormatOption = Annotated[
     str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
 ]
 EquationOption = Annotated[
-    str | None, typer.Option("--balance", help="Only this equation, such as motor.")
+    str | None, typer.Option("--equation", help="Only this equation, such as motor.")
 ]
 LedgerOption = Annotated[Path | None, typer.Option(help="Path of the held-out-data usage log.")]
 JsonFile = Annotated[Path | None, typer.Option("--json-out", help="File for the result as JSON.")]

@@ -56,10 +56,10 @@ def replay(
     """
     if core:
         return _core(log, config, json_)
-    from rig.errors import ExitCode, UsageError
+    from rig.errors import UsageError
     from rig.live.estimator import HalfWidths, shown_channels
-    from rig.live.joint_forces import JOINTS, of_joints, with_joint_forces
-    from rig.live.keys import DisplayKeys, pressed_keys
+    from rig.live.joint_forces import with_joint_forces
+    from rig.live.keys import display_keys
     from rig.live.options import ShowOptions
     from rig.live.replay import OF_REPLAY, Pace, replay_blocks
     from rig.live.run import show
@@ -73,22 +73,27 @@ def replay(
         )
     recording = _choose(open_recordings(log, machine, format_), run, quiet=json_)
     estimators = _estimators(recording, model, any_instrument, quiet=json_)
-    usual = JOINTS if of_joints(recording.columns) else ("distal_torque_n_m",)
     options = ShowOptions(
         title=f"rig replay {recording.name}",
-        channels=shown_channels(estimators, usual),
+        channels=shown_channels(estimators, _usual(recording)),
         half_widths=HalfWidths(estimators),
         lever_m=lever_mm / 1e3,
         plain=plain,
         json=json_,
     )
-    with pressed_keys() as pressed:
-        keys = DisplayKeys(pressed) if pressed else None
+    with display_keys() as keys:
         pace = Pace(speed or None, keys) if keys else None
         blocks = replay_blocks(recording, estimators, speed or None, pace=pace)
         blocks = with_status(with_joint_forces(blocks), estimators)
         summary = show(blocks, options.with_keys(keys, OF_REPLAY), results(json_))
-    return ExitCode.INTERRUPTED if summary.ended == "interrupted" else ExitCode.OK
+    return summary.exit_code
+
+
+def _usual(recording: "Recording") -> tuple[str, ...]:
+    """Return the quantities to watch: a grasper's forces where its joints were recorded."""
+    from rig.live.joint_forces import JOINTS, of_joints
+
+    return JOINTS if of_joints(recording.columns) else ("distal_torque_n_m",)
 
 
 def _core(log: Path, config: Path | None, json: bool) -> int:

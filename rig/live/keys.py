@@ -63,6 +63,13 @@ class DisplayKeys:
 
 
 @contextmanager
+def display_keys() -> Iterator[DisplayKeys | None]:
+    """Yield the keys of a display; None where `pressed_keys` has none."""
+    with pressed_keys() as pressed:
+        yield DisplayKeys(pressed) if pressed else None
+
+
+@contextmanager
 def pressed_keys() -> Iterator[Keys | None]:
     """Yield the keys of the terminal, and give the terminal back on the way out.
 

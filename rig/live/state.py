@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.channels import unit_of
 from estimation.recording import Flag
+from rig.errors import ExitCode
 from rig.live.block import DeviceStatus, FloatArray, LimitStatus, SampleBlock
 from rig.live.window import Window
 
@@ -121,6 +122,11 @@ class Summary:
     error_samples: int
     inside_rms: float | None = None
     inside_samples: int = 0
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """What a command that showed the stream ends with."""
+        return ExitCode.INTERRUPTED if self.ended == "interrupted" else ExitCode.OK
 
 
 class LiveState:

@@ -41,7 +41,7 @@ def run(folder: Path, *words: str) -> dict:
 
 def test_a_diagnosis_leaves_json_report_and_model(campaign, tmp_path, capsys):
     model, report = tmp_path / "model.toml", tmp_path / "report"
-    found = run(tmp_path, "--model-out", str(model), "--report", str(report), "--balance", "motor")
+    found = run(tmp_path, "--model-out", str(model), "--report", str(report), "--equation", "motor")
     DiagnosisSchema.model_validate(found)
     (finding,) = found["findings"]
     assert finding["family"] == "spring.position"
@@ -77,7 +77,7 @@ def test_a_folder_of_logs_keeps_its_diagnosis_with_them(tmp_path, monkeypatch, c
     folder = tmp_path / "monday"
     words = ["record", "--sim", "-p", "quick", "-o", str(folder), "--seed", "5"]
     assert main(words) == 0
-    words = ["diagnose", str(folder), "--balance", "motor", "--quick"]
+    words = ["diagnose", str(folder), "--equation", "motor", "--quick"]
     assert main([*words, "--ledger", str(tmp_path / "looks.jsonl")]) == 0
     out = capsys.readouterr().out
     page = folder / "diagnosis" / "diagnosis.html"
@@ -98,7 +98,7 @@ def test_every_equation_that_is_decided_goes_into_the_model_file(campaign, tmp_p
 
 def test_the_written_model_runs_live_with_the_error_that_is_reported(campaign, tmp_path):
     path = tmp_path / "model.toml"
-    found = run(tmp_path, "--model-out", str(path), "--balance", "motor", "--quick")
+    found = run(tmp_path, "--model-out", str(path), "--equation", "motor", "--quick")
     estimator = load(path)
     (one, *_) = [r for r in campaign if r.name in found["runs"]["confirm"]]
     stepper = estimator.stepper(one.sample_rate_hz)
@@ -117,7 +117,7 @@ def test_what_has_no_name_is_reported_and_in_no_model_file(monkeypatch, tmp_path
     recordings = runs(tight_spot, count=9, seconds=4.0)
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     path, report = tmp_path / "model.toml", tmp_path / "report"
-    words = ["--model-out", str(path), "--report", str(report), "--balance", "motor"]
+    words = ["--model-out", str(path), "--report", str(report), "--equation", "motor"]
     found = run(tmp_path, *words, "--quick")
     DiagnosisSchema.model_validate(found)
     (finding,) = found["findings"]
@@ -131,11 +131,11 @@ def test_what_has_no_name_is_reported_and_in_no_model_file(monkeypatch, tmp_path
 
 
 def test_a_second_look_at_the_same_runs_is_exploratory(campaign, tmp_path):
-    assert run(tmp_path, "--balance", "motor")["exploratory"] is False
-    again = run(tmp_path, "--balance", "motor")
+    assert run(tmp_path, "--equation", "motor")["exploratory"] is False
+    again = run(tmp_path, "--equation", "motor")
     assert again["exploratory"] is True
     # another seed confirms on runs that were seen all the same
-    assert run(tmp_path, "--balance", "motor", "--seed", "5")["exploratory"] is True
+    assert run(tmp_path, "--equation", "motor", "--seed", "5")["exploratory"] is True
     assert len((tmp_path / "looks.jsonl").read_text().splitlines()) == 3
 
 
@@ -189,7 +189,7 @@ def test_runs_whose_clock_jumps_are_left_out_and_named(monkeypatch, tmp_path, ca
     recordings = runs(count=6, seconds=2.0)
     spoilt = [jumping(recordings[0]), *recordings[1:]]
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(spoilt))
-    found = run(tmp_path, "--balance", "motor", "--quick")
+    found = run(tmp_path, "--equation", "motor", "--quick")
     assert recordings[0].name not in {*found["runs"]["discover"], *found["runs"]["confirm"]}
     assert any("jumps by 0.401 s at 0.699 s" in note for note in found["notes"])
 
@@ -197,7 +197,7 @@ def test_runs_whose_clock_jumps_are_left_out_and_named(monkeypatch, tmp_path, ca
 def test_a_diagnosis_without_a_finding_has_a_page(monkeypatch, tmp_path):
     clean = Campaign.of(runs(lambda angle, speed, load: 0.0 * angle, count=9, seconds=5.0))
     monkeypatch.setattr(subject, "open_campaign", lambda *_: clean)
-    found = run(tmp_path, "--report", str(tmp_path / "report"), "--balance", "motor", "--quick")
+    found = run(tmp_path, "--report", str(tmp_path / "report"), "--equation", "motor", "--quick")
     assert found["findings"] == []
     assert "No unmodelled effect" in (tmp_path / "report/diagnosis.html").read_text()
 
@@ -205,7 +205,7 @@ def test_a_diagnosis_without_a_finding_has_a_page(monkeypatch, tmp_path):
 def test_when_every_clock_jumps_nothing_is_decided(monkeypatch, tmp_path, capsys):
     spoilt = [jumping(r) for r in runs(spring, count=6, seconds=2.0)]
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(spoilt))
-    words = ["diagnose", str(tmp_path), "--balance", "motor", "--ledger", str(tmp_path / "l")]
+    words = ["diagnose", str(tmp_path), "--equation", "motor", "--ledger", str(tmp_path / "l")]
     assert main(words) == 5
     said = capsys.readouterr().err
     assert "its clock jumps" in said
@@ -234,15 +234,15 @@ def test_two_paths_are_diagnosed_by_their_periods_and_the_claim_says_so(monkeypa
 
     paths = [periodic("one", 1), periodic("two", 2)]
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(paths))
-    found = run(tmp_path, "--balance", "motor", "--quick")
+    found = run(tmp_path, "--equation", "motor", "--quick")
     assert len(found["runs"]["discover"]) == len(found["runs"]["confirm"]) == 6
     assert "Two recorded paths only" in found["notes"][0]
     assert found["exploratory"] is False
-    assert run(tmp_path, "--balance", "motor", "--quick")["exploratory"] is True
+    assert run(tmp_path, "--equation", "motor", "--quick")["exploratory"] is True
 
 
 def test_an_unknown_balance_is_a_usage_error(tmp_path, capsys):
-    assert main(["diagnose", str(tmp_path), "--balance", "elbow"]) == 2
+    assert main(["diagnose", str(tmp_path), "--equation", "elbow"]) == 2
     assert "elbow" in capsys.readouterr().err
 
 

@@ -38,7 +38,7 @@ def test_a_joint_is_diagnosed_like_any_balance(tmp_path: Path, monkeypatch, caps
     campaign = runs()
     monkeypatch.setattr(subject, "open_campaign", lambda *_: campaign)
     out, report = tmp_path / "diagnosis.json", tmp_path / "report"
-    words = ["diagnose", str(tmp_path), "--balance", "joint.2", "--quick", "--json-out", str(out)]
+    words = ["diagnose", str(tmp_path), "--equation", "joint.2", "--quick", "--json-out", str(out)]
     words += ["--report", str(report), "--ledger", str(tmp_path / "looks.jsonl")]
     assert main(words) == 0
     found = json.loads(out.read_text())

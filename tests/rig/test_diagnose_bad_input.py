@@ -83,7 +83,7 @@ CASES: dict[str, tuple[Spoil, str]] = {
 
 def diagnosed(monkeypatch, folder: Path, recordings: list[Recording]) -> dict[str, Any]:
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
-    words = ["diagnose", str(folder), "--balance", "motor", "--quick"]
+    words = ["diagnose", str(folder), "--equation", "motor", "--quick"]
     words += ["--ledger", str(folder / "looks.jsonl"), "--json-out", str(folder / "diagnosis.json")]
     assert main(words) == 0
     found: dict[str, Any] = json.loads((folder / "diagnosis.json").read_text())
@@ -112,7 +112,7 @@ def test_nothing_is_decided_and_the_reason_is_said(monkeypatch, tmp_path, capsys
     recordings = spoil(runs(spring, count=9, seconds=2.0))
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     ledger, out = tmp_path / "looks.jsonl", tmp_path / "diagnosis.json"
-    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick"]
+    words = ["diagnose", str(tmp_path), "--equation", "motor", "--quick"]
     assert main([*words, "--ledger", str(ledger), "--json-out", str(out)]) == 5
     said = capsys.readouterr().err
     assert reason in " ".join(said.split())
@@ -135,7 +135,7 @@ def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(monkeypatch,
     recordings = runs(spring, count=9, seconds=2.0)
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     out = tmp_path / "diagnosis.json"
-    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick", "--json-out", str(out)]
+    words = ["diagnose", str(tmp_path), "--equation", "motor", "--quick", "--json-out", str(out)]
     assert main([*words, "--ledger", "/dev/null/x"]) == 5
     assert "reading the recordings" not in capsys.readouterr().err
     assert not out.exists()
@@ -151,7 +151,7 @@ def test_a_diagnosis_that_leaves_nothing_does_not_use_up_the_runs(monkeypatch, t
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     monkeypatch.setattr("rig.reports.diagnosis.page", broken)
     ledger = tmp_path / "looks.jsonl"
-    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick", "--ledger", str(ledger)]
+    words = ["diagnose", str(tmp_path), "--equation", "motor", "--quick", "--ledger", str(ledger)]
     assert main([*words, "--report", str(tmp_path)]) == 70
     assert not ledger.exists()
 
@@ -165,7 +165,7 @@ def test_a_reader_that_leaves_early_has_the_files(monkeypatch, tmp_path):
     recordings = runs(spring, count=9, seconds=2.0)
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
     out, ledger = tmp_path / "diagnosis.json", tmp_path / "looks.jsonl"
-    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick", "--ledger", str(ledger)]
+    words = ["diagnose", str(tmp_path), "--equation", "motor", "--quick", "--ledger", str(ledger)]
     main([*words, "--json-out", str(out)])
     assert json.loads(out.read_text())["schema"] == "rig.diagnosis/1"
     assert len(ledger.read_text().splitlines()) == 1
@@ -175,6 +175,6 @@ def test_a_rig_that_lacks_nothing_has_a_page(monkeypatch, tmp_path):
     monkeypatch.setattr(
         subject, "open_campaign", lambda *_: Campaign.of(runs(count=9, seconds=2.0))
     )
-    words = ["diagnose", str(tmp_path), "--balance", "motor", "--quick", "--report", str(tmp_path)]
+    words = ["diagnose", str(tmp_path), "--equation", "motor", "--quick", "--report", str(tmp_path)]
     assert main([*words, "--ledger", str(tmp_path / "looks.jsonl")]) == 0
     assert "motor: measured and estimated" in (tmp_path / "diagnosis.html").read_text()

@@ -9,7 +9,7 @@ from rig.cli.main import main
 
 @pytest.mark.long
 def test_a_protocol_shows_which_effects_its_runs_distinguish(capsys) -> None:
-    assert main(["diagnose", "--plan", "quick", "--balance", "motor", "--json"]) == 0
+    assert main(["diagnose", "--plan", "quick", "--equation", "motor", "--json"]) == 0
     plan = json.loads(capsys.readouterr().out)
     assert (plan["source"], plan["runs"]) == ("quick", 12)
     chance = {(e["place"], e["family"]): e["probability"] for e in plan["effects"]}

@@ -108,6 +108,6 @@ def test_no_workers_and_no_scheduler_are_usage_errors(monkeypatch, tmp_path, cap
     with pytest.raises(UsageError, match="1 or more"), engine(0):
         pass
     monkeypatch.setattr("rig.diagnosis.engine.CONNECT_S", 0.2)
-    words = ["diagnose", str(tmp_path), "--balance", "motor", "--scheduler", "tcp://127.0.0.1:1"]
+    words = ["diagnose", str(tmp_path), "--equation", "motor", "--scheduler", "tcp://127.0.0.1:1"]
     assert main(words) == 2
     assert "No scheduler answers" in capsys.readouterr().err

@@ -122,7 +122,7 @@ def test_the_whole_loop_names_what_is_hidden(tmp_path, capsys):
     from rig.protocols.protocol import protocol_toml
 
     protocol.write_text(protocol_toml(PROTOCOL))
-    words = ["loop", "--sim", "--hide", "motor_ripple=1.0", "--balance", "motor", "--quick"]
+    words = ["loop", "--sim", "--hide", "motor_ripple=1.0", "--equation", "motor", "--quick"]
     words += ["--protocol", str(protocol), "--out", str(tmp_path / "loop"), "--seed", "1"]
     assert main([*words, "--rounds", "1", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)

@@ -70,7 +70,7 @@ def test_files_of_another_format_and_earlier_attempts_are_named(tmp_path, make_l
     assert "notes.txt" not in said
 
 
-@pytest.mark.parametrize("words", [["fit"], ["diagnose", "--quick", "--balance", "motor"]])
+@pytest.mark.parametrize("words", [["fit"], ["diagnose", "--quick", "--equation", "motor"]])
 def test_a_damaged_run_stops_a_command_unless_it_is_asked_to_skip_it(
     tmp_path, make_log, capsys, words, monkeypatch
 ):
