@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from estimation.recording import Recording
     from rig.live.estimator import ModelEstimator
 
+GRIP, EFFORTS = "distal_torque_n_m", ("_n_m", "_n", "_a")
+"""The main channel of the reference rig, and the units of what is shown where there is none."""
+
 
 def replay(
     log: Annotated[Path, typer.Argument(help="Recording: a file, folder or archive.")],
@@ -90,10 +93,13 @@ def replay(
 
 
 def _usual(recording: "Recording") -> tuple[str, ...]:
-    """Return the quantities to watch: a grasper's forces where its joints were recorded."""
+    """Return the quantities to watch: a grasper's forces, the grip torque, or the first effort."""
     from rig.live.joint_forces import JOINTS, of_joints
 
-    return JOINTS if of_joints(recording.columns) else ("distal_torque_n_m",)
+    if of_joints(recording.columns):
+        return JOINTS
+    efforts = [n for n in recording.columns if n.endswith(EFFORTS)]
+    return (efforts[0],) if efforts and GRIP not in efforts else (GRIP,)
 
 
 def _core(log: Path, config: Path | None, json: bool) -> int:

@@ -168,6 +168,17 @@ def command(*words):
     return app(args=[*words], standalone_mode=False)
 
 
+def test_a_recording_of_another_machine_is_shown_by_a_channel_that_it_has(logs, capsys):
+    own = recording()
+    current_a = own["motor_current_a"]
+    path = logs(recording(columns={"motor_angle_rad": current_a, "motor_current_a": current_a}))
+    assert command(path, "--json", "--speed", "0") == 0
+    frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    (shown,) = frames[-2]["channels"].items()
+    assert shown[0] == "motor_current_a"
+    assert shown[1]["sensor"] is not None
+
+
 def test_command_writes_json_lines(logs, capsys):
     path = logs(recording())
     assert command(path, "--json", "--speed", "0", "--lever-mm", "10") == 0
