@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import TablesFile, WorkersOption
+from rig.cli.options import FiguresFolder, TablesFile, WorkersOption
 from rig.output.console import JsonFlag, emit_json, progress, show_result
 
 if TYPE_CHECKING:
@@ -25,10 +25,6 @@ StateFolder = Annotated[
 ]
 
 Arms = Annotated[int, typer.Option(min=1, help="Simulated arms of each family, from seed 0.")]
-
-TablesFile = TablesFile
-
-FigureFolder = Annotated[Path | None, typer.Option("--figures", help="Folder for the figures.")]
 
 
 def _from_page(drawn: list[Path], out: Path | None) -> list[str]:
@@ -95,7 +91,7 @@ def pique(
         typer.Option(help="A further run to test on, with models fitted on the second path."),
     ] = None,
     out: TablesFile = None,
-    figures: FigureFolder = None,
+    figures: FiguresFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Make table 3.2 of Piqué 2018 again: an arm's joint torques in free space."""
@@ -151,7 +147,7 @@ def wrench(
     workers: WorkersOption = 1,
     state: StateFolder = None,
     out: TablesFile = None,
-    figures: FigureFolder = None,
+    figures: FiguresFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and contact."""
@@ -173,7 +169,7 @@ def delsol(
     workers: WorkersOption = 1,
     state: StateFolder = None,
     out: TablesFile = None,
-    figures: FigureFolder = None,
+    figures: FiguresFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms."""
@@ -195,7 +191,7 @@ def zhang(
     workers: WorkersOption = 1,
     state: StateFolder = None,
     out: TablesFile = None,
-    figures: FigureFolder = None,
+    figures: FiguresFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and wrench."""
