@@ -29,7 +29,9 @@ def predicted_of(channel: str, target: str) -> str:
 
 def with_prediction(model: Model) -> Model:
     """Return a fitted model whose signals have the prediction of its target, where it has one."""
-    known = model.signals
+    name = predicted_of(model.target, model.target)
+    others = tuple(c for c in model.signals.combinations if c.name != name)
+    known = replace(model.signals, combinations=others)
     shares, turn = [], None
     for term in model.terms:
         (channel, *_) = term.channels.values() or ("",)
@@ -40,7 +42,7 @@ def with_prediction(model: Model) -> Model:
             turn = Direction(channel, term.weights[0], term.values["width"].value)
     if not shares:
         return model
-    made = Combination(predicted_of(model.target, model.target), tuple(shares), turn)
+    made = Combination(name, tuple(shares), turn)
     return replace(model, signals=replace(known, combinations=(*known.combinations, made)))
 
 

@@ -60,10 +60,10 @@ def search_shape(problem: Problem, everywhere: bool = True) -> list[float]:
             tried = [[*point[:k], x, *point[k + 1 :]] for x in grid]
             point = min([point, *tried], key=error)
     reach = [grid[1] - grid[0] for grid in grids]
-    return values(_descended(error, point, reach, bounds))
+    return values(descended(error, point, reach, bounds))
 
 
-def _descended(
+def descended(
     error: Callable[[Sequence[float] | FloatArray], float],
     point: list[float],
     reach: Sequence[float],
@@ -73,7 +73,14 @@ def _descended(
 
     A line search over all of a parameter's range steps over a narrow valley, such as an order's, so
     each descent moves by at most one step of the grid; it restarts from its end while that improves
-    the result, since a valley of two shapes is curved.
+    the result, since a valley of two shapes is curved. Where the error changes by less than its
+    rounding, `scipy` ends without a direction to move in: the point is as good as any then.
+
+    Args:
+        error: To lower.
+        point: Where it begins, moved within the bounds.
+        reach: Longest step of each coordinate in one descent.
+        bounds: Lowest and highest value of each coordinate.
     """
     point = [min(max(x, low), high) for x, (low, high) in zip(point, bounds, strict=True)]
     left = error(point)
@@ -82,9 +89,12 @@ def _descended(
             (max(low, x - step), min(high, x + step))
             for x, step, (low, high) in zip(point, reach, bounds, strict=True)
         ]
-        best = optimize.minimize(
-            error, point, method="Powell", bounds=near, options={"xtol": 1e-4, "ftol": 1e-10}
-        )
+        try:
+            best = optimize.minimize(
+                error, point, method="Powell", bounds=near, options={"xtol": 1e-4, "ftol": 1e-10}
+            )
+        except ValueError:  # a direction of no length
+            break
         gained, left = left - best.fun, min(left, best.fun)
         if gained > 0:
             point = [float(x) for x in best.x]

@@ -16,11 +16,9 @@ from benchmarks.diagnosis.case import Report
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.fitting import fit
-from estimation.residual import centred, residuals
+from estimation.model import Model, balance_channels, estimate, settled
+from estimation.recording import FloatArray
 from rig.importers.registry import open_campaign
-
-EVERY_HZ = 1e6
-"""Above any rate of recording: every sample counts."""
 
 
 def errors_without(
@@ -43,7 +41,16 @@ def errors_without(
     errors = {}
     for equation in equations:
         fitted = fit(model_file.read(Path(equation)), training, bootstrap=0)
-        parts = residuals(replace(fitted, counted="all"), test, EVERY_HZ)
-        left = np.concatenate(centred(fitted, [part.values for part in parts]))
-        errors[equation] = float(np.sqrt(np.mean(left**2)))
+        errors[equation] = _error(replace(fitted, counted="all"), test)
     return errors
+
+
+def _error(model: Model, test: Campaign) -> float:
+    """Return the root mean square residual over all valid samples, means removed."""
+    parts = list[FloatArray]()
+    for recording in test.evidence:
+        run = balance_channels(model, recording)
+        left = (run[model.target] - estimate(model, run))[settled(model, run)]
+        parts.append(left - left.mean() if model.run_offsets else left)
+    whole = np.concatenate(parts)
+    return float(np.sqrt(np.mean((whole if model.run_offsets else whole - whole.mean()) ** 2)))

@@ -12,7 +12,7 @@ from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.functions import Function, functions_at
 from estimation.causes.instruments import signal
 from estimation.causes.joint import Joint
-from estimation.causes.laid import Laid, Scale
+from estimation.causes.laid import NOTHING, Laid, Scale
 from estimation.causes.places import places_of
 from estimation.causes.sources import Source, sources_at
 from estimation.recording import FloatArray
@@ -26,9 +26,6 @@ QUIET = 0.002
 
 AT_ONCE = 40_000
 """Causes times squared columns in one group: keeps its memory small."""
-
-NOTHING = 1e-12
-"""Norm of a column, in declared errors of its equations for one unit, below which it is zero."""
 
 
 @dataclass(frozen=True)

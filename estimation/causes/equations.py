@@ -259,7 +259,7 @@ def lay_out(
                     f"The equation {model.balance} needs it. Every run has {', '.join(measured)}.",
                     "Record it, or declare an equation of channels that were recorded.",
                 )
-            equations[model.balance] = _equation(fit(model, campaign, bootstrap=0, every=None))
+            equations[model.balance] = equation_of(fit(model, campaign, bootstrap=0, every=None))
         except EstimationError as error:
             undecided[model.balance] = error
     if not equations:
@@ -329,7 +329,8 @@ def on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
     return out
 
 
-def _equation(model: Model) -> Equation:
+def equation_of(model: Model) -> Equation:
+    """Return a fitted model as an equation."""
     channels: dict[str, float] = {}
     speed, width = "", 0.0
     for term in model.terms:

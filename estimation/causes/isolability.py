@@ -18,6 +18,7 @@ from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
+from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.scoring import assessed, best_of_each, probabilities
 from estimation.model import Model
@@ -74,7 +75,7 @@ def isolability(
         FitError: A declared equation cannot be identified.
     """
     names = [r.name for r in recordings]
-    layout = lay_out(models, recordings, names)
+    layout = with_levels(lay_out(models, recordings, names), names, numbers)
     add_instruments(layout, names)
     plain = Joint(layout, numbers)
     joint = with_skews(plain, skews(plain))

@@ -207,6 +207,25 @@ class Joint:
         gram[range(self.size), range(self.size)] += self._prior
         return np.asarray(inverse(gram[:-1, :-1]) @ gram[:-1, -1])
 
+    def declared_products(self, part: Part) -> FloatArray:
+        """Return the products of an equation's amplitudes, its offset and its target, of all runs.
+
+        Shapes stay as they were fitted: an amplitude and the derivative by a shape may be much
+        alike, as a gap and its compliance.
+
+        Args:
+            part: The equation, within runs or of their means.
+
+        Returns:
+            Shape (amplitudes + 2, amplitudes + 2): offset and target are the last two.
+        """
+        name, _ = part
+        of_shape = self.layout.equations[name].of_shape
+        at = [k for k, s in zip(self._equations_at[name], of_shape, strict=True) if not s]
+        offsets = self._declared_size - len(self._equations_at)
+        at += [offsets + list(self._equations_at).index(name), self.size]
+        return np.asarray(self.gram[part].sum(axis=0)[np.ix_(at, at)])
+
     def parameter(self, base: FloatArray, equation: str, column: int | None) -> float:
         """Return one declared parameter, with what was taken off the columns of causes.
 

@@ -15,6 +15,9 @@ Scale = Literal["each", "first", "none"]
 
 TINY = 1e-300
 
+NOTHING = 1e-12
+"""Norm of a column, in declared errors of its equations for one unit, below which it is zero."""
+
 
 @dataclass(frozen=True)
 class Laid:
@@ -165,7 +168,7 @@ class Projection:
                 middles[name] /= size
                 taken[name] = taken[name] / size[:, None]
         for noise in shaken.values():
-            noise /= size[:, None]
+            noise /= np.maximum(size, NOTHING)[:, None]
         across = {n: self.noise[n].transpose(0, 2, 1)[:, None] @ x for n, x in shaken.items()}
         own = {n: x.transpose(0, 1, 3, 2) @ x for n, x in shaken.items()}
         return Laid(inners, middles, taken, size, across, own)

@@ -2,8 +2,8 @@
 
 `python -m benchmarks.diagnosis.calibrate` measures on drawn campaigns which `sharpness` and
 `cause_cost` give the truth the best mean log probability, see docs/results/diagnosis-numbers.md.
-The shipped ones are round values within .03 of the best, at the least cost that keeps all but one
-of 60 clean campaigns without a cause. All others were set by hand while the core was developed on
+The shipped ones are round values within .03 of the best; a larger cost keeps more clean campaigns
+without a cause and loses weak effects. All others were set by hand while the core was developed on
 campaigns of the develop range.
 """
 

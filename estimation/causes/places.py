@@ -15,16 +15,24 @@ from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensiti
 from estimation.derived import CAMPAIGN_TIME, measured_channels
 from estimation.signals import Signals
 
-Kind = Literal["loss", "actuator", "deflection", "torque sensor", "angle sensor"]
+Kind = Literal["loss", "actuator", "deflection", "lever", "torque sensor", "angle sensor"]
 
 
 @dataclass(frozen=True)
 class Entry:
-    """How a cause enters one equation's residual: gain times its derivative of that order."""
+    """How a cause enters one equation's residual: gain times its derivative of that order.
+
+    Attributes:
+        equation: The equation.
+        gain: The gain.
+        order: How many times it is differentiated by time.
+        load: Channel of the load that its derivative by the angle is multiplied with; none if "".
+    """
 
     equation: str
     gain: float
     order: int = 0
+    load: str = ""
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,9 @@ def places_of(layout: Layout) -> list[Place]:
         if any(t.effect.id == "motor.torque_constant" for t in equation.terms):
             found.append(_actuator(equation, own))
     sensors = [n for n in layout.measured if n not in _computed(layout)]
-    found += [p for n in sensors for p in _behind(layout, n, angles)]
+    found += [
+        p for n in sensors for p in (*_behind(layout, n, angles), *_levers(layout, n, angles))
+    ]
     found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
     return found
 
@@ -217,22 +227,66 @@ def _actuator(equation: Equation, angles: Sequence[str]) -> Place:
         "drive": (current,),
         "reading": (current,),
     }
-    return Place(
-        f"actuator {current}", "actuator", equation.name, (Entry(equation.name, 1.0),), roles
-    )
+    share = abs(equation.channels.get(current, 0.0)) or 1.0  # amplitudes are of the constant's
+    enters = (Entry(equation.name, share),)
+    return Place(f"actuator {current}", "actuator", equation.name, enters, roles)
+
+
+def _both(layout: Layout, sensor: str) -> tuple[Equation, Equation] | None:
+    """Return the equations of a transmission's torque and of its bend that read a torque sensor."""
+    reading = [e for e in layout.equations.values() if sensor in e.channels]
+    torque = [e for e in reading if not e.of_angle]
+    if len(torque) != 1 or len(reading) < 2:
+        return None
+    return torque[0], next(e for e in reading if e.of_angle)
 
 
 def _behind(layout: Layout, sensor: str, angles: Sequence[str]) -> list[Place]:
     """Return the place of a torque between a compliance and a torque sensor behind it."""
-    reading = [e for e in layout.equations.values() if sensor in e.channels]
-    torque = [e for e in reading if not e.of_angle]
-    if len(torque) != 1 or len(reading) < 2:
+    if (both := _both(layout, sensor)) is None:
         return []
+    torque, bent = both
+    reading = [e for e in layout.equations.values() if sensor in e.channels]
     enters = tuple(Entry(e.name, e.channels[sensor]) for e in reading)
-    bent = next(e for e in reading if e.of_angle)
-    angle = bent.target if bent.target in angles else _own_angle(torque[0], angles)
+    angle = bent.target if bent.target in angles else _own_angle(torque, angles)
     roles = _motion(angle) | _shared(angles, angle) | {"load": (sensor,)}
-    return [Place(f"torque at {sensor}", "loss", torque[0].name, enters, roles)]
+    return [Place(f"torque at {sensor}", "loss", torque.name, enters, roles)]
+
+
+def _levers(layout: Layout, sensor: str, angles: Sequence[str]) -> list[Place]:
+    """Return the places of a wheel that is not round, between a torque equation and a sensor.
+
+    With the travel A(angle) the bend's equation c_in angle_in + c_out angle_out = A + ... has the
+    ratio of its angles, and by virtual work of its torques, changed by the factor 1 - A'/c_in where
+    the wheel turns with the driving side, and by 1 + A'/c_out where it turns with the driven one.
+    """
+    if (both := _both(layout, sensor)) is None:
+        return []
+    torque, bent = both
+    found = []
+    for angle in angles[1:]:
+        if not angle.endswith("_angle_rad"):
+            continue  # a carriage does not turn
+        share = _share(bent, angle)
+        if not share:
+            continue
+        side = -1.0 if torque.speed in _motion(angle)["speed"] else 1.0
+        gain = side * torque.channels[sensor] / share
+        enters = (Entry(bent.name, 1.0), Entry(torque.name, gain, load=sensor))
+        roles = {"output_angle": (angle,)}
+        found.append(Place(f"wheel of {angle} at {sensor}", "lever", bent.name, enters, roles))
+    return found
+
+
+def _share(equation: Equation, angle: str) -> float:
+    """Return the factor of an angle in an equation's target less its right-hand side."""
+    known = equation.model.signals
+    total = 0.0
+    for name, weight in ((equation.target, 1.0), *((n, -w) for n, w in equation.channels.items())):
+        found = sensitivity(name, angle, known)
+        if found is not None and found[1] == 0:
+            total += weight * found[0]
+    return total
 
 
 def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None:

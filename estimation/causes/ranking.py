@@ -17,6 +17,7 @@ from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.scoring import Scored, assessed, best_of_each
 from estimation.causes.sources import RELATIVE, Bend, Source
+from estimation.effects import Parameter
 
 KNOTS_OF_BEND, BENT = 5, 24
 """Hat functions of a form's deviation from its equation, and families that are given one."""
@@ -100,16 +101,20 @@ def _neighbours(candidate: Candidate) -> list[Claim]:
         return []
     out = []
     for k, parameter in enumerate(cause.effect.shape):
-        values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
-        if parameter.name in ("width", "settled", "order") or values is None or len(values) < 2:
-            continue
-        ratio = values[1] / values[0]
-        for step in (-0.5, -0.25, 0.25, 0.5):
-            moved = (
-                cause.shape[k] + step * (values[1] - values[0])
-                if parameter.linear
-                else cause.shape[k] * ratio**step
-            )
-            shape = (*cause.shape[:k], float(moved), *cause.shape[k + 1 :])
+        for value in _nearby(cause, k, parameter):
+            shape = (*cause.shape[:k], float(value), *cause.shape[k + 1 :])
             out.append(Claim(replace(cause, shape=shape), candidate.acts, candidate.choices))
     return out
+
+
+def _nearby(cause: Source, k: int, parameter: Parameter) -> list[float]:
+    """Return values of one shape parameter between the points of its grid."""
+    if parameter.name == "order":
+        return [cause.shape[k] + step for step in (-2.0, -1.0, 1.0, 2.0)]  # whole: of its shaft
+    values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
+    if parameter.name in ("width", "settled") or values is None or len(values) < 2:
+        return []
+    steps, ratio = (-0.5, -0.25, 0.25, 0.5), values[1] / values[0]
+    if parameter.linear:
+        return [cause.shape[k] + step * (values[1] - values[0]) for step in steps]
+    return [cause.shape[k] * ratio**step for step in steps]

@@ -47,7 +47,7 @@ class Scored:
 
 
 def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
-    """Return the score of each candidate given the base; those of a wrong sign are left out."""
+    """Return the score of each candidate given the base; impossible amplitudes are left out."""
     before, spreads = joint.base_errors(folds), [joint.extrapolated(family) for family in folds]
     out = []
     for group in pool:
@@ -57,7 +57,7 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
         scores, by_family = joint.score(spreads, before, outcome.errors)
         for k, candidate in enumerate(group.candidates):
             amplitudes = outcome.amplitudes[k]
-            if replaces[k] or _sign_is_wrong(candidate, amplitudes):
+            if replaces[k] or _is_impossible(candidate, amplitudes):
                 continue
             gain = float(scores[k])
             score = gain - _price(candidate, joint)
@@ -129,12 +129,13 @@ def _in_readings(
     return replaces
 
 
-def _sign_is_wrong(candidate: Candidate, amplitudes: FloatArray) -> bool:
+def _is_impossible(candidate: Candidate, amplitudes: FloatArray) -> bool:
     cause = candidate.cause
-    if isinstance(cause, Function) or not cause.is_bounded:
+    if isinstance(cause, Function):
         return False
     count = len(cause.parts)  # a bend comes after them
-    return float(np.sum(amplitudes[:count] / candidate.size[:count])) < 0.0
+    total = float(np.sum(amplitudes[:count] / candidate.size[:count]))
+    return abs(total) < cause.least or (cause.is_bounded and total < 0.0)
 
 
 def _price(candidate: Candidate, joint: Joint) -> float:

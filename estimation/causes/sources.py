@@ -14,7 +14,7 @@ import numpy as np
 from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
 from estimation.causes.places import Place, direction_width
-from estimation.effects import Effect, Parameter, catalogue
+from estimation.effects import Effect, Parameter, Pointwise, catalogue
 from estimation.recording import FloatArray
 
 DECLARED_ONLY = (
@@ -65,6 +65,13 @@ KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
 
 NARROW = 0.02
 """Speed over which friction changes its sign where none is declared, share of the usual most."""
+
+ANGLE_STEP_RAD = 1e-4
+"""Step of a derivative by an angle."""
+
+LATE = ("sensor.delay", "sensor.lag", "motor.electrical")
+LEAST_LATE = 0.3
+"""Share of a reading that a delay or a lag makes late, at least: a small slow share is creep."""
 
 LEAST_PERIODS = 1.5
 """Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
@@ -126,21 +133,35 @@ class Source:
         return 1
 
     @property
+    def least(self) -> float:
+        """Size that its amplitude has at least: a reading is late as a whole."""
+        return LEAST_LATE if self.effect.id in LATE else 0.0
+
+    @property
     def is_bounded(self) -> bool:
         """Whether its amplitudes have a sign: all but a loop over the load of what it bends."""
+        if self.family == "sensor.creep":
+            return True  # its place has the sign of the reading in every equation
         of_load = any(r == "travel" and not c.endswith(ANGLES) for r, c in self.channels)
         lower = [self.effect.amplitudes[k].lower for k in self.parts]
         return min(lower) >= 0.0 and not of_load
 
-    def signal(self, run: RunSignals, equation: str) -> FloatArray | None:
-        """Return the source's columns in one equation over the whole run, (n, parts).
+    @property
+    def on_grid(self) -> bool:
+        """Whether its columns need no other samples than those that are regressed on."""
+        return isinstance(self.effect, Pointwise) and not any(e.order for e in self.place.enters)
 
-        None where a column is not finite.
+    def signal(self, run: RunSignals, equation: str, load: str = "") -> FloatArray | None:
+        """Return the source's columns in one equation, (n, parts): over the run, or on its grid.
+
+        With a load, its work: the load times their derivatives by the angle. None where a column is
+        not finite.
         """
         names = tuple(signal(run, channel, equation) for _, channel in self.channels)
-        key = (self.effect.id, self.shape, names, self.odd)
+        behind = load and signal(run, load, equation)
+        key = (self.effect.id, self.shape, names, self.odd, behind, self.on_grid)
         if key not in run.memo:
-            run.memo[key] = _worked_out(self, names, run)
+            run.memo[key] = _worked_out(self, names, run, behind)
         found = run.memo[key]
         if found is None:
             return None
@@ -155,11 +176,12 @@ class Source:
         """Return the source's columns in every equation it enters, at the samples each counts."""
         made: dict[str, FloatArray] = {}
         for entry in self.place.enters:
-            found = self.signal(run, entry.equation)
+            found = self.signal(run, entry.equation, entry.load)
             if found is None:
                 return None
-            column = entry.gain * self.side * _derived(found, run.rate_hz, entry.order)[run.grid]
-            used = column[run.used[entry.equation]]
+            if not self.on_grid:
+                found = _derived(found, run.rate_hz, entry.order)[run.grid]
+            used = entry.gain * self.side * found[run.used[entry.equation]]
             made[entry.equation] = made[entry.equation] + used if entry.equation in made else used
         return made
 
@@ -222,7 +244,11 @@ def _acts(effect: Effect, place: Place) -> bool:
         return False  # slower than a count a sample, the pattern of the counts passes for a bend
     if effect.family == "friction.capstan" and kind in KNOWN and kind not in effect.balances:
         return False  # a cable that is wrapped, not a shaft in its bearings
+    if (place.kind == "lever") != (effect.id == "eccentric.load.pulley"):
+        return False
     match place.kind:
+        case "lever":
+            return True
         case "actuator":
             return effect.id.startswith((*ACTUATOR, "sensor.delay"))
         case "deflection":
@@ -304,6 +330,7 @@ RELATIVE: Mapping[object, Sequence[float]] = {
     "width": tuple(np.geomspace(0.005, 0.05, 3)),
     "time": (0.15, 0.5, 1.5),
     "time_constant": (0.15, 0.5, 1.5),
+    ("sensor.creep", "time_constant"): tuple(np.geomspace(0.03, 1.5, 5)),
     ("sensor.lag", "time_constant"): tuple(np.geomspace(2e-4, 5e-2, 6)),
     ("motor.electrical", "time_constant"): tuple(np.geomspace(1e-4, 5e-3, 4)),
     ("transmission.relaxation", "time"): tuple(np.geomspace(0.01, 0.7, 6)),
@@ -332,7 +359,7 @@ def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:
     resolved = 2 * math.pi / travel
     first = max(1, math.ceil(LEAST_PERIODS * resolved))
     if effect.id == "eccentric.load":
-        first = 1  # the load multiplies it, so a part of a period shows
+        first = 1  # the load multiplies it, so a part of one sine shows
     last = max(40, round(60 * min(resolved, 1.5))) // (len(effect.amplitudes) // 2)
     return [float(k) for k in range(first, last + 1, max(1, round(resolved / 3)))]
 
@@ -349,10 +376,19 @@ def _range(layout: Layout, channel: str) -> tuple[float, float]:
     return low, high
 
 
-def _worked_out(source: Source, names: Sequence[str], run: RunSignals) -> FloatArray | None:
+def _worked_out(
+    source: Source, names: Sequence[str], run: RunSignals, load: str
+) -> FloatArray | None:
     effect, roles = source.effect, [role for role, _ in source.channels]
-    seen = {r: run.channels[n] for r, n in zip(roles, names, strict=True)}
+    read = run.on_grid if source.on_grid else run.channels.__getitem__
+    seen = {r: read(n) for r, n in zip(roles, names, strict=True)}
     columns = effect.columns(seen, source.shape)
+    if load:
+        ends = [
+            effect.columns({r: x + step for r, x in seen.items()}, source.shape)
+            for step in (ANGLE_STEP_RAD, -ANGLE_STEP_RAD)
+        ]
+        columns = read(load)[:, None] * (ends[0] - ends[1]) / (2.0 * ANGLE_STEP_RAD)
     if source.odd:
         back = {r: x[::-1] if r not in CLOCKS else x[-1] - x[::-1] for r, x in seen.items()}
         columns = 0.5 * (columns - effect.columns(back, source.shape)[::-1])
@@ -362,16 +398,22 @@ def _worked_out(source: Source, names: Sequence[str], run: RunSignals) -> FloatA
         (x for p, x in zip(effect.shape, source.shape, strict=True) if p.name == "order"), None
     )
     if order is not None:
-        angle = next(seen[r] for r in TURNING if r in seen)
-        columns = columns * _passed(run, order * angle)[:, None]
+        angle = next(n for r in TURNING for role, n in zip(roles, names, strict=True) if role == r)
+        passed = _passed(run, angle, order)
+        columns = columns * (passed[run.grid] if source.on_grid else passed)[:, None]
     return columns
 
 
-def _passed(run: RunSignals, phase_rad: FloatArray) -> FloatArray:
+def _passed(run: RunSignals, angle: str, order: float) -> FloatArray:
     """Return the gain that the channels' filter, forwards and backwards, has on a wave."""
-    frequency_hz = np.abs(np.gradient(phase_rad)) * run.rate_hz / (2 * math.pi)
+    key = ("turns", angle)
+    turns_s = run.memo.get(key)
+    if turns_s is None:
+        speed = np.abs(np.gradient(run.channels[angle])) * run.rate_hz
+        turns_s = run.memo[key] = speed / (2.0 * math.pi)
     low_pass = run.low_pass
-    return np.asarray(1.0 / (1.0 + (frequency_hz / low_pass.cutoff_hz) ** (2 * low_pass.order)))
+    relative = order * turns_s / low_pass.cutoff_hz
+    return np.asarray(1.0 / (1.0 + relative ** (2 * low_pass.order)))
 
 
 def _derived(columns: FloatArray, rate_hz: float, order: int) -> FloatArray:

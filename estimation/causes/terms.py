@@ -8,6 +8,7 @@ from estimation.causes.functions import Function
 from estimation.causes.places import Entry
 from estimation.causes.sources import Source
 from estimation.derived import origin_of
+from estimation.effects import effect
 from estimation.model import Estimate, Term
 from estimation.predicted import predicted_of
 
@@ -33,6 +34,13 @@ def term_of(source: Source, equation: Equation) -> Term | None:
     entry = _entry(source, equation.name)
     if entry is None:
         return None
+    if entry.load:
+        return Term(
+            effect("eccentric.load.harmonics"),
+            int(math.copysign(1, entry.gain)),
+            {**dict(source.channels), "load": entry.load},
+            dict(zip(("order",), map(Estimate, source.shape), strict=True)),
+        )
     target = equation.target
     own = {c for _, c in source.channels if target in (c, origin_of(c)[0])}
     channels = {r: predicted_of(c, target) if c in own else c for r, c in source.channels}

@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from estimation.causes.folds import unvaried
 from estimation.causes.functions import Function
 from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
+from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.refit import Errors
 from estimation.causes.refits import Refits
@@ -97,6 +98,7 @@ def answer(
     layout = lay_out(models, timed, sealed.discover)
     timed = [r for r in timed if r.name not in layout.left_out]
     sealed = sealed.without(layout.left_out)
+    layout = with_levels(layout, sealed.discover, numbers)
     add_instruments(layout, sealed.discover)
     on_stage("searching the training runs for what they lack")
     with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
@@ -130,59 +132,82 @@ def answer(
     return Answer(diagnosis, layout, found, tuple(kept), refits, tuple(written))
 
 
+@dataclass(frozen=True)
+class _Opened:
+    """A cause next to the earlier ones, with its errors on the test runs.
+
+    Attributes:
+        acts_in: Run to whether it acts there.
+        before: Equation to its errors without the cause.
+        after: Equation to its errors with it.
+        notes: On runs that decide themselves whether it acts there.
+    """
+
+    acts_in: Mapping[str, bool]
+    before: Mapping[str, Errors]
+    after: Mapping[str, Errors]
+    notes: Sequence[str]
+
+
 def _judged(
     found: Found, held_out: HeldOut, refits: Refits
 ) -> tuple[list[Kept], list[Finding], list[str]]:
     """Return the causes that the test runs confirm, their findings, and notes on the others."""
-    numbers, sealed = refits.numbers, refits.sealed
-    kept: list[Kept] = []
-    findings: list[Finding] = []
-    confirmed, notes = _confirmed(found, held_out, numbers)
+    kept, findings = list[Kept](), list[Finding]()
+    confirmed, notes = _confirmed(found, held_out, refits.numbers)
     for one in confirmed:
-        cause = one.scored.candidate.cause
-        earlier = [k.scored.candidate for k in kept]
-        acts_in, settled = held_out.acts_in(earlier, one.scored.candidate)
-        if settled:
-            uncounted = refits.open | {*settled}
-            counted = one.scored.candidate.acts is not None or uncounted >= {*sealed.confirm}
-            if not counted:
-                refits.open = uncounted
+        candidate = one.scored.candidate
+        opened = _opened(one, kept, held_out, refits)
+        if opened is None:
             notes.append(
-                f"{', '.join(settled)}: the training runs do not show whether {cause.family} acts"
-                " there; "
-                + ("these test runs themselves do." if counted else "not counted in the errors.")
-            )
-        home = cause.place.home
-        entered = dict.fromkeys(e.equation for e in cause.place.enters)
-        known = dict(refits.parts)
-        before = {name: refits.test_errors(name) for name in entered}
-        refits.add(one.scored.candidate, acts_in)
-        after = {name: refits.test_errors(name) for name in entered}
-        if not any(_is_lower(before[name], after[name], numbers) for name in entered):
-            refits.parts = known
-            notes.append(
-                f"{cause.family} ({cause.place.name}) was found in the training runs and does not"
-                " lower the error on the test runs."
+                f"{candidate.cause.family} ({candidate.cause.place.name}) was found in the training"
+                " runs and does not lower the error on the test runs."
             )
             continue
-        finding = named(one, sealed.may_name)
-        findings.append(
-            replace(
-                finding,
-                rmse_before=before[home].rmse,
-                rmse_after=after[home].rmse,
-                runs_improved=sum(
-                    after[home].by_run[n] < x for n, x in before[home].by_run.items()
-                ),
-                runs_total=len(before[home].by_run),
-                runs_affected=tuple(name for name, acts in acts_in.items() if acts),
-            )
-        )
-        part = refits.parts[home][-1]
+        findings.append(_with_errors(named(one, refits.sealed.may_name), opened))
+        part = refits.parts[candidate.cause.place.home][-1]
         kept.append(replace(one, part=part))
+        notes += opened.notes
         if not part.is_written:
-            notes.append(_unwritten(one.scored.candidate))
+            notes.append(_unwritten(candidate))
     return kept, findings, notes
+
+
+def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) -> _Opened | None:
+    """Add a cause to the equations it enters; None, and nothing added, where no error falls."""
+    candidate, sealed = one.scored.candidate, refits.sealed
+    acts_in, settled = held_out.acts_in([k.scored.candidate for k in kept], candidate)
+    parts, uncounted, notes = dict(refits.parts), refits.open, list[str]()
+    if settled:
+        more = refits.open | {*settled}
+        counted = candidate.acts is not None or more >= {*sealed.confirm}
+        if not counted:
+            refits.open = more
+        notes.append(
+            f"{', '.join(settled)}: the training runs do not show whether"
+            f" {candidate.cause.family} acts there; "
+            + ("these test runs themselves do." if counted else "not counted in the errors.")
+        )
+    entered = dict.fromkeys(e.equation for e in candidate.cause.place.enters)
+    before = {name: refits.test_errors(name) for name in entered}
+    refits.add(candidate, acts_in)
+    after = {name: refits.test_errors(name) for name in entered}
+    if any(_is_lower(before[name], after[name], refits.numbers) for name in entered):
+        return _Opened(acts_in, before, after, notes)
+    refits.parts, refits.open = parts, uncounted
+    return None
+
+
+def _with_errors(finding: Finding, opened: _Opened) -> Finding:
+    before, after = opened.before[finding.balance], opened.after[finding.balance]
+    return replace(
+        finding,
+        rmse_before=before.rmse,
+        rmse_after=after.rmse,
+        runs_improved=sum(after.by_run[name] < x for name, x in before.by_run.items()),
+        runs_total=len(before.by_run),
+        runs_affected=tuple(name for name, acts in opened.acts_in.items() if acts),
+    )
 
 
 def _confirmed(found: Found, held_out: HeldOut, numbers: Numbers) -> tuple[list[Kept], list[str]]:

@@ -11,6 +11,7 @@ from estimation.causes.equations import Layout, lay_out
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
+from estimation.causes.levels import with_levels
 from estimation.causes.numbers import Numbers
 from estimation.causes.scoring import Scored, assessed, best_of_each, probabilities
 from estimation.causes.search import Ranking, hypothesis
@@ -143,7 +144,7 @@ def compare(
             )
     named = [*_named(a, A), *_named(b, B)]
     train = [r.name for r in named]
-    layout = lay_out(models, [*named, *_named(on, ON)], train)
+    layout = with_levels(lay_out(models, [*named, *_named(on, ON)], train), train)
     add_instruments(layout, train)
     fitted = layout.select(train)
     is_b = [run.name.startswith(B) for run in fitted.runs]

@@ -22,7 +22,7 @@ class EccentricLoad(Pointwise):
     id = "eccentric.load"
     balances: ClassVar = {"motor": -1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": -1}
     roles: ClassVar = {"output_angle": "spindle_angle_rad", "load": "motor_load_n_m"}
-    amplitudes = (
+    amplitudes: ClassVar[tuple[Parameter, ...]] = (
         Parameter("sine", "target / load", "eccentricity along one axis, of the lever arm"),
         Parameter("cosine", "target / load", "eccentricity along the other"),
     )

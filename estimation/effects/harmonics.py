@@ -6,11 +6,14 @@ import numpy as np
 
 from estimation.effects.effect import Parameter
 
-HARMONIC_AMPLITUDES = tuple(
-    Parameter(f"{wave}_{n}", "target", f"amplitude of the {wave} at {n} times the order")
-    for n in (1, 2, 3)
-    for wave in ("sine", "cosine")
-)
+
+def harmonics_in(unit: str) -> tuple[Parameter, ...]:
+    """Return the amplitudes of the harmonics, in a unit."""
+    return tuple(
+        Parameter(f"{wave}_{n}", unit, f"amplitude of the {wave} at {n} times the order")
+        for n in (1, 2, 3)
+        for wave in ("sine", "cosine")
+    )
 
 
 def harmonics(phase: Any) -> list[Any]:

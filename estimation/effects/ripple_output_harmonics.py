@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from estimation.effects.effect import Parameter
-from estimation.effects.harmonics import HARMONIC_AMPLITUDES, harmonics
+from estimation.effects.harmonics import harmonics, harmonics_in
 from estimation.effects.ripple_output import OutputRipple
 
 
@@ -22,7 +22,7 @@ class OutputHarmonics(OutputRipple):
 
     id = "ripple.output.harmonics"
     family = "ripple.output"
-    amplitudes = HARMONIC_AMPLITUDES
+    amplitudes = harmonics_in("target")
     # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
     shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=31),)
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from estimation.effects.effect import Parameter
-from estimation.effects.harmonics import HARMONIC_AMPLITUDES, harmonics
+from estimation.effects.harmonics import harmonics, harmonics_in
 from estimation.effects.sensor_encoder_inl import EncoderNonlinearity
 
 
@@ -22,7 +22,7 @@ class EncoderHarmonics(EncoderNonlinearity):
 
     id = "sensor.encoder_inl.harmonics"
     family = "sensor.encoder_inl"
-    amplitudes = HARMONIC_AMPLITUDES
+    amplitudes = harmonics_in("target")
     shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=16),)
 
     def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:

@@ -1,4 +1,4 @@
-"""The demonstration: record, fit, screen the residual, diagnose, report.
+"""The demonstration: record, fit, diagnose, report.
 
 The simulated rig contains one effect that the declared model lacks. The campaign uses the whole
 chain: frames from the board, its driver, calibration, one log a run. What the diagnosis is
@@ -12,14 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from estimation import model_file
-from estimation.campaign import Campaign
 from estimation.cross_validation import HeldOutError, held_out_error
 from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import evidence, split
 from estimation.files import write_text_atomic
-from estimation.fitting import fit
-from estimation.model import Model
-from estimation.residual import Structure, largest_structure
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.campaigns.index import DIAGNOSIS
@@ -35,7 +31,7 @@ from rig.output.render import write_report
 from rig.protocols.protocol import load_protocol
 from rig.recording.campaign import Progress, RunResult, open_campaign_folder, record_campaign
 from rig.reports import diagnosis as diagnosis_page
-from rig.reports.first_look import first_look
+from rig.reports.fit import held_out_sentence
 
 PROTOCOL = "diagnosis"
 MODEL = "motor"
@@ -64,24 +60,20 @@ class Demo:
     Attributes:
         folder: Folder of all files, the logs in `logs`.
         report: The diagnosis, one HTML page.
-        first_look: The page of the screening.
         model: File of the model with the added effect.
         ledger: The demonstration's own log of uses of held-out data.
         runs: The recorded runs.
         held_out: Error of the declared model on runs it was not fitted on.
-        structures: Variables that its residual depends on, largest first.
         diagnosis: What the model lacks.
         firmware: Whether the compiled firmware core was in the loop.
     """
 
     folder: Path
     report: Path
-    first_look: Path
     model: Path
     ledger: Path
     runs: tuple[RunResult, ...]
     held_out: HeldOutError
-    structures: tuple[Structure, ...]
     diagnosis: Diagnosis
     firmware: bool
 
@@ -110,12 +102,8 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     campaign = open_campaign(logs)
     # the others are the diagnosis' proof; whoever looks at them first proves nothing with them
     campaign = campaign.select(split(evidence(campaign), seed).discover)
-    fitted = fit(declared, campaign, seed=seed)
     held_out = held_out_error(declared, campaign, FOLDS, seed)
-    structures = largest_structure(fitted, campaign, seed=seed)
-    on_stage(f"screening: {structures[0].sentence()}")
-    look = _first_look(fitted, campaign, structures, held_out, firmware, seed)
-    looked = write_report(folder / "first_look.html", look)
+    on_stage(held_out_sentence(declared, held_out))
     # simulated runs are not evidence about a real rig: they are not in the user's own log
     ledger = folder / "looks.jsonl"
     looks = Ledger(ledger)
@@ -132,12 +120,10 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     return Demo(
         folder,
         report,
-        looked,
         model_path,
         ledger,
         runs,
         held_out,
-        tuple(structures),
         done.diagnosis,
         firmware,
     )
@@ -153,22 +139,3 @@ def _record(
     from rig.simulation.logger import uses_firmware
 
     return runs, uses_firmware(config.simulation)
-
-
-def _first_look(
-    fitted: Model,
-    campaign: Campaign,
-    structures: list[Structure],
-    held_out: HeldOutError,
-    firmware: bool,
-    seed: int,
-) -> str:
-    board = "the compiled firmware core" if firmware else "a plain board without guards"
-    story = (
-        "The simulated rig, with one effect that no model declares, was recorded through"
-        f" {board} and its driver. The declared model {fitted.name!r} was fitted on"
-        f" {len(campaign)} runs; the others are left for the diagnosis to prove itself on. On runs"
-        f" it was not fitted on it errs by {held_out.rmse * 1e3:.2f} mN m rms"
-        f" ({held_out.folds} folds by run, run means removed)."
-    )
-    return first_look(fitted, campaign, structures, story, Provenance.now(seed))

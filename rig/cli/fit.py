@@ -151,7 +151,7 @@ def fit(
     from estimation import model_file
     from rig.machines.recordings import open_recordings
     from rig.output.table import to_rich
-    from rig.reports.first_look import held_out_sentence, parameter_table
+    from rig.reports.fit import held_out_sentence, parameter_table
 
     require_new(out)
     screen = results(json_)

@@ -168,7 +168,6 @@ def bars(
     values: Mapping[str, float],
     unit: str,
     caption: str,
-    line: tuple[str, float] | None = None,
 ) -> Markup:
     """Draw one bar a name.
 
@@ -176,14 +175,10 @@ def bars(
         values: Name to value.
         unit: Name and unit of the values.
         caption: Description of the figure.
-        line: Name and height of a level to compare with, or None.
     """
     figure, (ax,) = _axes(7.2, 2.2)
     with mpl.rc_context(_STYLE):
         ax.bar(range(len(values)), list(values.values()), color=COLOURS[0], width=0.7)
-        if line is not None:
-            ax.axhline(line[1], color=COLOURS[1], linewidth=1.2, label=line[0])
-            _legend_above(ax)
         many = len(values) > 12
         names = [name.replace("_", " ") for name in values]
         ax.set_xticks(range(len(values)), names, rotation=90 if many else 0, fontsize=7)

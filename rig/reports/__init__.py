@@ -1,1 +1,1 @@
-"""Pages on a campaign: its screening, its diagnosis, its adaptation."""
+"""Pages on a campaign: its diagnosis, its adaptation."""

@@ -107,7 +107,7 @@ def test_half_a_record_is_never_there(store, monkeypatch):
     assert list((store.folder / "records").iterdir()) == []
 
 
-def test_the_store_is_in_the_configuration_folder_unless_the_environment_says_otherwise(tmp_path):
+def test_the_store_is_in_the_configuration_folder_unless_the_environment_names_another(tmp_path):
     assert default_folder({"RIG_CALIBRATIONS": str(tmp_path)}) == tmp_path
     assert default_folder({"XDG_CONFIG_HOME": "/c"}).as_posix() == "/c/rig/calibrations"
     assert default_folder({}).parts[-3:] == (".config", "rig", "calibrations")

@@ -26,7 +26,7 @@ MISSING = (
 )
 """Why the emulated board cannot be tried here; empty where it can."""
 SILENT_S = 120.0
-"""An emulator that says nothing for so long has crashed."""
+"""An emulator that is silent for so long has crashed."""
 
 
 class EmulatedBoard:

@@ -38,7 +38,7 @@ def test_one_changed_bit_is_refused(value: int, bit: int) -> None:
         protocol.decode_reply(word.to_bytes(2, "little"))
 
 
-def test_it_asks_at_its_rate_and_reads_the_angle() -> None:
+def test_it_polls_at_its_rate_and_reads_the_angle() -> None:
     fake = Amt21Fake(counts_a_tick=100)
     device = Amt21(SimulatedTransport(fake), rate_hz=100.0)
     assert device.identify().model == "AMT21"

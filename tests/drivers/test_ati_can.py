@@ -130,7 +130,7 @@ def test_a_saturated_gauge_makes_the_whole_wrench_invalid() -> None:
     assert not protocol.is_saturated(np.array([32_766, -32_767, 0, 0, 0, 0], np.int16))
 
 
-def test_the_status_is_said_in_words_and_flags_what_cannot_be_used() -> None:
+def test_the_status_is_reported_in_words_and_flags_what_cannot_be_used() -> None:
     node = AtiCanFake()
     device = AtiCan(SimulatedCanBus([node]))
     device.start()
@@ -173,7 +173,7 @@ def test_the_bias_is_taken_off() -> None:
     device.close()
 
 
-def test_another_calibration_is_used_or_its_absence_said() -> None:
+def test_another_calibration_is_used_or_its_absence_reported() -> None:
     load = np.array([1000, 0, 0, 0, 0, 0])
     device = AtiCan(SimulatedCanBus([AtiCanFake(load=lambda _: load)]), calibration=1)
     device.start()
@@ -202,7 +202,7 @@ def restarted(silent_s: float) -> tuple[AtiCan, AtiCanFake]:
 
 
 @pytest.mark.parametrize(("silent_s", "samples"), [(0.5, 0), (0.0, 200)])
-def test_a_sensor_that_restarts_and_forgets_its_calibration_is_noticed(
+def test_a_sensor_that_restarts_and_loses_its_calibration_is_noticed(
     silent_s: float, samples: int
 ) -> None:
     device, _ = restarted(silent_s)

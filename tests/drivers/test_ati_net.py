@@ -64,7 +64,7 @@ def test_a_calibration_is_refused_unless_whole_and_of_known_units(answer: bytes)
             protocol.decode_calibration(answer[:24])
 
 
-def test_counts_become_si_by_what_the_device_says() -> None:
+def test_counts_become_si_by_the_scale_of_the_device() -> None:
     pounds = Calibration(1, 1, 1000, 500)
     device = AtiNet(
         SimulatedTransport(RdtFake()), lambda: SimulatedTransport(CalibrationFake(pounds))
@@ -97,7 +97,7 @@ def test_a_status_bit_is_that_of_the_manual(row: str) -> None:
     assert protocol.is_data_fault(np.array([1 << 31 | 1 << bit], np.uint32))[0] == (bit != 16)
 
 
-def test_a_status_is_said_in_words_and_flags_its_samples() -> None:
+def test_a_status_is_reported_in_words_and_flags_its_samples() -> None:
     assert protocol.status_words(0) == []
     assert protocol.status_words(0x80010000) == ["a threshold has been crossed"]
     assert protocol.status_words(1 << 31 | 1 << 17 | 1 << 5) == [
@@ -186,7 +186,7 @@ def test_a_stream_that_goes_on_counting_after_a_command_loses_nothing() -> None:
     assert (counters.late, counters.restarts, counters.lost) == (1, 0, 0)
 
 
-def test_a_device_that_is_gone_is_said_at_every_reading_until_it_is_back() -> None:
+def test_a_device_that_is_gone_is_reported_at_every_reading_until_it_is_back() -> None:
     fake = RdtFake()
     device = device_of(fake)
     device.start()

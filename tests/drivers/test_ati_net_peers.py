@@ -132,7 +132,7 @@ def test_a_bias_does_not_end_its_stream(device: AtiNet) -> None:
     assert device.counters["stalls"] == 0
 
 
-def test_its_silence_and_its_end_are_said(sensor: Sensor, device: AtiNet) -> None:
+def test_its_silence_and_its_end_are_reported(sensor: Sensor, device: AtiNet) -> None:
     some(device, 100)
     sensor.say("pause")
     with pytest.raises(LinkTimeoutError, match="fallen silent"):  # noqa: PT012

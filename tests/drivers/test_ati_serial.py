@@ -131,7 +131,7 @@ def test_an_empty_or_impossible_calibration_is_refused() -> None:
     assert (function, reason) == (modbus.WRITE | protocol.FAILED, b"\x02")
 
 
-def test_what_may_differ_can_be_told_otherwise() -> None:
+def test_what_may_differ_can_be_set() -> None:
     fake = AtiSerialFake()
     told = AtiSerial(SimulatedTransport(fake))
     told.start()

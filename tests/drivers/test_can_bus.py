@@ -132,7 +132,7 @@ def test_what_an_interface_raises_becomes_ours_and_stays_the_cause() -> None:
         ("can:slcan:/dev/nothing_here?bitrate=1000000", LinkError, "nothing_here"),
     ],
 )
-def test_a_url_that_opens_nothing_says_why(url: str, error: type[LinkError], words: str) -> None:
+def test_a_url_that_opens_nothing_reports_why(url: str, error: type[LinkError], words: str) -> None:
     with pytest.raises(error, match=words):
         open_can(url)
 

@@ -172,7 +172,7 @@ def test_it_survives_a_fault_and_names_it(name: str, fault: Fault) -> None:
     device.close()
 
 
-def test_what_is_said_of_a_fault_is_declared_for_every_driver() -> None:
+def test_the_words_of_a_fault_are_declared_for_every_driver() -> None:
     assert set(SAID) == set(NAMES)
     for name, said in SAID.items():
         assert set(said) == set(Fault) - {Fault.DISCONNECT}
@@ -183,7 +183,7 @@ def test_what_is_said_of_a_fault_is_declared_for_every_driver() -> None:
 
 
 @pytest.mark.parametrize("name", PLACES)
-def test_a_cut_link_is_said_and_it_can_be_opened_again(name: str) -> None:
+def test_a_cut_link_is_reported_and_it_can_be_opened_again(name: str) -> None:
     faults = Faults()
     device = opened(name, faults)
     device.start()

@@ -59,7 +59,7 @@ def test_a_command_beyond_the_limit_or_no_number_is_refused(armed, factor: float
     device.close()
 
 
-def test_a_host_that_falls_silent_stops_the_motor_and_is_told_so(armed) -> None:
+def test_a_host_that_falls_silent_stops_the_motor_and_reads_why(armed) -> None:
     kind, fake, device, _ = armed
     command = getattr(device, kind.command)
     for _ in range(2):  # armed again, it is as before

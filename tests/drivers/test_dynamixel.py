@@ -149,7 +149,7 @@ def test_a_host_that_reads_slowly_but_steadily_is_heard() -> None:
     device.close()
 
 
-def test_a_hardware_error_is_said_in_words_and_cleared_by_a_restart() -> None:
+def test_a_hardware_error_is_reported_in_words_and_cleared_by_a_restart() -> None:
     fake = DynamixelFake()
     device = armed(fake)
     device.set_current(0.03)
@@ -167,7 +167,7 @@ def test_a_hardware_error_is_said_in_words_and_cleared_by_a_restart() -> None:
     device.close()
 
 
-def test_a_disarm_is_not_believed_while_the_register_says_otherwise() -> None:
+def test_a_disarm_is_not_believed_while_the_register_differs() -> None:
     fake = DynamixelFake()
     device = armed(fake)
     write = fake._write

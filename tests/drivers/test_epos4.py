@@ -75,7 +75,7 @@ def test_a_torque_turns_the_motor_and_the_end_is_powerless() -> None:
         device.read(0.1)
 
 
-def test_what_is_said_to_set_up_and_arm_in_its_order() -> None:
+def test_set_up_and_arm_send_their_messages_in_order() -> None:
     device, bus = armed(Epos4Fake())
     heartbeat = 0x700 + 127
     spoken = [frame for frame in bus.sent if frame.can_id != heartbeat]
@@ -253,7 +253,7 @@ def test_a_stopped_node_is_cleared_too() -> None:
     device.close()
 
 
-def test_a_drive_that_somebody_takes_out_of_operation_is_said_at_the_next_heartbeat() -> None:
+def test_a_drive_that_somebody_takes_out_of_operation_is_reported_at_the_next_heartbeat() -> None:
     node = Epos4Fake()
     device, _ = armed(node)
     device.read(0.1)
@@ -269,7 +269,7 @@ def test_a_drive_that_somebody_takes_out_of_operation_is_said_at_the_next_heartb
     assert node.state is State.SWITCH_ON_DISABLED
 
 
-def test_a_drive_that_restarts_is_said_and_not_commanded_any_more() -> None:
+def test_a_drive_that_restarts_is_reported_and_not_commanded_any_more() -> None:
     node = Epos4Fake()
     device, bus = armed(node)
     device.set_torque(1e-3)
@@ -322,7 +322,7 @@ def test_a_disarm_that_nobody_confirms_is_no_disarm() -> None:
         bus.read(0.0)
 
 
-def test_a_disarm_is_not_believed_while_the_statusword_says_otherwise() -> None:
+def test_a_disarm_is_not_believed_while_the_statusword_differs() -> None:
     node = Epos4Fake()
     device, bus = armed(node)
     # the drive confirms the write of the controlword and does not follow it
@@ -389,7 +389,7 @@ def test_options_that_are_no_drives(options: dict[str, float]) -> None:
         (0x0208, State.FAULT),
     ],
 )
-def test_a_statusword_says_a_state(word: int, state: State) -> None:
+def test_a_statusword_is_a_state(word: int, state: State) -> None:
     assert protocol.state_of(word) is state
 
 

@@ -88,7 +88,9 @@ def test_it_runs_a_torque_and_clears_a_lost_heartbeat(
     assert device.last_error == 0
 
 
-def test_a_drive_whose_process_dies_is_said(drive: subprocess.Popen[str], device: Epos4) -> None:
+def test_a_drive_whose_process_dies_is_reported(
+    drive: subprocess.Popen[str], device: Epos4
+) -> None:
     device.arm()
     samples(device, 10)
     drive.kill()

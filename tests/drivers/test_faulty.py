@@ -1,4 +1,4 @@
-"""Faults around a transport: each does what it says, in the link's own time, repeatably."""
+"""Faults around a transport: each does what its name states, in the link's own time, repeatably."""
 
 import pytest
 from hypothesis import given

@@ -385,7 +385,7 @@ def test_a_host_that_does_not_read_loses_whole_frames_and_gets_their_number(libr
     assert last["sequence"] == 4501
 
 
-def test_a_missing_library_says_what_to_type(tmp_path: Path) -> None:
+def test_a_missing_library_reports_what_to_type(tmp_path: Path) -> None:
     with pytest.raises(FirmwareMissingError, match="make -C firmware"):
         FirmwareBoard(PlainBench(), library=tmp_path / "none.so")
     (tmp_path / "other.so").write_bytes(b"no library")

@@ -143,7 +143,7 @@ def test_a_torque_turns_the_output_and_the_end_is_without_force() -> None:
         device.read(0.1)
 
 
-def test_a_fault_is_said_in_words_and_cleared_by_arming() -> None:
+def test_a_fault_is_reported_in_words_and_cleared_by_arming() -> None:
     fake = MoteusFake()
     device = armed(fake)
     device.read(0.1)
@@ -156,7 +156,7 @@ def test_a_fault_is_said_in_words_and_cleared_by_arming() -> None:
     device.close()
 
 
-def test_a_controller_that_is_stopped_by_somebody_is_said() -> None:
+def test_a_controller_that_is_stopped_by_somebody_is_reported() -> None:
     fake = MoteusFake()
     device = armed(fake)
     fake.receive(protocol.send_line(1, protocol.stop_command()))
@@ -167,7 +167,7 @@ def test_a_controller_that_is_stopped_by_somebody_is_said() -> None:
     device.close()
 
 
-def test_a_disarm_is_not_believed_while_the_mode_says_otherwise() -> None:
+def test_a_disarm_is_not_believed_while_the_mode_differs() -> None:
     fake = MoteusFake()
     device = armed(fake)
     change, fake._change = fake._change, lambda mode: None  # type: ignore[method-assign]

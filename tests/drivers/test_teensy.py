@@ -135,7 +135,7 @@ def test_without_a_word_from_the_host_the_board_makes_itself_safe(make_board: Ma
     logger.close()
 
 
-def test_a_dry_queue_holds_the_last_target_and_says_so(make_board: MakeBoard) -> None:
+def test_a_dry_queue_holds_the_last_target_and_reports_it(make_board: MakeBoard) -> None:
     logger = logger_of(make_board())
     logger.start()
     logger.arm(GAINS, WIDEST)
@@ -291,7 +291,7 @@ def test_disarm_is_not_believed_without_an_answer() -> None:
         cable.read(0.0)
 
 
-def test_disarm_is_not_believed_when_the_board_says_it_is_still_armed() -> None:
+def test_disarm_is_not_believed_when_the_board_reports_that_it_is_armed() -> None:
     cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     logger.arm(GAINS, WIDEST)
 

@@ -1,4 +1,4 @@
-"""A board's counts mean nothing until it has been told where its zeros are: the firmware core."""
+"""A board's counts mean nothing until its zeros are set: the firmware core."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -93,7 +93,7 @@ class RefusingPort:
         type(self).closed = True
 
 
-def test_a_speed_the_adapter_does_not_have_is_said() -> None:
+def test_a_speed_the_adapter_does_not_have_is_reported() -> None:
     register_scheme("refusing", lambda url: SerialTransport(url, RefusingPort()))
     with pytest.raises(LinkError, match="cannot be set to 1250000 bit/s"):
         open_line("refusing:", 1_250_000, "E")

@@ -29,7 +29,7 @@ def test_skips_and_held_channels_are_reported():
     assert not any("skips" in s for s in audit(runs))
 
 
-def test_a_run_that_jumps_is_left_out_and_one_that_skips_or_says_so_is_kept():
+def test_a_run_that_jumps_is_left_out_and_one_that_skips_or_is_flagged_is_kept():
     whole = run()
     time_s = whole.time_s.copy()
     time_s[7000:] += 0.25

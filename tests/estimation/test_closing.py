@@ -17,7 +17,7 @@ def test_closing_samples_are_fast_enough_and_away_from_the_ends():
     assert len(kept) == np.count_nonzero(done["spindle_velocity_rad_s"][inner] >= 0.25)
 
 
-def test_flagged_samples_count_unless_told_otherwise():
+def test_flagged_samples_count_unless_excluded():
     recording = run("a", 0.3, 0.1, seed=1).with_stretch(Stretch(3, 5, Flag.SUSPECT, "test"))
     done = processed(recording, ["motor_current_a"])
     assert len(closing_samples(done, keep_flagged=False)) < len(closing_samples(done))

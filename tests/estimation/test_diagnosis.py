@@ -113,7 +113,7 @@ def test_with_too_few_runs_something_is_missing_but_nothing_is_named():
     assert any("no effect is named" in note for note in found.notes)
 
 
-def test_runs_at_one_load_are_said_not_to_distinguish_what_depends_on_it():
+def test_runs_at_one_load_do_not_distinguish_what_depends_on_it_and_a_note_states_it():
     same = [
         # two, three or four whole periods of the load, so that its mean does not change
         synthetic.run(f"run{k}", (2 + k % 3) / 5.4, 0.1, seed=k, seconds=6.0)
@@ -186,7 +186,7 @@ def test_the_data_hash_follows_the_samples():
     ],
     ids=["too few", "two rigs", "two instruments", "no current", "nan", "no excitation"],
 )
-def test_bad_input_is_told_and_never_named(spoil, message):
+def test_bad_input_is_reported_and_never_named(spoil, message):
     recordings = spoil(runs(spring, count=6, seconds=2.0))
     with pytest.raises((EstimationError, SplitError), match=message):
         diagnosed(recordings)

@@ -1,4 +1,4 @@
-"""Two recorded paths: whole periods stand for runs, and the claim says so."""
+"""Two recorded paths: whole periods stand for runs, and the claim states it."""
 
 import os
 from dataclasses import replace

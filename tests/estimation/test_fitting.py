@@ -15,6 +15,7 @@ from estimation.fitting import fit
 from estimation.model import Model, NotFittedError, Term, predict
 from estimation.model_file import read
 from estimation.recording import Flag, MissingChannelError, Stretch
+from estimation.shape_search import descended
 from estimation.stream import Stream
 from tests.estimation.synthetic import TRUE, campaign, run
 
@@ -89,7 +90,7 @@ def test_collinear_columns_are_named():
         fit(read(Path("linear")), Campaign.of([still]))
 
 
-def test_a_model_says_what_is_missing(motor):
+def test_a_model_reports_what_is_missing(motor):
     recording = run("a", 0.3, 0.1, seed=1)
     with pytest.raises(NotFittedError, match="declared but not fitted"):
         predict(read(Path("motor")), recording)
@@ -127,7 +128,7 @@ def test_live_is_offline_to_rounding_however_the_batches_are_cut(motor, cuts):
     assert np.concatenate(pieces) == pytest.approx(offline, rel=1e-12, abs=1e-15)
 
 
-def test_live_takes_single_samples_and_says_nan_where_an_input_is_lost(motor):
+def test_live_takes_single_samples_and_gives_nan_where_an_input_is_lost(motor):
     recording = run("live", 0.4, 0.1, seed=5, seconds=0.1)
     current = recording["motor_current_a"].copy()
     current[50] = np.nan
@@ -138,3 +139,14 @@ def test_live_takes_single_samples_and_says_nan_where_an_input_is_lost(motor):
     ]
     assert all(part.shape == (1,) for part in live)
     assert np.flatnonzero(np.isnan(np.concatenate(live))).tolist() == [50]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_search_ends_where_the_error_changes_by_less_than_its_rounding(seed: int) -> None:
+    random = np.random.default_rng(seed)
+
+    def error(point):
+        return float(abs(point[0] - 0.3) + 1e-6 * random.normal())
+
+    (found,) = descended(error, [0.5], [1e-8], [(0.0, 1.0)])
+    assert abs(found - 0.5) < 1e-6

@@ -129,12 +129,12 @@ LINEAR = Model("linear", "motor", "proximal_torque_n_m", (Term(effect("motor.tor
 
 
 @pytest.mark.parametrize("counted", [None, "all", "motion", "closing"])
-def test_a_model_file_says_which_samples_count(counted):
+def test_a_model_file_declares_which_samples_count(counted):
     model = replace(LINEAR, counted=counted)
     assert parse(to_toml(model)).counted == counted
 
 
-def test_friction_counts_samples_in_motion_unless_the_file_says_otherwise():
+def test_friction_counts_samples_in_motion_unless_the_file_declares_all():
     terms = (*LINEAR.terms, Term(effect("friction.coulomb"), -1))
     assert replace(LINEAR, terms=terms).samples == "motion"
     assert LINEAR.samples == "all"

@@ -79,7 +79,7 @@ def test_a_model_without_evidence_learns_from_the_first_runs(fitted: Model) -> N
     assert later[-1].since == f"run {FIRST}"
 
 
-def test_a_run_at_rest_says_nothing(fitted: Model) -> None:
+def test_a_run_at_rest_has_no_report(fitted: Model) -> None:
     still = runs(0, 1)[0]
     still = still.with_columns(motor_angle_rad=np.zeros(len(still)))
     assert ResidualWatch(fitted).see(still) is None

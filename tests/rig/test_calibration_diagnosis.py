@@ -1,4 +1,4 @@
-"""What a calibration lacks is told by the same diagnosis as everything else, of each kind."""
+"""What a calibration lacks is found by the same diagnosis as everything else, of each kind."""
 
 import json
 from pathlib import Path
@@ -16,11 +16,6 @@ FEW_RUNS = pytest.mark.xfail(
 )
 NOT_DECLARED = pytest.mark.xfail(
     strict=False, reason="only channels of a declared equation are read, and the other axes are not"
-)
-
-
-SMOOTH_WAVE = pytest.mark.xfail(
-    strict=False, reason="a smooth function of the angle explains more than one harmonic of it"
 )
 
 
@@ -56,8 +51,8 @@ def families(told):
     ("kind", "words", "hidden", "family"),
     [
         ("gearbox", ["--stiffness-only"], "{ gear_backlash = 1.0 }", "transmission.backlash"),
-        pytest.param("encoder", ["--which", "jaw", "--line-only"], "{ jaw_encoder_wave = 1.0 }",
-                     "sensor.encoder_inl", marks=SMOOTH_WAVE),
+        ("encoder", ["--which", "jaw", "--line-only"], "{ jaw_encoder_wave = 1.0 }",
+                     "sensor.encoder_inl"),
         pytest.param("current", [], "{ motor_ripple = 1.0 }", "ripple.motor", marks=FEW_RUNS),
     ],
 )  # fmt: skip
@@ -80,12 +75,12 @@ def test_what_a_parts_calibration_leaves_out_is_named(rig, kind, words, hidden, 
         ("ft", ["--repeats", "3"]),
     ],
 )
-def test_a_calibration_that_lacks_nothing_is_told_nothing(rig, kind, words):
+def test_a_calibration_that_lacks_nothing_has_no_finding(rig, kind, words):
     rig(kind, *words)
     assert families(rig.run("diagnose", "raw", "--json")) == []
 
 
-def test_a_torque_sensor_with_a_kink_is_told_so(rig, monkeypatch):
+def test_a_torque_sensor_with_a_kink_is_named(rig, monkeypatch):
     hang = HandledBench.hang
 
     def kinked(self, sensor, torque_n_m):
@@ -98,7 +93,7 @@ def test_a_torque_sensor_with_a_kink_is_told_so(rig, monkeypatch):
 
 
 @NOT_DECLARED
-def test_a_force_sensor_whose_axes_mix_is_told_so(rig, monkeypatch):
+def test_a_force_sensor_whose_axes_mix_is_named(rig, monkeypatch):
     load = LoadedRdt.load
 
     def mixed(self, tick):
@@ -114,7 +109,7 @@ def test_a_force_sensor_whose_axes_mix_is_told_so(rig, monkeypatch):
     assert told == [("calibration.ft", "sensor.crosstalk")]
 
 
-def test_a_gap_that_was_modelled_is_not_told_again(rig):
+def test_a_gap_that_was_modelled_is_not_found_again(rig):
     (digest,) = rig("gearbox", hidden="{ gear_backlash = 1.0 }")
     assert families(rig.run("cal", "diagnose", digest, "--json")) == []
 

@@ -59,7 +59,7 @@ def test_a_killed_process_is_a_lost_link_and_the_drive_is_reported_as_live() -> 
     assert link.process.poll() is not None
 
 
-def test_a_drive_that_cannot_be_reached_is_said_with_what_to_type() -> None:
+def test_a_drive_that_cannot_be_reached_is_reported_with_what_to_type() -> None:
     settings = load_config(Path("canopen")).changed(
         logger={"url": "can:slcan:/dev/nonesuch?bitrate=1000000"}
     )

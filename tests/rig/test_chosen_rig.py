@@ -76,7 +76,7 @@ def test_the_defaults_have_an_order(home, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("words", ["selftest", "doctor", "stop", "firmware version"])
-def test_a_simulated_session_says_so_first(words, capsys):
+def test_a_simulated_session_reports_that_it_is_simulated_first(words, capsys):
     main([*words.split(), "--sim"])
     assert capsys.readouterr().err.startswith("Simulated rig")
 
@@ -94,7 +94,7 @@ def test_stop_stops_every_configured_rig_and_goes_on_after_a_dead_one(home, caps
     assert "b_unreadable.toml: UNKNOWN" in err
 
 
-def test_stop_without_a_rig_has_stopped_nothing_and_says_so(capsys):
+def test_stop_without_a_rig_has_stopped_nothing_and_reports_it(capsys):
     assert main(["stop"]) == 2
     out, err = capsys.readouterr()
     assert "Nothing was stopped" in err

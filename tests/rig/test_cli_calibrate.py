@@ -259,7 +259,7 @@ def test_a_stopped_session_goes_on_where_it_was(typed):
 @pytest.mark.parametrize(
     "words", [["--masses-g", "50,100"], ["--sensor", "middle"], ["--operator", " "]]
 )
-def test_what_cannot_be_calibrated_is_said_before_the_first_weight(typed, words):
+def test_what_cannot_be_calibrated_is_reported_before_the_first_weight(typed, words):
     code, _, err = typed([], *words)
     assert code == 2
     assert "1/" not in err

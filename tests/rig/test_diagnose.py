@@ -172,7 +172,7 @@ def test_beside_runs_already_seen_only_new_ones_confirm(tmp_path):
     assert ledger.seen(few, split(few, 0, ledger.known(few)))
 
 
-def test_a_damaged_ledger_is_told(tmp_path):
+def test_a_damaged_ledger_is_reported(tmp_path):
     (tmp_path / "looks.jsonl").write_text("nonsense\n")
     first = runs(count=3, seconds=1.0)
     with pytest.raises(LedgerError, match="cannot be read"):
@@ -212,7 +212,7 @@ def test_when_every_clock_jumps_nothing_is_decided(monkeypatch, tmp_path, capsys
     assert "too few to diagnose" in said
 
 
-def test_two_paths_are_diagnosed_by_their_periods_and_the_claim_says_so(monkeypatch, tmp_path):
+def test_two_paths_are_diagnosed_by_their_periods_and_the_claim_reports_it(monkeypatch, tmp_path):
     def periodic(name, seed):
         one = runs(count=1, seconds=24.0, first_seed=seed)[0]
         time_s = one.time_s

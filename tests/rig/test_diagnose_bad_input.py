@@ -1,4 +1,4 @@
-"""What `rig diagnose` says of recordings it can decide nothing of: what, why, and never a name."""
+"""`rig diagnose` of recordings that decide nothing: it reports what and why, and names nothing."""
 
 import io
 import json
@@ -97,7 +97,7 @@ def test_with_few_runs_something_may_be_missing_and_nothing_has_a_name(monkeypat
     assert any("fewer than 5 no effect is named" in note for note in found["notes"])
 
 
-def test_what_never_varies_is_said(monkeypatch, tmp_path):
+def test_what_never_varies_is_reported(monkeypatch, tmp_path):
     held = [
         r.with_columns(load_command_a=np.full(len(r), 0.5))
         for r in runs(spring, count=6, seconds=2.0)
@@ -107,7 +107,7 @@ def test_what_never_varies_is_said(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("what", CASES)
-def test_nothing_is_decided_and_the_reason_is_said(monkeypatch, tmp_path, capsys, what) -> None:
+def test_nothing_is_decided_and_the_reason_is_reported(monkeypatch, tmp_path, capsys, what) -> None:
     spoil, reason = CASES[what]
     recordings = spoil(runs(spring, count=9, seconds=2.0))
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))

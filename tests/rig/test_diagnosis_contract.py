@@ -103,7 +103,7 @@ def test_every_field_is_there_and_no_number_is_undefined(diagnosis: Diagnosis) -
     DiagnosisSchema.model_validate(found)
 
 
-def test_the_published_schema_asks_for_every_field_and_knows_every_family() -> None:
+def test_the_published_schema_requires_every_field_and_lists_every_family() -> None:
     schema = json.loads(json_schema())
     assert set(schema["required"]) == FIELDS
     assert set(schema["$defs"]["Finding"]["required"]) == OF_FINDING

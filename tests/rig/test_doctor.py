@@ -243,7 +243,7 @@ def test_a_build_of_other_sources_is_reported(
     assert any("rig firmware flash" in r for r in firmware.compare(load_config()).remarks)
 
 
-def test_flashing_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flashing_reports_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(UsageError, match="teensy41"):
         firmware.flash("uno")
     monkeypatch.setattr(firmware.shutil, "which", lambda tool: None)

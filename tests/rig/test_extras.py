@@ -1,4 +1,4 @@
-"""A command that needs an extra says which, and how it is installed here."""
+"""A command that needs an extra reports which, and how it is installed here."""
 
 import ast
 import builtins
@@ -44,7 +44,7 @@ def test_the_error_holds_the_command_to_type(words, without_pyarrow, capsys):
 
 
 @pytest.mark.parametrize(("answer", "installed"), [("y\n", True), ("n\n", False), ("\n", False)])
-def test_on_a_terminal_it_asks_before_it_installs(
+def test_on_a_terminal_it_prompts_before_it_installs(
     words, without_pyarrow, capsys, monkeypatch, answer, installed
 ):
     ran = []

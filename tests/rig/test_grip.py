@@ -29,7 +29,7 @@ def test_a_torque_beyond_the_limits_is_refused(torque, capsys):
     assert "cannot be held" in capsys.readouterr().err
 
 
-def test_a_torque_the_load_cannot_give_is_said(capsys):
+def test_a_torque_the_load_cannot_give_is_reported(capsys):
     assert main(["grip", "--torque", "0.3", "--duration", "12"]) == 1
     assert "not reached" in capsys.readouterr().out
 

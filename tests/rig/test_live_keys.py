@@ -1,4 +1,4 @@
-"""Keys of the live display, its recordings, and what it says of calibrations."""
+"""Keys of the live display, its recordings, and what it reports of calibrations."""
 
 import os
 import sys

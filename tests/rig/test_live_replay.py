@@ -192,7 +192,7 @@ def test_command_writes_json_lines(logs, capsys):
     assert err == ""
 
 
-def test_command_writes_plain_lines_and_says_which_run(logs, capsys):
+def test_command_writes_plain_lines_and_reports_which_run(logs, capsys):
     path = logs(recording("00").exclude("runaway"), recording("01"), recording("02"))
     assert command(path, "--plain", "--speed", "0") == 0
     out, err = capsys.readouterr()

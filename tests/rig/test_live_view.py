@@ -116,13 +116,13 @@ def test_limits_say_in_words_when_they_are_near_or_unknown():
     assert "no value, limit 0.600 A" in text
 
 
-def test_colour_only_repeats_what_the_text_says():
+def test_colour_only_repeats_the_text():
     coloured = Console(file=io.StringIO(), width=80, height=24, record=True, force_terminal=True)
     coloured.print(View(snapshot_of(stream()), "rig live", 0.012))
     assert coloured.export_text(styles=False) == render(snapshot_of(stream()))
 
 
-def test_before_the_first_sample_the_display_says_so():
+def test_before_the_first_sample_the_display_reports_it():
     text = render(LiveState((GRIP,)).snapshot())
     assert "no samples yet" in text
     assert "sensor  no value (no samples arriving)" in text

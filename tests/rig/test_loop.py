@@ -1,4 +1,4 @@
-"""`rig loop --sim`: rounds until the name is unique, with the diagnosis standing in where told."""
+"""`rig loop --sim`: rounds until the name is unique, partly with a stand-in for the diagnosis."""
 
 import json
 from dataclasses import replace
@@ -56,7 +56,7 @@ def rounds(folder, budget=Budget(5, 60.0), **options):  # noqa: B008 - frozen
     return list(run_loop(folder, simulated(seed=1), [], budget, first=first, **options))
 
 
-def test_rivals_are_told_apart_by_a_second_campaign_read_with_the_first(tmp_path, diagnosed):
+def test_rivals_are_distinguished_by_a_second_campaign_read_with_the_first(tmp_path, diagnosed):
     diagnosed.answers = [answer("one_of", NEXT), answer("identified")]
     made = rounds(tmp_path)
     assert [r.stopped for r in made] == ["", UNIQUE]
@@ -76,7 +76,7 @@ def test_rivals_are_told_apart_by_a_second_campaign_read_with_the_first(tmp_path
         (answer("one_of", {"name": "by hand", "protocol": None}), NO_RIVALS),
     ],
 )
-def test_a_loop_ends_where_nothing_more_can_be_told(tmp_path, diagnosed, first, why):
+def test_a_loop_ends_where_nothing_more_can_be_distinguished(tmp_path, diagnosed, first, why):
     diagnosed.answers = [first]
     assert [r.stopped for r in rounds(tmp_path)] == [why]
 

@@ -103,7 +103,7 @@ reads = "effort"
 
 
 @pytest.mark.parametrize("constant_n", [0.0, 60.0])
-def test_a_load_that_differs_between_runs_and_is_left_out_is_said(tmp_path, capsys, constant_n):
+def test_a_load_that_differs_between_runs_and_is_left_out_is_reported(tmp_path, capsys, constant_n):
     table = slide_table(tmp_path)
     rows = np.loadtxt(table, delimiter=",", skiprows=1)
     load = constant_n * (np.floor(rows[:, 0] / 3.0) % 3)
@@ -134,7 +134,7 @@ def test_a_column_that_was_not_recorded_is_named(slide, capsys):
     )
 
 
-def test_a_machine_without_any_equation_says_what_is_needed(tmp_path, capsys):
+def test_a_machine_without_any_equation_reports_what_is_needed(tmp_path, capsys):
     file = tmp_path / "bare.toml"
     file.write_text(SLIDE.split("[[sensor]]")[0])
     assert main(["machine", "check", str(file)]) == 1
@@ -143,7 +143,7 @@ def test_a_machine_without_any_equation_says_what_is_needed(tmp_path, capsys):
     assert "Needed: A sensor of position on one of carriage." in printed
 
 
-def test_a_machine_file_is_written_from_options_and_never_asks_without_a_terminal(
+def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_terminal(
     tmp_path, monkeypatch, capsys
 ):
     table = slide_table(tmp_path)

@@ -174,7 +174,7 @@ def test_a_drifting_sensor_is_reported(tmp_path):
     assert "drifted" in read_log(result.path).end.drift_verdict
 
 
-def test_the_command_records_and_says_what_next(tmp_path, capsys):
+def test_the_command_records_and_reports_what_next(tmp_path, capsys):
     protocol = tmp_path / "p.toml"
     protocol.write_text(
         'name = "tiny"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2]\n'

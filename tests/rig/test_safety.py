@@ -66,7 +66,7 @@ CROSSINGS = {
 
 
 @pytest.mark.parametrize("trip", list(CROSSINGS), ids=lambda trip: trip.name)
-def test_a_crossing_ends_the_session_safe_and_says_what_and_how_late(trip):
+def test_a_crossing_ends_the_session_safe_and_reports_what_and_how_late(trip):
     safety, limits = CROSSINGS[trip]
     config = simulated(firmware=True).changed(safety=safety, limits=limits)
     link = transport(config)
@@ -145,7 +145,7 @@ def test_a_second_ctrl_c_does_not_break_into_the_way_out(number):
     assert signal.getsignal(number) is handler
 
 
-def test_a_cut_cable_is_said_as_unknown_and_the_board_makes_itself_safe():
+def test_a_cut_cable_is_reported_as_unknown_and_the_board_makes_itself_safe():
     config = simulated(firmware=True).changed(safety={"watchdog_s": 0.05})
     link = transport(config)
     unsafe = pytest.raises(SafetyTripError, match="did not confirm")

@@ -70,7 +70,7 @@ def test_a_board_whose_watchdog_sleeps_fails(monkeypatch: pytest.MonkeyPatch) ->
     assert "the board goes to its safe state when the host is silent" in failed
 
 
-def test_a_board_that_says_nothing_fails_everything(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_silent_board_fails_everything(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(failing(simulated(), monkeypatch, lambda board, data: b"")) == 6
 
 

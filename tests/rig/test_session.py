@@ -84,7 +84,7 @@ def test_sigterm_and_a_lost_terminal_take_the_way_out_of_ctrl_c(number):
     assert signal.getsignal(number) is before
 
 
-def test_a_crossed_limit_disarms_and_says_which(library):
+def test_a_crossed_limit_disarms_and_reports_which(library):
     config = simulated(firmware=True).changed(limits={"proximal_torque_n_m": 0.05})
     link = transport(config)
     with Session(config, link) as session:

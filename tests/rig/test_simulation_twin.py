@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
+from estimation.causes.verdict import diagnose
+from estimation.diagnosis.split import split
 from estimation.fitting import fit
 from estimation.model import Model, NotFittedError
-from estimation.residual import largest_structure
 from rig.errors import DataError
 from rig.simulation.fitted import DECLARED_PLANT, noise_std, plant_of
 from rig.simulation.parameters import SensorParameters, vary
@@ -96,11 +97,11 @@ def test_the_simulated_nulls_residual_has_the_recordings_size(
     assert again.evidence.rmse == pytest.approx(before.rmse, rel=0.25)
 
 
-def test_the_simulated_nulls_motor_residual_has_no_structure_beyond_chance(
+def test_a_diagnosis_of_the_simulated_null_finds_nothing_in_the_motor(
     fitted: list[Model], twin: Campaign
 ) -> None:
-    again = fit(fitted[0], twin, bootstrap=0)
-    assert not largest_structure(again, twin)[0].stands_out
+    runs = list(twin.evidence)
+    assert diagnose(runs, fitted[:1], split(runs)).findings == ()
 
 
 def test_a_campaign_without_trajectory_or_an_unfitted_model_is_refused(

@@ -49,7 +49,7 @@ def test_a_run_with_flagged_closing_samples_is_left_out_with_the_reason():
     assert any("Run 11 left out: runaway" in note for note in shown.notes(found))
 
 
-def test_what_is_missing_is_said_and_too_little_is_refused():
+def test_what_is_missing_is_reported_and_too_little_is_refused():
     runs = list(campaign())
     bare = [
         type(r)(
@@ -84,7 +84,7 @@ def named(names: list[str]) -> Campaign:
     )
 
 
-def test_the_reference_part_is_picked_and_said(tmp_path, monkeypatch):
+def test_the_reference_part_is_picked_and_reported(tmp_path, monkeypatch):
     opened: list[Path] = []
 
     def opener(path: Path) -> Campaign:

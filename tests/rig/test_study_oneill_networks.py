@@ -135,7 +135,7 @@ def test_rows_are_scored_next_to_the_paper(deep):
 
 
 @torch_only
-def test_the_command_says_what_it_could_not_train(tmp_path, monkeypatch):
+def test_the_command_reports_what_it_could_not_train(tmp_path, monkeypatch):
     monkeypatch.setattr(
         data, "open_reference", lambda path: Source(with_jaw(), "analytic rig", measured=False)
     )

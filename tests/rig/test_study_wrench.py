@@ -53,7 +53,7 @@ def test_the_command_reports_every_family(tmp_path, monkeypatch):
     assert "| thesis | 2.38 | 4.80 | 12.83 | 6.49 | 15.29 | 18.11 |" in out.read_text()
 
 
-def test_wrenches_in_the_tip_frame_are_what_the_body_jacobian_tells():
+def test_wrenches_in_the_tip_frame_are_those_of_the_body_jacobian():
     rng = np.random.default_rng(3)
     motion = contact_motion(rng, 1.0)
     wrench = rng.normal(size=(len(motion), 6))
@@ -65,7 +65,7 @@ def test_wrenches_in_the_tip_frame_are_what_the_body_jacobian_tells():
     assert np.allclose(at_base, at_tip)
 
 
-def test_an_interrupted_study_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+def test_an_interrupted_study_reports_how_to_go_on(tmp_path, monkeypatch, capsys):
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 

@@ -83,7 +83,7 @@ def test_a_file_of_several_balances_is_watched_whole_and_its_first_runs_live(
     assert [m.balance for m in declared_models(path, "gearbox")] == ["gearbox"]
 
 
-def test_a_stream_says_since_when_its_model_no_longer_fits() -> None:
+def test_a_stream_reports_since_when_its_model_no_longer_fits() -> None:
     campaign = synthetic.campaign()
     fitted = fit(model_file.read(Path("motor")), campaign, bootstrap=0)
 

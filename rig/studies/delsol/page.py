@@ -1,7 +1,7 @@
 """The study of del Sol et al. 2014 as tables for any medium, as Markdown, and as figures."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +73,7 @@ def is_false(finding: Named, family: str) -> bool:
 def lead(study: DelSolStudy) -> str:
     """Return how ours compares, on how many arms the hoses were found, and what was false."""
     found = [(f, family) for family, arms in _by_family(study).items() for arm in arms for f in arm]
-    hoses = sum(any(f.joint == 1 and f.family in PULLS for f in arm) for arm in study.named)
+    hoses = sum(map(_has_hoses, study.named))
     false = [f for f, family in found if is_false(f, family)]
     which = sorted({f"{f.family} on joint {f.joint}" for f in false})
     return (
@@ -166,14 +166,22 @@ def _named(study: DelSolStudy) -> TextTable:
     for family, arms in _by_family(study).items():
         own = names_of(family)
         found = [f for arm in arms for f in arm]
-        right = sum(not {f.family, *f.alternatives}.isdisjoint(own) for f in found)
-        hoses = sum(f.joint == 1 and f.family in PULLS for f in found)
+        right = sum(len({f.joint for f in arm if _names(f, own)}) for arm in arms)
+        hoses = sum(_has_hoses(arm) for arm in arms)
         false = Counter(f.family for f in found if is_false(f, family))
         count = f"{right} of {JOINTS * len(arms)}" if own else "no right name"
         wrong = ", ".join(f"{name} {count}" for name, count in false.most_common())
         rows.append([family, count, f"{hoses} of {len(arms)}", wrong])
     header = ["hidden friction", "joints named right", "hoses named", "false names"]
     return TextTable(f"Effects identified, {len(study.named)} arms", header, rows, NAMED_NOTE)
+
+
+def _names(finding: Named, families: Collection[str]) -> bool:
+    return not {finding.family, *finding.alternatives}.isdisjoint(families)
+
+
+def _has_hoses(arm: Sequence[Named]) -> bool:
+    return any(f.joint == 1 and f.family in PULLS for f in arm)
 
 
 def _near(found: FloatArray, paper: tuple[float, ...]) -> list[str]:

@@ -65,12 +65,15 @@ def gearbox() -> Model:
     return model_file.read(Path("gearbox"))
 
 
-def geared(slow: float = 0.0, bend: float = 0.0, runs: int = 12, seed: int = 0) -> list[Recording]:
+def geared(
+    slow: float = 0.0, bend: float = 0.0, creep: float = 0.0, runs: int = 12, seed: int = 0
+) -> list[Recording]:
     """Return runs of motor and gearbox against a load of both signs that moves in steps.
 
     Args:
         slow: Compliance that acts late, by .6 s, over the gear's own.
         bend: Gain of the torque's reading that grows with its size, at the largest load.
+        creep: Share of the torque's reading that comes slowly, over .5 s.
         runs: How many.
         seed: Of the noise.
     """
@@ -85,12 +88,62 @@ def geared(slow: float = 0.0, bend: float = 0.0, runs: int = 12, seed: int = 0) 
         lost = 2e-5 * np.gradient(speed, one.time_s) + 1e-4 * speed + 0.02 * np.tanh(speed / 2.0)
         twist = (load + slow * (lag - load)) / 50.0
         reading = load + bend * load * np.abs(load) / 0.12 + random.normal(0, 1e-4, len(load))
+        reading = reading + creep * (_lagging(load, 0.5) - load)
         columns = {
             "motor_current_a": (load + lost) / 1.2 + random.normal(0, 2e-3, len(load)),
             "proximal_torque_n_m": reading,
             "spindle_angle_rad": motor_angle / 35.0 - twist + random.normal(0, 1e-5, len(load)),
         }
         out.append(one.with_columns(**columns))
+    return out
+
+
+def cable() -> list[Model]:
+    """Return the shipped equations of the cable: its torque, and what it stretches."""
+    return [model_file.read(Path(name)) for name in ("cable", "stretch")]
+
+
+RATIO = 1.2
+"""Jaw angle per spindle angle of `cabled`."""
+
+
+def cabled(
+    wave: float = 0.0, *, held: bool = False, runs: int = 12, seed: int = 0
+) -> list[Recording]:
+    """Return runs of a cable between spindle and jaw.
+
+    Args:
+        wave: Change of the pulley's lever arm over its turn, seven times a turn.
+        held: Whether the load hardly changes within each run.
+        runs: How many.
+        seed: Of the motion and the noise.
+    """
+    random = np.random.default_rng(seed)
+    out = []
+    for k in range(runs):
+        time = np.arange(int(RATE_HZ * SECONDS)) / RATE_HZ
+        waves = [(0.2 + 0.1 * (k % 4) + 0.2 * m, random.uniform(0, 2 * np.pi)) for m in range(3)]
+        spindle = 0.6 * sum(
+            np.sin(2 * np.pi * f * time + p) / (m + 1) for m, (f, p) in enumerate(waves)
+        )
+        speed = np.gradient(spindle, time)
+        load = (
+            0.04 * (1 + k % 3) * (1 + (0.01 if held else 0.5) * np.sin(2 * np.pi * 0.31 * time + k))
+        )
+        phase = 7.0 * spindle + 0.4
+        lever = RATIO + wave * (np.cos(phase) + 0.4 * np.cos(2 * phase))
+        travel = RATIO * spindle + wave / 7.0 * (np.sin(phase) + 0.2 * np.sin(2 * phase))
+        lost = 1e-4 * np.gradient(speed, time) + 1e-4 * speed + 0.004 * np.tanh(speed / 0.06)
+        columns = {
+            "motor_angle_rad": 35.0 * spindle,
+            "spindle_angle_rad": spindle,
+            "jaw_angle_rad": 1.3 + travel - load / 20.0 + random.normal(0, 1e-4, len(time)),
+            "proximal_torque_n_m": lever * load + lost + random.normal(0, 2e-4, len(time)),
+            "distal_torque_n_m": load + random.normal(0, 2e-4, len(time)),
+        }
+        conditions = {"load_command_a": 0.1 * (1 + k % 3)}
+        start = int(1e9 * 20 * k) + 1
+        out.append(Recording(f"{k:02d}", time, columns, conditions=conditions, started_at_ns=start))
     return out
 
 

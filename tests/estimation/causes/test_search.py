@@ -11,14 +11,23 @@ from estimation.causes.equations import lay_out
 from estimation.causes.findings import family_probabilities
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
+from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.places import places_of
 from estimation.causes.search import Found, search
 from estimation.causes.sources import sources_at
-from estimation.causes.verdict import diagnose
+from estimation.causes.verdict import answer, diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import FloatArray, Recording
-from tests.estimation.causes.synthetic import gearbox, geared, motor, recordings
+from tests.estimation.causes.synthetic import (
+    RATIO,
+    cable,
+    cabled,
+    gearbox,
+    geared,
+    motor,
+    recordings,
+)
 
 
 def _asymmetric(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArray:
@@ -113,6 +122,65 @@ def test_a_torque_sensor_with_a_gain_that_grows_to_both_sides_is_identified() ->
     runs = geared(bend=0.1)
     (finding,) = diagnose(runs, [motor(), gearbox()], split(runs)).findings
     assert finding.family == "sensor.gain_nonlinear"
+
+
+def test_a_torque_sensor_with_a_small_slow_share_creeps_and_is_not_late() -> None:
+    runs = geared(creep=0.1)
+    (finding,) = diagnose(runs, [motor(), gearbox()], split(runs)).findings
+    assert finding.family == "sensor.creep"
+
+
+def test_a_pulley_that_is_not_round_is_one_cause_in_the_torque_and_in_the_travel() -> None:
+    runs = cabled(wave=0.05)
+    answer = diagnose(runs, cable(), split(runs))
+    (finding,) = answer.findings
+    assert (finding.family, finding.verdict) == ("eccentric.load", "identified")
+    assert all(e.after < 0.5 * e.before for e in answer.errors.values())
+
+
+def test_a_pulley_in_a_model_file_holds_in_both_equations() -> None:
+    runs = cabled(wave=0.05)
+    written = answer(runs, cable(), split(runs)).models
+    torque, travel = (m.terms[-1] for m in written)
+    assert (torque.effect.id, travel.effect.id) == (
+        "eccentric.load.harmonics",
+        "eccentric.load.pulley",
+    )
+    sine, cosine = (travel.values[f"{wave}_1"].value for wave in ("sine", "cosine"))
+    lever_sine, lever_cosine = (torque.values[f"{wave}_1"].value for wave in ("sine", "cosine"))
+    order = travel.values["order"].value
+    assert (order * sine, -order * cosine) == pytest.approx((lever_cosine, lever_sine), abs=0.01)
+
+
+def test_a_load_that_is_held_in_each_run_has_its_ratio_from_the_runs_means() -> None:
+    runs = cabled(held=True)
+    names = [run.name for run in runs]
+    within = lay_out(cable(), runs, names)
+    layout = with_levels(within, names)
+    ratio = layout.equations["cable"].channels["distal_torque_n_m"]
+    assert ratio == pytest.approx(RATIO, rel=0.01)
+    assert within.equations["cable"].channels["distal_torque_n_m"] < 0.98 * RATIO
+
+
+def test_zeros_that_scatter_between_runs_leave_a_ratio_as_it_was_within_runs() -> None:
+    random = np.random.default_rng(4)
+    runs = [
+        replace(
+            run,
+            columns={
+                **run.columns,
+                "proximal_torque_n_m": run.columns["proximal_torque_n_m"] + random.normal(0, 0.5),
+            },
+        )
+        for run in cabled()
+    ]
+    names = [run.name for run in runs]
+    within = lay_out(cable(), runs, names)
+    before, after = (
+        layout.equations["cable"].channels["distal_torque_n_m"]
+        for layout in (within, with_levels(within, names))
+    )
+    assert after == pytest.approx(before, rel=1e-3)
 
 
 def test_friction_that_jumps_at_random_times_is_found_without_a_name() -> None:

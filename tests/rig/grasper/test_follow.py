@@ -102,7 +102,7 @@ def test_the_firmware_process_follows_in_real_time(library, capsys):
     assert read_log(Path(told["log"])).end.clean
 
 
-def test_a_master_that_asks_for_too_much_trips_the_grasper(link, capsys):
+def test_a_master_that_requests_too_much_trips_the_grasper(link, capsys):
     code = main(["grasper", "follow", "--sim", "--duration", "6", "--scale", "1"])
     assert code == ExitCode.SAFETY
     assert "force" in capsys.readouterr().err

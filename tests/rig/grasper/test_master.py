@@ -1,4 +1,4 @@
-"""The master's potentiometers: counts to joints, as a configuration says, and what they refuse."""
+"""The master's potentiometers: counts to joints, by the configuration, and what they refuse."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def test_zero_and_turn_of_each_potentiometer_are_the_configurations():
     np.testing.assert_allclose(chief.joint_rad([2100, 2148, 2000]), [0.1, -0.1, -0.2])
 
 
-def test_a_turn_of_300_degrees_is_taken_where_nothing_is_said():
+def test_a_turn_of_300_degrees_is_the_default():
     assert np.degrees(master_of(configured()).joint_rad([4094, 2048, 1])).tolist() == (
         pytest.approx([149.89, 0.0, -149.96], abs=0.01)
     )

@@ -110,7 +110,7 @@ def test_the_arms_rate_is_that_of_its_own_velocities(tmp_path, rate_hz):
     assert slope == pytest.approx(1, abs=0.02)
 
 
-def test_an_arm_that_does_not_move_has_the_formats_rate_and_says_so(tmp_path):
+def test_an_arm_that_does_not_move_has_the_formats_rate_and_reports_it(tmp_path):
     def still(rows):
         rows[:] = np.random.default_rng(1).normal(size=rows.shape)
 

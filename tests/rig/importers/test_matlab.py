@@ -93,7 +93,7 @@ def test_names_that_cannot_be_understood_are_listed(save, variables, message):
 
 
 @pytest.mark.parametrize("header", [b"MATLAB 7.3 MAT-file, Platform: GLNXA64", b"MATLAB 7.0"])
-def test_version_7_3_says_how_to_save_again(tmp_path, header):
+def test_version_7_3_reports_how_to_save_again(tmp_path, header):
     path = tmp_path / "run.mat"
     path.write_bytes(header.ljust(512) + b"\x89HDF\r\n\x1a\n")
     with pytest.raises(DataError, match=r"version 7\.3.*'-v7'"):

@@ -151,7 +151,7 @@ def test_the_folder_wins_over_the_header(load):
     assert "names tool 4, lot N10150901 729; the folder names tool 5 and wins" in recording.notes
 
 
-def test_a_folder_without_a_known_name_is_said_to_be_one(load):
+def test_a_folder_without_a_known_name_is_reported_as_one(load):
     recording = load(folder="bench")
     assert recording.instrument.serial == "tool 4"
     assert recording.instrument.side == "left"  # from the header

@@ -1,4 +1,4 @@
-"""What check says of a log, and what repair saves of a damaged one."""
+"""What `check` reports of a log, and what `repair` saves of a damaged one."""
 
 import hashlib
 

@@ -118,7 +118,7 @@ def test_check_names_the_runs_of_a_campaign_that_are_missing(rig, tmp_path):
     assert out.splitlines()[-1].startswith("1 of 2 runs complete")
 
 
-def test_repair_says_what_was_saved_and_lost(rig, log):
+def test_repair_reports_what_was_saved_and_lost(rig, log):
     assert "not damaged" in rig("repair", log)[1]
     log.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
     code, out, _ = rig("repair", log, "--json")

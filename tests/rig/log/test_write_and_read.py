@@ -146,7 +146,7 @@ def test_while_recording_the_file_is_called_part_and_a_clean_close_renames_it(tm
     assert [item.name for item in tmp_path.iterdir()] == ["a.mcap"]
 
 
-def test_an_exception_closes_the_log_and_says_why_it_is_not_clean(tmp_path):
+def test_an_exception_closes_the_log_and_reports_why_it_is_not_clean(tmp_path):
     path = tmp_path / "a.mcap"
 
     def record():
