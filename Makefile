@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: setup demo demo-real test test-unit test-long lint site bench measure results mutants mutants-core soak fuzz hunt figures firmware firmware-arm firmware-teensy clean
+.PHONY: setup demo demo-real test test-unit test-long lint site bench measure results mutants mutants-core proofs soak fuzz hunt figures firmware firmware-arm firmware-teensy clean
 
 # what users run; nothing in it needs a compiler. A command that needs more says so and offers it.
 $(VENV)/.installed: pyproject.toml
@@ -103,8 +103,21 @@ MUTANTS ?=
 mutants: $(VENV)/.developing
 	$(BIN)/python -m benchmarks.mutants $(MUTANTS)
 
+# decides the theorems on the firmware's core for all values; five minutes. angr has its own environment, since it
+# pins much of what it needs
+PROOFS := .venv-proofs
+$(PROOFS)/.installed:
+	@echo "setup: angr, into $(PROOFS); half a minute, once"
+	@$(PYTHON) -m venv $(PROOFS)
+	@$(PROOFS)/bin/pip install --quiet --disable-pip-version-check \
+	    'angr==9.2.213' 'bitstring<5' 'pycparser==3.0'
+	@touch $@
+
+proofs: $(VENV)/.developing $(PROOFS)/.installed
+	$(BIN)/python -m benchmarks.core_proofs --python $(PROOFS)/bin/python
+
 # damages the firmware's core in 200 places; goes on where it stopped; an hour
-mutants-core: $(VENV)/.developing firmware
+mutants-core: $(VENV)/.developing $(PROOFS)/.installed firmware
 	$(BIN)/python -m benchmarks.core_mutants $(MUTANTS)
 
 figures: $(VENV)/.developing

@@ -5,8 +5,9 @@
 Each mutant is one change of one line of `firmware/core`: a comparison, a logical operator, a sign,
 a constant, a result, or a statement left out. `--count` of them are drawn over all files by a fixed
 seed. Every mutant is held against the unit tests (`firmware/tests/core_test.cpp`) and against
-random sequences (`proofs/hunt.cpp`); one that passes both against the contract tests in Python, and
-one that passes those too against every small input (`proofs/small.cpp`). A mutant that does not
+random sequences (`proofs/hunt.cpp`); one that passes both against the theorems on its file
+(`benchmarks.core_proofs`), then against the contract tests in Python, and one that passes those too
+against every small input (`proofs/small.cpp`). A mutant that does not
 compile does not count. What was found is kept in `build/core_mutants.json` for this core; the
 command goes on where it stopped, tries what passed a test again where that test was changed since,
 and writes `docs/results/core-mutants.md`.
@@ -28,6 +29,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.core_proofs import build, decide
 from benchmarks.hunt import FIRMWARE, write_settings
 from estimation.files import write_text_atomic
 from rig.bench.firmware import source_hash
@@ -38,6 +40,21 @@ STATE = Path("build/core_mutants.json")
 PAGE = Path("docs/results/core-mutants.md")
 SEED = 0
 LONGEST_S = 120.0
+LONGEST_PROOF_S = 600.0
+PROOFS_PYTHON = ROOT / ".venv-proofs" / "bin" / "python"
+"""The interpreter that `make proofs` installs angr into."""
+THEOREMS = {
+    "board.hpp": ("board_tick", "board_command"),
+    "control.hpp": ("command_limit",),
+    "framing.hpp": ("crc_step", "receiver_byte", "cobs_round_trip", "cobs_anything"),
+    "limits.hpp": ("limits_within",),
+    "motor_guard.hpp": ("heat_limit", "heat_step"),
+    "profile_reference.hpp": ("setpoint_allowed", "levels_trip"),
+    "session.hpp": ("sequence_window", "board_command"),
+    "setpoint_queue.hpp": ("queue_step",),
+    "watchdog.hpp": ("watchdog_steps",),
+}
+"""File of the core to the theorems on it."""
 CONTRACTS = ("test_guards.py", "test_sessions.py", "test_teensy_reference.py")
 RULES = (
     ("<=", "<"),
@@ -178,6 +195,24 @@ def _unit(firmware: Path, settings: Path) -> bool | None:
     return None if program is None else not _passes(program)
 
 
+def _proofs(firmware: Path, settings: Path) -> bool:
+    """Whether a theorem on the changed file can be broken."""
+    changed = [f for f in THEOREMS if (firmware / "core" / f).read_text() != _sound(f)]
+    if not changed:
+        return False
+    program = build(firmware)
+    if program is None:
+        return True
+    return any(
+        decide(program, name, str(PROOFS_PYTHON), LONGEST_PROOF_S).broken
+        for name in THEOREMS[changed[0]]
+    )
+
+
+def _sound(file: str) -> str:
+    return (FIRMWARE / "core" / file).read_text()
+
+
 def _small(firmware: Path, settings: Path) -> bool:
     program = _built(firmware, "proofs/small.cpp", "-O1")
     return program is None or not _passes(program, settings, "3")
@@ -246,11 +281,12 @@ def _contract(firmware: Path, settings: Path) -> bool:
 TESTS: dict[str, Callable[[Path, Path], bool | None]] = {
     "unit": _unit,
     "hunt": _hunt,
+    "proofs": _proofs,
     "contract": _contract,
     "small": _small,
 }
 """What a mutant is held against, in order."""
-LATER = ("contract", "small")
+LATER = ("proofs", "contract", "small")
 """Tests of a mutant that no test before them noticed."""
 
 
@@ -259,6 +295,10 @@ def forget_changed(state: dict[str, Any]) -> dict[str, str]:
     sources = {
         "unit": [*(FIRMWARE / "tests").glob("*.*"), FIRMWARE / "proofs" / "world.hpp"],
         "hunt": [FIRMWARE / "proofs" / name for name in ("hunt.cpp", "world.hpp")],
+        "proofs": [
+            *(FIRMWARE / "proofs").glob("symbolic*"),
+            FIRMWARE / "proofs" / "any_profile.hpp",
+        ],
         "contract": [ROOT / "tests" / "drivers" / name for name in CONTRACTS],
         "small": [FIRMWARE / "proofs" / name for name in ("small.cpp", "world.hpp")],
     }
@@ -292,7 +332,8 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
         "",
         "Written by `make mutants-core`, which goes on where it stopped. Each mutant is one change",
         "of one line of `firmware/core`, drawn by a fixed seed. Unit tests and random sequences",
-        "see every mutant, the contract tests those that passed both, every small input the rest.",
+        "see every mutant, the theorems on its file those that passed both, the contract tests",
+        "what passed these, every small input the rest.",
         "",
         f"{len(tried)} mutants tried so far, {noticed} noticed ({noticed / total:.0%}),"
         f" {len(alike)} equivalent; {len(results) - len(tried)} did not compile.",
@@ -304,6 +345,7 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
     names = {
         "unit": "unit tests in C++",
         "hunt": "random sequences",
+        "proofs": "theorems for all values",
         "contract": "contract tests in Python",
         "small": "every small input",
     }
@@ -327,6 +369,8 @@ def main() -> int:
     parser.add_argument("--tests", nargs="+", choices=list(TESTS), default=list(TESTS))
     parser.add_argument("--list", action="store_true", help="name them and try none")
     options = parser.parse_args()
+    if "proofs" in options.tests and not PROOFS_PYTHON.exists():
+        parser.error("no angr: make proofs installs it; or --tests unit hunt contract small")
     mutants = drawn(options.count)
     if options.list:
         sys.stdout.write("".join(f"{mutant.name}\n" for mutant in mutants))
@@ -340,6 +384,7 @@ def main() -> int:
         folder = Path(name) / "firmware"
         for part in ("core", "boards", "host", "proofs", "tests"):
             shutil.copytree(FIRMWARE / part, folder / part)
+        shutil.copy(FIRMWARE / "Makefile", folder)
         write_settings(folder / "settings.bin")
         prepare(folder)
         for mutant in mutants:

@@ -100,6 +100,12 @@ PAGES = (
     ),
     Page("core-mutants", "python -m benchmarks.core_mutants", _CORE, 60),
     Page(
+        "core-proofs",
+        "python -m benchmarks.core_proofs --python .venv-proofs/bin/python",
+        f"firmware/proofs {_CORE}",
+        6,
+    ),
+    Page(
         "delsol",
         "rig study delsol --seeds 1 --state {state} --out docs/results/delsol.md"
         " --figures docs/figures",
