@@ -4,13 +4,12 @@
 
 Each mutant is one change of one line of `firmware/core`: a comparison, a logical operator, a sign,
 a constant, a result, or a statement left out. `--count` of them are drawn over all files by a fixed
-seed. Every mutant is held against the unit tests (`firmware/tests/core_test.cpp`) and against
-random sequences (`proofs/hunt.cpp`); one that passes both against the theorems on its file
-(`benchmarks.core_proofs`), then against the contract tests in Python, and one that passes those too
-against every small input (`proofs/small.cpp`). A mutant that does not
-compile does not count. What was found is kept in `build/core_mutants.json` for this core; the
-command goes on where it stopped, tries what passed a test again where that test was changed since,
-and writes `docs/results/core-mutants.md`.
+seed. Every mutant is held against the unit tests (`firmware/tests/core_test.cpp`), random sequences
+(`proofs/hunt.cpp`), the contract tests in Python and the theorems on its file
+(`benchmarks.core_proofs`); one that passes all of them against every small input
+(`proofs/small.cpp`). A mutant that does not compile does not count. What was found is kept in
+`build/core_mutants.json` for this core; the command goes on where it stopped, tries what passed a
+test again where that test was changed since, and writes `docs/results/core-mutants.md`.
 """
 
 import argparse
@@ -72,22 +71,44 @@ RULES = (
     ("0", "1"),
 )
 EQUIVALENT = {
-    "std::uint32_t sequence_ = 0;": "a board sends samples from a start on, which sets it to 0",
-    "return {{0, 0, 0, 0, kFullScaleE4}": "of a board's own gains only the largest command is read",
-    "std::int64_t far_ticks_ = 0;": "the first target is within its window, so a tick sets it to 0",
-    "std::size_t first_ = 0;": "a queue may begin anywhere in its ring, and an app fills its buffer"
-    " before it reads it",
-    "const bool good = length_ > 0": "a frame of one byte has no checksum",
-    "std::size_t used_ = 0;": "each arming clears the queue",
-    "std::int64_t still_mean_ = 0;": "the first tick sets it",
-    "std::int32_t forward = 0;": "each arming sets it, and without a torque it is not read",
-    "std::int32_t second_per_turn = 0;": "each arming sets it",
-    "std::int32_t twist_e6 = 0;": "each arming sets it",
-    "std::int32_t target = 0;": "a setpoint is read before it is followed",
-    "std::uint32_t offers_ = 0;": "each start sets it",
-    "double limit = 0;": "gains are read before they are used",
+    "app.hpp: first_ = last_ = 0; -> first_ = last_ = 1;": "bytes may begin anywhere in the buffer",
+    "board.hpp: session_.end();": "a session counts only while the board is armed",
+    "board.hpp: std::uint32_t sequence_ = 0;": "the start of a stream sets it",
+    "board.hpp: std::size_t staged_count_ = 0;": "each block sets it",
+    "board.hpp: std::uint32_t boot_ = 0;": "each start sets it",
+    "control.hpp: double limit = 0;": "gains are read before they are used",
+    "control.hpp: if (value < -gains_.limit)": "a command at the limit is the limit",
+    "encoder_pair.hpp: std::int32_t second_per_turn = 0;": "each arming sets it",
+    "encoder_pair.hpp: std::int32_t twist_e6 = 0;": "each arming sets it",
+    "encoder_pair.hpp: if (step < -kFastest)": "the fastest step is the fastest",
+    "encoder_pair.hpp: std::int64_t least_ = 0;": "the first tick sets it",
+    "end_probe.hpp: std::int32_t command_e4 = 0;": "each arming sets it",
+    "framing.hpp: const bool good = length_ > 0": "a frame of one byte has no checksum",
+    "framing.hpp: std::size_t first_ = 0;": "bytes may begin anywhere in the ring",
+    "loop_guard.hpp: std::int64_t far_ticks_ = 0;": "the first target is within its window",
+    "loop_guard.hpp: std::int64_t still_mean_ = 0;": "the first tick sets it",
+    "loop_guard.hpp: std::int64_t last_motor_ = 0;": "the first tick sets it",
+    "loop_guard.hpp: std::int64_t anchor_current_ = 0;": "the first tick sets it",
+    "motor_guard.hpp: heat_ = heat_ < 0 ? 0 : least(heat_, kHottest);"
+    " -> heat_ = heat_ < 1 ?": "the least whole number above 0 is 1",
+    "profile_reference.hpp: return {{0, 0, 0, 0, kFullScaleE4}": "of a board's own gains only the"
+    " largest command is read",
+    "profile_reference.hpp: std::int32_t target = 0;": "a setpoint is read before it is followed",
+    "protocol.hpp: if (value < low)": "a value at the end is the end",
+    "protocol.hpp: if (value < INT32_MIN)": "a value at the end is the end",
+    "rest_guard.hpp: std::int32_t forward = 0;": "each arming sets it",
+    "rest_guard.hpp: std::int32_t torque_e3 = 0;": "each arming sets it",
+    "rest_guard.hpp: std::int64_t slow_unfound_ = 0;": "the first tick sets it",
+    "rest_guard.hpp: const std::int64_t turned = primed_ ? std::int64_t{counts[0]} - still_at_[0]"
+    " : 0; -> const std::int64_t turned = primed_ ? std::int64_t{counts[0]} - still_at_[0]"
+    " : 1;": "one count is no motion",
+    "session.hpp: std::uint32_t boot_ = 0;": "each start sets it",
+    "session.hpp: std::uint32_t offers_ = 0;": "each start sets it",
+    "session.hpp: std::uint32_t number_ = 0;": "each arming sets it",
+    "setpoint_queue.hpp: std::size_t first_ = 0;": "a queue may begin anywhere in its ring",
+    "setpoint_queue.hpp: std::size_t used_ = 0;": "each arming clears the queue",
 }
-"""Beginnings of lines whose change no input can show, and why."""
+"""Beginnings of changes that no input can show, behind their file, and why."""
 _STATEMENT = re.compile(r"\s+[\w.\[\]>()*-]+(\s*[-+*|&]?=\s|\(|\+\+|--).*;(\s*//.*)?")
 _NO_CODE = re.compile(r"\s*(//|#|\"|static_assert|using|template|constexpr char|namespace|\}|$)")
 
@@ -166,9 +187,9 @@ def killers_of(
     lines[mutant.line - 1] = mutant.after
     source.write_text("\n".join(lines) + "\n")
     try:
-        for test in lacking(known, tests):
+        for test in lacking(mutant.name, known, tests):
             if test in LATER and any(known.values()):
-                break
+                break  # noticed just now
             notices = TESTS[test](folder, folder / "settings.bin")
             if notices is None:
                 return None
@@ -178,10 +199,13 @@ def killers_of(
     return known
 
 
-def lacking(known: dict[str, bool], tests: list[str]) -> list[str]:
+def lacking(name: str, known: dict[str, bool], tests: list[str]) -> list[str]:
     """Return the tests that a mutant is still to be held against."""
-    noticed = any(known.values())
-    return [t for t in TESTS if t in tests and t not in known and not (t in LATER and noticed)]
+    settled = any(known.values()) or any(_is(change, name) for change in EQUIVALENT)
+    without = set(LATER) if settled else set[str]()
+    if name.partition(":")[0] not in THEOREMS:
+        without.add("proofs")
+    return [t for t in TESTS if t in tests and t not in known and t not in without]
 
 
 def _hunt(firmware: Path, settings: Path) -> bool | None:
@@ -281,12 +305,12 @@ def _contract(firmware: Path, settings: Path) -> bool:
 TESTS: dict[str, Callable[[Path, Path], bool | None]] = {
     "unit": _unit,
     "hunt": _hunt,
-    "proofs": _proofs,
     "contract": _contract,
+    "proofs": _proofs,
     "small": _small,
 }
 """What a mutant is held against, in order."""
-LATER = ("proofs", "contract", "small")
+LATER = ("small",)
 """Tests of a mutant that no test before them noticed."""
 
 
@@ -314,6 +338,11 @@ def forget_changed(state: dict[str, Any]) -> dict[str, str]:
     return sums
 
 
+def _is(change: str, name: str) -> bool:
+    """Whether a change of `EQUIVALENT` is the mutant of this name."""
+    return re.sub(r":\d+:", ":", name, count=1).startswith(change)
+
+
 def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
     """Return the page of which tests noticed which mutants."""
     tried = {name: found for name, found in results.items() if found is not None}
@@ -321,9 +350,9 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
     count = Counter(test for tests in killed.values() for test in tests)
     alone = Counter(tests[0] for tests in killed.values() if len(tests) == 1)
     unseen = [name for name, tests in killed.items() if not tests]
-    alike = {n: why for n in unseen for line, why in EQUIVALENT.items() if f": {line}" in n}
+    alike = {n: why for n in unseen for change, why in EQUIVALENT.items() if _is(change, n)}
     lived = [name for name in unseen if name not in alike]
-    unfinished = sum(len(tried[name]) < len(TESTS) for name in lived)
+    unfinished = sum(bool(lacking(name, tried[name], [*TESTS])) for name in lived)
     total = max(1, len(tried))
     noticed = sum(bool(tests) for tests in killed.values())
     asked = Counter(test for found in tried.values() for test in found)
@@ -331,11 +360,11 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
         "# Mutants of the core",
         "",
         "Written by `make mutants-core`, which goes on where it stopped. Each mutant is one change",
-        "of one line of `firmware/core`, drawn by a fixed seed. Unit tests and random sequences",
-        "see every mutant, the theorems on its file those that passed both, the contract tests",
-        "what passed these, every small input the rest.",
+        "of one line of `firmware/core`, drawn by a fixed seed. Unit tests, random sequences and",
+        "contract tests see every mutant, the theorems those of the files that have some, in the",
+        "order of the list as far as they have come. Every small input is for the rest.",
         "",
-        f"{len(tried)} mutants tried so far, {noticed} noticed ({noticed / total:.0%}),"
+        f"{len(tried)} mutants tried, {noticed} noticed ({noticed / total:.0%}),"
         f" {len(alike)} equivalent; {len(results) - len(tried)} did not compile.",
         f"Of those not noticed, {unfinished} have not yet been held against every test.",
         "",
@@ -345,8 +374,8 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
     names = {
         "unit": "unit tests in C++",
         "hunt": "random sequences",
-        "proofs": "theorems for all values",
         "contract": "contract tests in Python",
+        "proofs": "theorems for all values",
         "small": "every small input",
     }
     for test, title in names.items():
@@ -354,7 +383,8 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
         lines.append(f"| {title} | {asked[test]} | {count[test]} | {share:.0%} | {alone[test]} |")
     lines += ["", "Not noticed, or not yet (*):", ""]
     lines += [
-        f"- `{name}`{'' if len(tried[name]) == len(TESTS) else ' *'}" for name in sorted(lived)
+        f"- `{name}`{' *' if lacking(name, tried[name], [*TESTS]) else ''}"
+        for name in sorted(lived)
     ] or ["- none"]
     lines += ["", "Equivalent:", "", *(f"- `{name}`: {why}." for name, why in alike.items())]
     now = Provenance.now(SEED)
@@ -389,7 +419,7 @@ def main() -> int:
         prepare(folder)
         for mutant in mutants:
             known = results.get(mutant.name, {})
-            if known is None or not lacking(known, options.tests):
+            if known is None or not lacking(mutant.name, known, options.tests):
                 continue
             results[mutant.name] = killers_of(mutant, folder, known, options.tests)
             write_text_atomic(

@@ -56,8 +56,9 @@ class App {
     void fill() {
         first_ = last_ = 0;
         for (std::size_t got = 1; got != 0 && last_ < kChunk; last_ += got) {
+            const std::size_t room = kChunk - last_;  // not whole pieces: a tick may add to the last one
             const typename Hardware::Lock lock;
-            got = board_.transmit(waiting_ + last_, kPiece);
+            got = board_.transmit(waiting_ + last_, room < kPiece ? room : kPiece);
         }
     }
 

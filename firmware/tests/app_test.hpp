@@ -5,6 +5,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <functional>
 #include <vector>
 
 #include "../core/app.hpp"
@@ -65,6 +66,70 @@ TEST_CASE("a host that takes bytes slowly gets every frame whole and in order") 
     CHECK(whole == kFrames);
 }
 
+// Takes every byte at once; a tick may come whenever the board is not locked.
+struct Interrupted : Narrow {
+    static inline std::function<void()> between;
+    struct Lock {
+        Lock() {}
+        ~Lock() {
+            if (between) between();
+        }
+    };
+    std::size_t write(const std::uint8_t* bytes, std::size_t size) {
+        to_host.insert(to_host.end(), bytes, bytes + size);
+        return size;
+    }
+};
+
+TEST_CASE("samples that are logged while bytes are copied out reach the host whole and in order") {
+    for (int waiting = 0; waiting < 30; ++waiting) {
+        Interrupted hardware;
+        hardware.piece = 512;
+        rig::App<Profile, Interrupted, 4096> app(hardware, "TICKS");
+        app.begin(1, Profile::Settings::widest(), true);
+        hardware.from_host = proofs::wire_of(proofs::World::header(rig::kStart, 1));
+        app.exchange();
+        for (int tick = 0; tick < waiting; ++tick) app.tick();
+        int more = 12;
+        Interrupted::between = [&] {
+            if (--more > 0) app.tick();
+        };
+        for (int turn = 0; turn < 10; ++turn) app.exchange();
+        Interrupted::between = nullptr;
+        rig::FrameReceiver frames;
+        std::uint32_t next = 0;
+        for (std::uint8_t byte : hardware.to_host) {
+            if (!frames.take(byte) || frames.payload()[1] != rig::kSample) continue;
+            CHECK(rig::Reader(frames.payload() + 4).u32() == next);
+            ++next;
+        }
+        CHECK(next == static_cast<std::uint32_t>(waiting + 11));
+    }
+}
+
+TEST_CASE("a board takes its rig for a real one unless it was declared simulated") {
+    for (bool simulated : {false, true}) {
+        Narrow hardware;
+        rig::App<Profile, Narrow, 4096> app(hardware, "REAL");
+        simulated ? app.begin(1, Profile::Settings::widest(), true) : app.begin(1, Profile::Settings::widest());
+        hardware.from_host = proofs::wire_of(proofs::World::header(rig::kHello, 1));
+        for (int turn = 0; turn < 60; ++turn) app.exchange();
+        rig::FrameReceiver frames;
+        int whole = 0;
+        for (std::uint8_t byte : hardware.to_host) whole += frames.take(byte);
+        REQUIRE(whole == 1);
+        CHECK(rig::Reader(frames.payload() + frames.size() - 6).u16() == (simulated ? rig::kReferenced : 0));
+    }
+}
+
+TEST_CASE("a board that was asked nothing sends nothing") {
+    Narrow hardware;
+    rig::App<Profile, Narrow, 4096> app(hardware, "MUTE");
+    app.begin(1, Profile::Settings::widest(), true);
+    for (int turn = 0; turn < 4; ++turn) app.exchange();
+    CHECK(hardware.to_host.empty());
+}
+
 TEST_CASE("the chip's watchdog is fed once by each tick that the main loop turned before") {
     Narrow hardware;
     rig::App<Profile, Narrow, 4096> app(hardware, "FED");
@@ -121,7 +186,10 @@ TEST_CASE("a hold is gentle, where the spindle stood, and ends after its time") 
     Profile::Inputs inputs;
     inputs.spindle = 500;
     profile.check(inputs);
-    CHECK(profile.drive({1000, 7}, inputs).command_e4 == 5000);
+    const Profile::Outputs outputs = profile.drive({1000, 7}, inputs);
+    CHECK(outputs.command_e4 == 5000);
+    CHECK(outputs.load_ma == 7);
+    CHECK(outputs.in_force);
     const Profile::Setpoint held = profile.begin_to_hold(inputs);
     CHECK(held.target == 500);
     CHECK(held.load_ma == 0);

@@ -126,6 +126,13 @@ inline const Guard kGuards[] = {
          l.max_still_torque = 10;
      },
      [](Inputs& i, int since, int b) { i.current = since == 0 ? 100 + 5 * b : since % 2; }},
+    // a motion of 8 counts is none
+    {rig::kEncoderFrozen, 0, 6,
+     [](Limits& l) {
+         l.loop.frozen_motion = 8;
+         l.loop.frozen_current = 20;
+     },
+     [](Inputs& i, int since, int b) { i.current = 30, i.motor = since % 2 * (9 - b); }},
     {rig::kFollowingError, 1, 7,
      [](Limits& l) {
          l.loop.max_following = 60;
@@ -141,7 +148,7 @@ inline const Guard kGuards[] = {
 };
 
 // Ticks until a motor that turned this way and then counts no more is found dead, its current rising as given.
-inline int stands(int way, int rise) {
+inline int stands(int way, int rise) {  // its other encoders stand far from 0
     Profile::Settings settings = Profile::Settings::widest();
     settings.limits.torque_e3 = 1000;
     settings.limits.twist_e6 = 1;
@@ -151,6 +158,7 @@ inline int stands(int way, int rise) {
     for (int tick = 0; tick < 400; ++tick) {
         Inputs inputs;
         inputs.motor = 10 * way * (tick < 100 ? tick : 100);
+        inputs.spindle = inputs.jaw = 5000 * way;
         inputs.current = tick < 100 ? 50 * way : 50 * way + rise;
         const rig::Crossing crossing = profile.check(inputs);
         if (crossing.code != rig::kNoTrip) return crossing.code == rig::kEncoderFrozen ? tick - 100 : -1;
@@ -240,6 +248,8 @@ TEST_CASE("a count that is missing is named by its channel") {
         const rig::Crossing crossing = profile.check(inputs);
         CHECK(crossing.code == rig::kSensorMissing);
         CHECK(crossing.channel == k);
+        CHECK(crossing.value == rig::kMissing);
+        CHECK(crossing.limit == 0);
     }
 }
 
@@ -268,6 +278,7 @@ inline int trips(const Guard& guard, int beyond, rig::Crossing& crossing) {
     for (int tick = 1; tick < 200; ++tick) {
         Inputs inputs = quiet(tick);
         if (tick >= kBegins) guard.fault(inputs, tick - kBegins, beyond);
+        inputs.motor += 1000;  // it may have begun anywhere
         profile.warm(inputs, 1);
         crossing = profile.check(inputs);
         if (crossing.code != rig::kNoTrip) return tick;
@@ -285,6 +296,105 @@ TEST_CASE("a guard trips one count beyond its limit, after the time that the lim
         CHECK(crossing.code == guard.code);
         CHECK(crossing.channel == guard.channel);
         CHECK(crossing.late_us % Profile::kTickUs == 0);  // since a tick
+    }
+}
+
+TEST_CASE("counts far from 0 at the first tick are no jump, and a stall is counted from that tick") {
+    Profile::Settings settings = Profile::Settings::widest();
+    Limits& limits = settings.limits;
+    limits.loop.max_motor_jump = limits.max_spindle_jump = limits.max_jaw_jump = 60;
+    limits.motor.stall_current = 50, limits.motor.stall_motion = 3, limits.choice.stall_ticks = 20;
+    Profile profile;
+    profile.begin(settings);
+    Inputs inputs;
+    inputs.motor = 5000, inputs.spindle = 1000, inputs.jaw = -900, inputs.current = 60;
+    for (int tick = 1; tick < 20; ++tick) CHECK(profile.check(inputs).code == rig::kNoTrip);
+    CHECK(profile.check(inputs).code == rig::kStalled);
+}
+
+TEST_CASE("a motor is frozen where its current changed since it last moved, wherever both began") {
+    rig::LoopFields limits = rig::widest<Limits>().loop;
+    limits.frozen_motion = 8, limits.frozen_current = 20;
+    rig::LoopGuard guard;
+    std::int32_t motor = 1000;
+    guard.prime(motor, 500);
+    const auto trips = [&](int ticks, int step, std::int32_t current) {
+        rig::Crossing crossing;
+        for (int k = 0; k < ticks && crossing.code == rig::kNoTrip; ++k) {
+            crossing = guard.check(limits, 1000, 0, motor += step, current, {1, 0, 5});
+        }
+        return crossing.code == rig::kEncoderFrozen;
+    };
+    CHECK_FALSE(trips(50, 0, 500));
+    CHECK_FALSE(trips(50, 9, 560));
+    CHECK_FALSE(trips(50, 0, 560));
+    CHECK(trips(50, 0, 530));
+}
+
+TEST_CASE("a current that stood before the first motion is no rise behind it") {
+    Profile::Settings settings = Profile::Settings::widest();
+    settings.limits.torque_e3 = 1000, settings.limits.twist_e6 = 1, settings.limits.max_still_rise = 30;
+    Profile profile;
+    profile.begin(settings);
+    Inputs inputs;
+    inputs.current = 100;
+    for (int tick = 0; tick < 300; ++tick) {
+        inputs.motor = 10 * (tick < 3 ? tick : 3);
+        CHECK(profile.check(inputs).code == rig::kNoTrip);
+    }
+}
+
+TEST_CASE("of a start whose heat is not known either motor may be too hot") {
+    for (bool load : {false, true}) {
+        Profile::Settings settings = Profile::Settings::widest();
+        settings.limits.motor.continuous_current = settings.limits.continuous_load_ma = 10;
+        (load ? settings.limits.load_i2t : settings.limits.motor.i2t) = 10;
+        Profile profile;
+        profile.assume_hot();
+        CHECK(profile.too_hot(settings));
+    }
+}
+
+TEST_CASE("a sensor at its end may stay there as long again while the rig holds") {
+    Profile::Settings settings = Profile::Settings::widest();
+    settings.limits.choice.saturated_ticks = 5;
+    Profile profile;
+    profile.begin(settings);
+    Inputs inputs;
+    inputs.proximal = INT16_MAX;
+    for (int round = 0; round < 2; ++round) {
+        for (int tick = 1; tick < 5; ++tick) CHECK(profile.check(inputs).code == rig::kNoTrip);
+        CHECK(profile.check(inputs).code == rig::kSensorSaturated);
+        profile.begin_to_hold(inputs);
+    }
+}
+
+TEST_CASE("a sensor is saturated at its ends and not one count within") {
+    const Profile profile;
+    for (int count : {INT16_MIN, INT16_MIN + 1, INT16_MAX - 1, INT16_MAX}) {
+        Inputs inputs;
+        inputs.distal = count;
+        CHECK(profile.saturated(inputs) == (count == INT16_MIN || count == INT16_MAX));
+    }
+}
+
+TEST_CASE("a pull that begins with the first command lasts as long as any other") {
+    const rig::ProbeLimits limits{-100, 100, 8, 5000, 400};
+    rig::EndProbe probe;
+    for (int still = 60; still < 70; ++still) {
+        CHECK(probe.check(1000, still).code == rig::kNoTrip);
+        CHECK(probe.drive(limits, 95, 90, still, 5) == -400);
+    }
+    CHECK(probe.check(1000, 70).code == rig::kEncoderFrozen);
+}
+
+TEST_CASE("an encoder that may be read late is believed to what the other turned in that time") {
+    const rig::PairLimits limits{1, 1, 0, 0, 30, 1};
+    for (int ahead : {7, 8}) {
+        rig::EncoderPair pair;
+        CHECK(pair.check(limits, 0, 0, 0, 2).code == rig::kNoTrip);
+        // 8 counts in the newest of 16 ticks: 15 in 30 ticks
+        CHECK((pair.check(limits, ahead, -8, 0, 2).code == rig::kNoTrip) == (ahead == 7));
     }
 }
 
