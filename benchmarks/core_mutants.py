@@ -101,7 +101,7 @@ EQUIVALENT = {
     "rest_guard.hpp: std::int64_t slow_unfound_ = 0;": "the first tick sets it",
     "rest_guard.hpp: const std::int64_t turned = primed_ ? std::int64_t{counts[0]} - still_at_[0]"
     " : 0; -> const std::int64_t turned = primed_ ? std::int64_t{counts[0]} - still_at_[0]"
-    " : 1;": "one count is no motion",
+    " : 1;": "one count is below the least motion",
     "session.hpp: std::uint32_t boot_ = 0;": "each start sets it",
     "session.hpp: std::uint32_t offers_ = 0;": "each start sets it",
     "session.hpp: std::uint32_t number_ = 0;": "each arming sets it",

@@ -14,7 +14,14 @@ from estimation.recording import Recording
 RATE_HZ = 200.0
 TIME_S = np.arange(0, 12, 1 / RATE_HZ)
 SPEEDS = (0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
-MACHINE = {"mass": 2.0, "damping": 5.0, "friction": 1.5, "asymmetry": 0.0, "offset": 0.2}
+MACHINE = {
+    "mass": 2.0,
+    "damping": 5.0,
+    "friction": 1.5,
+    "asymmetry": 0.0,
+    "stiction": 0.0,
+    "offset": 0.2,
+}
 
 
 def axis() -> Model:
@@ -49,6 +56,7 @@ def record(seed: int, only: int | None = None, **changed: float) -> list[Recordi
         force = machine["mass"] * np.gradient(speed, TIME_S) + machine["damping"] * speed
         force += machine["friction"] * np.tanh(speed / 0.01) + machine["offset"]
         force += machine["asymmetry"] * np.abs(speed)
+        force += machine["stiction"] * np.exp(-np.abs(speed) / 0.05) * np.tanh(speed / 0.01)
         force += random.normal(0, 0.1, TIME_S.size) + random.normal(0, 0.02)
         columns = {"axis_position_m": position, "drive_force_n": force}
         conditions = {"speed_ratio": scale}
@@ -89,6 +97,19 @@ def test_chance_is_not_a_change():
     wrong = [pair for pair in pairs if compare(*pair, [axis()]).changes]
     # at a level of 5 % more than three of ten has a probability of one in a thousand
     assert len(wrong) <= 3
+
+
+def test_what_the_model_lacks_in_both_campaigns_is_no_change():
+    alike = {"asymmetry": 2.0, "stiction": 1.0}
+    pairs = [(record(seed, **alike), record(seed + 100, **alike)) for seed in range(20, 26)]
+    assert not any(compare(*pair, [axis()]).changes for pair in pairs)
+
+
+def test_a_small_change_is_named_next_to_a_friction_that_the_model_lacks():
+    lacking = {"asymmetry": 2.0, "stiction": 1.0}
+    found = compare(record(1, **lacking), record(2, damping=5.5, **lacking), [axis()]).changes
+    assert found[0].name == "friction.viscous damping of motor"
+    assert found[0].parameters["damping"] == pytest.approx(0.5, rel=0.3)
 
 
 def test_a_third_campaign_is_predicted_best_by_the_changed_model():
