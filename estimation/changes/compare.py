@@ -232,7 +232,7 @@ def _of(fold: Sequence[int], is_b: Sequence[bool], side: bool) -> list[int]:
 
 
 def _ranked(plain: Joint) -> Rank:
-    """Return what ranks changes that the campaigns do not share, next to others that were found.
+    """Return the ranking of changes that the campaigns do not share, next to others found.
 
     Args:
         plain: The regression without changes.
