@@ -15,7 +15,8 @@ import numpy as np
 
 from benchmarks.rigs import draw
 from benchmarks.rigs.build import spread_over
-from estimation.changes.compare import Change, compare
+from estimation.changes.compare import compare
+from estimation.changes.difference import Change
 from estimation.files import write_text_atomic
 from estimation.plant_file import shipped_plant
 from estimation.plant_models import declared

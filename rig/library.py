@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.changes.compare import Difference
+from estimation.changes.difference import Difference
 from estimation.cross_validation import HeldOutError
 from estimation.diagnosis.result import Diagnosis
 from estimation.effects import Effect

@@ -110,4 +110,4 @@ def _takes_part(source: Source) -> bool:
         for parameter, value in zip(source.effect.shape, source.shape, strict=True)
         if parameter.name == "width"
     ]
-    return not clocks and not source.effect.id.startswith("change.") and 0.0 not in widths
+    return not clocks and 0.0 not in widths

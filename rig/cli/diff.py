@@ -10,7 +10,7 @@ from rig.cli.options import EquationOption, FormatOption, MachineOption, ModelOp
 from rig.output.console import JsonFlag, emit_json, results
 
 if TYPE_CHECKING:
-    from estimation.changes.compare import Difference
+    from estimation.changes.difference import Difference
 
 
 def diff(

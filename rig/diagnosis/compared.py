@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from estimation.arm.balances import balances_of
 from estimation.arm.shared import laid_out
 from estimation.campaign import Campaign
-from estimation.changes.compare import Difference, compare
+from estimation.changes.compare import compare
+from estimation.changes.difference import Difference
 from estimation.diagnosis.paths import periods
 from estimation.diagnosis.split import SplitError
 from estimation.model import Model

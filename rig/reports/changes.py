@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from estimation.changes.compare import Change, Difference
+from estimation.changes.difference import Change, Difference
 from rig.output.table import TextTable
 
 

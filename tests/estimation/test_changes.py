@@ -20,6 +20,7 @@ MACHINE = {
     "friction": 1.5,
     "asymmetry": 0.0,
     "stiction": 0.0,
+    "knock": 0.0,
     "offset": 0.2,
 }
 
@@ -57,6 +58,7 @@ def record(seed: int, only: int | None = None, **changed: float) -> list[Recordi
         force += machine["friction"] * np.tanh(speed / 0.01) + machine["offset"]
         force += machine["asymmetry"] * np.abs(speed)
         force += machine["stiction"] * np.exp(-np.abs(speed) / 0.05) * np.tanh(speed / 0.01)
+        force += machine["knock"] * (TIME_S > 7.0)
         force += random.normal(0, 0.1, TIME_S.size) + random.normal(0, 0.02)
         columns = {"axis_position_m": position, "drive_force_n": force}
         conditions = {"speed_ratio": scale}
@@ -90,6 +92,11 @@ def test_an_effect_that_came_and_one_that_went():
     assert (came.verdict, came.family) == ("came", "friction.viscous_asymmetry")
     (went,) = compare(worn, record(1), [axis()]).changes
     assert (went.verdict, went.family) == ("went", "friction.viscous_asymmetry")
+
+
+def test_a_sensor_that_is_knocked_in_every_run_of_one_campaign_is_a_step():
+    (found,) = compare(record(1), record(2, knock=1.0), [axis()]).changes
+    assert (found.verdict, found.family) == ("came", "change.step")
 
 
 def test_chance_is_not_a_change():

@@ -1,0 +1,76 @@
+"""What changed between two campaigns, as data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+SCHEMA = "rig.diff/2"
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change.
+
+    Attributes:
+        verdict: `moved` for a parameter, `came` or `went` for an effect, `one_of` where the runs do
+            not distinguish some of them.
+        name: What changed.
+        equation: Equation it is reported under.
+        family: The effect.
+        alternatives: Other names that explain it about as well.
+        confidence: Probability of this name next to the other changes, that of no change included.
+        parameters: Parameter to its change from A to B (of an effect: its amplitude), SI.
+        ci95: Parameter to the 95 % interval of that, over runs.
+        unit: Parameter to its unit.
+        before: Parameter to its value in A; None of an effect.
+    """
+
+    verdict: str
+    name: str
+    equation: str
+    family: str
+    alternatives: tuple[str, ...]
+    confidence: float
+    parameters: Mapping[str, float]
+    ci95: Mapping[str, tuple[float, float]]
+    unit: Mapping[str, str]
+    before: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Root mean square errors on a third campaign of an equation, within runs.
+
+    Attributes:
+        with_a: Fitted on A alone.
+        with_b: Fitted on B alone.
+        as_a: Fitted on both with the changes, taken as unchanged.
+        as_b: The same, taken as changed.
+        unit: Unit of the target.
+    """
+
+    with_a: float
+    with_b: float
+    as_a: float
+    as_b: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The answer.
+
+    Attributes:
+        changes: The changes, largest first; empty where nothing changed beyond chance.
+        runs: Campaign to the names of its runs.
+        predicted: Equation to its errors on a third campaign; empty without one.
+        notes: Limits of the answer, in words.
+        seed: Seed of the random choices.
+        schema: Name of this layout.
+    """
+
+    changes: tuple[Change, ...]
+    runs: Mapping[str, tuple[str, ...]]
+    predicted: Mapping[str, Predicted] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    seed: int = 0
+    schema: str = SCHEMA
