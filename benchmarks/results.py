@@ -94,7 +94,7 @@ PAGES = (
     ),
     Page(
         "changes",
-        "python -m benchmarks.changes --first 400 --pairs 36 --out docs/results/changes.md",
+        "python -m benchmarks.changes --first 500 --pairs 36 --out docs/results/changes.md",
         "benchmarks/changes.py estimation/changes estimation/causes benchmarks/rigs",
         5,
     ),

@@ -51,6 +51,7 @@ class Function:
     width: float
 
     family = "unknown"
+    is_declared = False
 
     @property
     def reads(self) -> tuple[str, ...]:

@@ -108,10 +108,12 @@ def _in_readings(
     then shares the task with it and halves the noise, with nothing to do with a cause: the factor
     of the reading becomes smaller, by as much as the noise is less seen. Who reads the reading
     itself, where that has noise of an amplifier, may do so by its slope within runs. And who reads
-    the target itself has no use for the declared terms; a cause comes in addition to them. Shape
-    (n,).
+    the target itself has no use for the declared terms; a cause comes in addition to them. A
+    declared term whose factor moved reads what the base reads, with another factor, so none of this
+    holds for it. Shape (n,).
     """
     replaces = np.zeros(len(candidates), dtype=np.bool_)
+    moved = np.array([one.cause.is_declared for one in candidates])
     for name, slopes in outcome.slopes.items():
         seen = np.ones(len(candidates))
         for k, channel in enumerate(joint.linear(name).values()):
@@ -123,9 +125,11 @@ def _in_readings(
             other = np.array([not {*one.cause.reads} <= {channel} for one in candidates])
             seen = np.where(other, np.minimum(seen, change), seen)
             replaces |= other & ((change < 1.0 / MOST_CHANGE) | (change > MOST_CHANGE))
+        seen = np.where(moved, 1.0, seen)
         unit = np.maximum(1.0, np.maximum(seen, 1e-3) ** -2.0)
         for family in outcome.errors:
             family[name, "within"][:] *= unit
+    replaces[moved] = False
     return replaces
 
 

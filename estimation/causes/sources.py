@@ -119,6 +119,11 @@ class Source:
         return self.effect.family
 
     @property
+    def is_declared(self) -> bool:
+        """Whether it is a term of the declared equation, with another factor in some runs."""
+        return False
+
+    @property
     def reads(self) -> tuple[str, ...]:
         """Channels that its columns come from, before instruments."""
         return tuple(channel for role, channel in self.channels if role not in CLOCKS)

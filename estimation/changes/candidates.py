@@ -38,6 +38,11 @@ class Moved(Source):
         return self.key
 
     @property
+    def is_declared(self) -> bool:
+        """A declared term; an offset and a sensor's gain are in no column."""
+        return self.column is not None
+
+    @property
     def is_bounded(self) -> bool:
         """A parameter moves either way."""
         return False

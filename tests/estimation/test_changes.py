@@ -146,3 +146,53 @@ def test_a_change_that_distorts_a_common_fit_does_not_hide_its_equation():
     found = compare(runs(0, 1, damping=3.0), runs(5, 11, damping=12.0), [axis()])
     assert not any("not judged" in note for note in found.notes)
     assert found.changes[0].name == "friction.viscous damping of motor"
+
+
+def held_loads(seed: int, torque_constant: float) -> list[Recording]:
+    """Return a campaign whose load is held in each run, so current within runs is friction's."""
+    random = np.random.default_rng(seed)
+    runs = []
+    for k in range(6):
+        phase = random.uniform(0, 2 * np.pi, 2)
+        angle = 8.0 * np.sin(2 * np.pi * 0.5 * TIME_S + phase[0])
+        angle += 5.0 * np.sin(2 * np.pi * 0.17 * TIME_S + phase[1])
+        speed = np.gradient(angle, TIME_S)
+        torque = (
+            0.02
+            + 0.008 * k
+            + 5e-3 * np.tanh(speed / 0.3)
+            + 1e-4 * speed
+            + 1e-3 * np.sin(angle / 4.0)
+        )
+        needed = torque + 8e-3 * np.tanh(speed / 0.3) + 6e-5 * speed
+        columns = {
+            "motor_angle_rad": angle,
+            "motor_current_a": needed / torque_constant + random.normal(0, 0.02, TIME_S.size),
+            "proximal_torque_n_m": torque + random.normal(0, 2e-4, TIME_S.size),
+        }
+        runs.append(Recording(f"{k:02d}", TIME_S, columns, conditions={"load": k}))
+    return runs
+
+
+def motor() -> Model:
+    speed = {"speed": "motor_velocity_rad_s"}
+    return Model(
+        name="motor",
+        balance="motor",
+        target="proximal_torque_n_m",
+        low_pass=LowPass(cutoff_hz=20.0),
+        run_offsets=False,
+        terms=(
+            Term(effect("motor.torque_constant"), 1, {"source": "motor_current_a"}),
+            Term(effect("friction.viscous"), -1, speed),
+            Term(effect("friction.coulomb"), -1, speed),
+            Term(effect("sensor.offset"), 1, {}),
+        ),
+    )
+
+
+def test_a_torque_constant_that_moved_is_named_where_friction_could_stand_in_for_the_current():
+    (found,) = compare(held_loads(1, 0.02), held_loads(2, 0.011), [motor()]).changes
+    assert found.name == "motor.torque_constant gain of motor"
+    assert found.parameters["gain"] == pytest.approx(-0.009, rel=0.2)
+    assert not compare(held_loads(1, 0.02), held_loads(2, 0.02), [motor()]).changes
