@@ -5,6 +5,7 @@ its cutoff. Effects with memory are worked out on that series; everything is reg
 grid that all equations of a run share.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -41,6 +42,10 @@ GRID_PER_CUTOFF = 1.7
 COULOMB = "friction.coulomb"
 LEAST = 20
 """Samples that an equation needs of each run."""
+
+MOST = 24_000
+"""Samples regressed on of all runs together, roughly: memory and time follow their number. A run
+counts as 40 samples that are independent of one another, so more of them show nothing new."""
 
 SHAPE_STEP = 0.02
 """Relative step of the derivative of a declared column by its shape."""
@@ -294,7 +299,17 @@ def _laid_out(
             lost[recording.name] = error
     if lost and not runs:
         raise next(iter(lost.values()))
-    return runs, {name: error.what for name, error in lost.items()}
+    every = math.ceil(sum(len(run.grid) for run in runs) / MOST)
+    thinned = [_thinned(run, every) for run in runs]
+    return thinned, {name: error.what for name, error in lost.items()}
+
+
+def _thinned(run: RunSignals, every: int) -> RunSignals:
+    """Return a run with one of so many places of its grid; unchanged where it has few."""
+    used = {name: at[at % every == 0] // every for name, at in run.used.items()}
+    if every == 1 or min(map(len, used.values())) < LEAST:
+        return run
+    return replace(run, grid=run.grid[::every], used=used)
 
 
 def sensitivity(name: str, measured: str, signals: Signals) -> tuple[float, int] | None:

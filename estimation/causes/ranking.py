@@ -83,7 +83,7 @@ def _bent(joint: Joint, one: Scored) -> Claim | None:
     candidate, cause = one.candidate, one.candidate.cause
     if isinstance(cause, Function) or len(candidate.size) != 1:
         return None
-    signals = [cause.signal(run, cause.place.home) for run in joint.runs]
+    signals = [cause.values(run) for run in joint.runs]
     values = np.concatenate([x[:, 0] for x in signals if x is not None])
     low, high = np.percentile(values, (1.0, 99.0))
     amplitude = abs(float(one.amplitudes[0] / candidate.size[0]))

@@ -8,6 +8,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -151,44 +152,52 @@ class Source:
         lower = [self.effect.amplitudes[k].lower for k in self.parts]
         return min(lower) >= 0.0 and not of_load
 
-    @property
+    @cached_property
     def on_grid(self) -> bool:
         """Whether its columns need no other samples than those that are regressed on."""
         return isinstance(self.effect, Pointwise) and not any(e.order for e in self.place.enters)
 
-    def signal(self, run: RunSignals, equation: str, load: str = "") -> FloatArray | None:
-        """Return the source's columns in one equation, (n, parts): over the run, or on its grid.
+    def values(self, run: RunSignals) -> FloatArray | None:
+        """Return the source's columns over the run, (n, parts), as its own equation reads them.
 
-        With a load, its work: the load times their derivatives by the angle. None where a column is
-        not finite.
+        None where a column is not finite. Of a source that needs no other samples, these are those
+        of the run's grid.
         """
-        names = tuple(signal(run, channel, equation) for _, channel in self.channels)
-        behind = load and signal(run, load, equation)
-        key = (self.effect.id, self.shape, names, self.odd, behind, self.on_grid)
-        if key not in run.memo:
-            run.memo[key] = _worked_out(self, names, run, behind)
-        found = run.memo[key]
-        if found is None:
-            return None
-        found = found[:, list(self.parts)]
-        if self.bend is not None:
-            inside = np.clip(found[:, 0], self.bend.knots[0], self.bend.knots[-1])
-            hats = [np.interp(inside, self.bend.knots, row) for row in np.eye(len(self.bend.knots))]
-            found = np.column_stack([found, found * np.array(hats).T])
-        return found
+        found = _worked_out(self, self._names(run, self.place.home), run, "")
+        return None if found is None else found[:, list(self.parts)]
 
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray] | None:
         """Return the source's columns in every equation it enters, at the samples each counts."""
         made: dict[str, FloatArray] = {}
+        series: dict[object, FloatArray | None] = {}
+        bends_first = None if self.on_grid else self.bend  # before it is differentiated
+        chosen = list(self.parts)
         for entry in self.place.enters:
-            found = self.signal(run, entry.equation, entry.load)
+            names = self._names(run, entry.equation)
+            load = entry.load and signal(run, entry.load, entry.equation)
+            form = (self.effect.id, self.shape, names, self.odd, load, self.on_grid)
+            key = (form, entry.order, bends_first, bends_first and self.parts)
+            if key not in run.memo:  # of the grid alone: the whole run is many times as long
+                if form not in series:
+                    series[form] = _worked_out(self, names, run, load)
+                found = series[form]
+                if found is not None and bends_first is not None:
+                    found = _bent(found[:, chosen], bends_first)
+                if found is not None and not self.on_grid:
+                    found = _derived(found, run.rate_hz, entry.order)[run.grid]
+                run.memo[key] = found
+            found = run.memo[key]
             if found is None:
                 return None
-            if not self.on_grid:
-                found = _derived(found, run.rate_hz, entry.order)[run.grid]
+            if bends_first is None:
+                found = found[:, chosen]
+                found = found if self.bend is None else _bent(found, self.bend)
             used = entry.gain * self.side * found[run.used[entry.equation]]
             made[entry.equation] = made[entry.equation] + used if entry.equation in made else used
         return made
+
+    def _names(self, run: RunSignals, equation: str) -> tuple[str, ...]:
+        return tuple(signal(run, channel, equation) for _, channel in self.channels)
 
 
 def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
@@ -407,6 +416,13 @@ def _worked_out(
         passed = _passed(run, angle, order)
         columns = columns * (passed[run.grid] if source.on_grid else passed)[:, None]
     return columns
+
+
+def _bent(columns: FloatArray, bend: Bend) -> FloatArray:
+    """Return columns and, after them, those of the first one's deviation from its equation."""
+    inside = np.clip(columns[:, 0], bend.knots[0], bend.knots[-1])
+    hats = [np.interp(inside, bend.knots, row) for row in np.eye(len(bend.knots))]
+    return np.column_stack([columns, columns * np.array(hats).T])
 
 
 def _passed(run: RunSignals, angle: str, order: float) -> FloatArray:

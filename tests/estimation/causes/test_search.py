@@ -60,6 +60,24 @@ def test_an_asymmetric_loss_is_identified_and_lowers_the_error_on_test_runs() ->
     assert answer.errors["motor"].after < answer.errors["motor"].before
 
 
+def test_many_runs_take_no_more_samples_than_some() -> None:
+    samples = []
+    for count in (12, 60, 120):
+        runs = recordings(_asymmetric, count)
+        layout = lay_out([motor()], runs, [run.name for run in runs])
+        samples.append(sum(len(run.used["motor"]) for run in layout.runs))
+        assert len(layout.runs) == count
+    few, some, many = samples
+    assert few < many < 1.2 * some
+
+
+@pytest.mark.long
+def test_an_effect_is_found_in_many_runs() -> None:
+    runs = recordings(_asymmetric, 90)
+    answer = diagnose(runs, [motor()], split(runs))
+    assert [f.family for f in answer.findings] == ["friction.viscous_asymmetry"]
+
+
 def test_a_run_with_too_few_samples_is_left_out_with_a_note() -> None:
     runs = recordings(_asymmetric)
     runs[3] = runs[3].slice_time(0.0, 0.3)
