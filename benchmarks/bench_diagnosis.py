@@ -12,15 +12,12 @@ from pathlib import Path
 
 from benchmarks.ratio import Ratio
 from estimation import model_file
-from estimation.causes.candidates import Claim, pool_of
+from estimation.causes.candidates import every_claim, pool_of
 from estimation.causes.equations import lay_out
 from estimation.causes.folds import folds_of
-from estimation.causes.functions import functions_at
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
-from estimation.causes.places import places_of
 from estimation.causes.scoring import assessed
-from estimation.causes.sources import sources_at
 from estimation.recording import Recording
 from rig.simulation.campaign import simulate_reference_campaign
 
@@ -90,12 +87,7 @@ def _cost(recordings: tuple[Recording, ...], share: float) -> Cost:
         layout = lay_out([model], recordings, names)
         add_instruments(layout, names)
         joint = Joint(layout)
-        claims = [
-            Claim(cause)
-            for place in places_of(layout)
-            for cause in (*sources_at(layout, place), *functions_at(layout, place))
-        ]
-        pool = pool_of(joint, claims[::step])
+        pool = pool_of(joint, list(every_claim(layout))[::step])
         assessed(joint, pool, folds_of(layout))
         tried = sum(len(group.candidates) for group in pool)
 

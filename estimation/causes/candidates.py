@@ -98,14 +98,16 @@ class Group:
     block: Block | None = None
 
 
+def every_claim(layout: Layout) -> Iterator[Claim]:
+    """Yield every cause that a diagnosis tries, those of one place after one another."""
+    for place in places_of(layout):
+        yield from map(Claim, sources_at(layout, place))
+        yield from map(Claim, functions_at(layout, place))
+
+
 def candidates(joint: Joint) -> list[Group]:
     """Return every candidate cause, laid out."""
-    train = joint.layout
-    causes: Iterable[Source | Function] = itertools.chain.from_iterable(
-        itertools.chain(sources_at(train, place), functions_at(train, place))
-        for place in places_of(train)
-    )
-    return pool_of(joint, map(Claim, causes))
+    return pool_of(joint, every_claim(joint.layout))
 
 
 def pool_of(joint: Joint, claims: Iterable[Claim]) -> list[Group]:
