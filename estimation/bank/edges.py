@@ -16,6 +16,10 @@ LEAST_LEVELS = 3
 """With two levels, the effect of the condition cannot be fitted after leaving one out."""
 
 
+ALIKE = 0.01
+"""Levels that differ by less than this share are one: files round what was commanded."""
+
+
 def edges(
     conditions: Sequence[Mapping[str, float | str]], least_left: int
 ) -> list[NDArray[np.int_]]:
@@ -42,3 +46,35 @@ def edges(
                 if len(values) - len(at) >= least_left:
                     found.append(at)
     return found
+
+
+def only_levels(conditions: Sequence[Mapping[str, float | str]]) -> dict[str, float]:
+    """Return the level of each condition that all runs have alike.
+
+    Nothing in such runs shows what another level changes.
+
+    Args:
+        conditions: Conditions of each run.
+    """
+    first = conditions[0] if conditions else {}
+    stated = {name: float(v) for name, v in first.items() if not isinstance(v, str)}
+    return {
+        name: level
+        for name, level in sorted(stated.items())
+        if all(name in held and not other_levels({name: level}, held) for held in conditions)
+    }
+
+
+def other_levels(
+    only: Mapping[str, float], conditions: Mapping[str, float | str]
+) -> dict[str, float]:
+    """Return the conditions of a run that differ from the only level fitted, with the run's level.
+
+    Args:
+        only: Level of each condition, from `only_levels`.
+        conditions: Conditions of the run; one that it does not state does not differ.
+    """
+    stated = {k: float(v) for k, v in conditions.items() if k in only and not isinstance(v, str)}
+    return {
+        name: value for name, value in stated.items() if not np.isclose(value, only[name], ALIKE)
+    }

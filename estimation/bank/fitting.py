@@ -230,7 +230,7 @@ def pull(
     prior: FloatArray,
     scale: FloatArray,
     stiffness: FloatArray,
-    flat: FloatArray | float = 0.0,
+    more: tuple[FloatArray, FloatArray] | None = None,
 ) -> FloatArray:
     """Return weights that fit the runs and stay near the prior, shape (p,).
 
@@ -239,11 +239,13 @@ def pull(
         prior: Weights to stay near, shape (p,).
         scale: Spread of each column where the prior was found, shape (p,).
         stiffness: Penalty on a weight's change in units of `scale`, a sample, shape (p,).
-        flat: Penalty on products of two weights' changes, a sample, shape (p, p).
+        more: Normal equations that also count, a sample: of shape (p, p) and (p,).
     """
     gram = np.sum([run.gram for run in runs], axis=0)
     cross = np.sum([run.cross for run in runs], axis=0)[:, 0]
     count = sum(run.count for run in runs)
-    scaled = (gram + count * flat) / np.outer(scale, scale) + np.diag(count * stiffness)
+    if more is not None:
+        gram, cross = gram + count * more[0], cross + count * more[1]
+    scaled = gram / np.outer(scale, scale) + np.diag(count * stiffness)
     rest = (cross - gram @ prior) / scale
     return np.asarray(prior + np.linalg.solve(scaled, rest) / scale)

@@ -225,6 +225,22 @@ class Bank:
         return design
 
 
+def held_within(bank: Bank, rows: FloatArray, ranges: FloatArray) -> FloatArray:
+    """Return rows with the angle, and the pose, moved to the nearest ones fitted, (n, channels).
+
+    A polynomial of the angle carried beyond them grows to many times the largest torque.
+
+    Args:
+        bank: The bank that reads the rows.
+        rows: Filtered channels, shape (n, channels).
+        ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
+    """
+    held = rows.copy()
+    for channel in (0, *range(JUDGED, bank.judged)):
+        held[:, channel] = np.clip(rows[:, channel], *ranges[:, channel])
+    return held
+
+
 def closed(products: Iterable[Product]) -> tuple[Product, ...]:
     """Return products after all those they are made of, the constant first, none twice."""
     found: dict[Product, None] = {(): None}

@@ -15,20 +15,21 @@ MRDLab/mis-tool-characterization, that of networks on one of them, Tool_4_Maryla
 changes at other angles also on Tool_4_Maryland_L_Pitch_1 and _Roll_1.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.bank.beyond import Visits, cut_to
+from estimation.bank.edges import other_levels
 from estimation.bank.fitting import Normal, pull
 from estimation.bank.interval import Interval, scaled, with_scores
 from estimation.bank.states import LAGS, Bank
 from estimation.closing import is_closing, processed
 from estimation.estimators.bank import EVERY, BankEstimator, fit_runs
 from estimation.estimators.network import NetworkEstimator
-from estimation.estimators.run_evidence import RunEvidence
+from estimation.estimators.run_evidence import RunEvidence, ranges_of
 from estimation.networks import training
 from estimation.networks.network import NetworkError, to_unit
 from estimation.recording import FloatArray, Recording
@@ -39,9 +40,9 @@ POSITION, LOAD, REST = 1e-3, 10.0, 3.0
 """Stiffness of the weights of products of position alone, of those with the load, of the others."""
 
 FLAT = 0.01
-"""Penalty on a change of the estimate at angles that the runs adapted with lack, beyond its change
-at the nearest angle that they have. Without it a polynomial of the angle fitted on one jaw stop
-grows to thousands of mN m on the next."""
+"""Penalty on a change of the source's estimate at angles that the runs adapted with lack, over its
+change at the nearest angle that they have. Without it a polynomial of the angle fitted on one jaw
+stop grows to thousands of mN m on the next."""
 ANGLES, EVERY_ROW = 13, 20
 """Angles at which that change is computed, and of how many samples one is used."""
 
@@ -61,11 +62,13 @@ class Evidence:
         rows: Filtered channels the estimator reads, shape (n, channels).
         truth: The target, shape (n,).
         valid: Samples without a flag, shape (n,); only they are fitted.
+        conditions: Conditions of the run.
     """
 
     rows: FloatArray
     truth: FloatArray
     valid: np.ndarray
+    conditions: Mapping[str, float | str] = field(default_factory=dict)
 
     @property
     def flagged(self) -> int:
@@ -86,7 +89,10 @@ class Evidence:
 
     def covered(self, estimator: Adaptable) -> NDArray[np.bool_] | None:
         """Return whether the interval covers the sensor, of the samples with one; None without."""
-        if not isinstance(estimator, BankEstimator) or estimator.interval is None:
+        if not isinstance(estimator, BankEstimator):
+            return None
+        estimator = estimator.at(self.conditions)
+        if estimator.interval is None:
             return None
         found = estimator.of_rows(self.rows)
         inside = np.abs(found.value - self.truth) <= found.half_width
@@ -111,7 +117,7 @@ def evidence(estimator: Adaptable, recording: Recording) -> Evidence | None:
     if not (kept & run.valid).any():
         return None
     rows = np.column_stack([run[name][kept] for name in names])
-    return Evidence(rows, run[estimator.target][kept], run.valid[kept])
+    return Evidence(rows, run[estimator.target][kept], run.valid[kept], recording.conditions)
 
 
 def adapted(source: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
@@ -151,11 +157,11 @@ def scratch(like: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
 
 def reduced(source: BankEstimator, runs: Sequence[Evidence]) -> list[RunEvidence]:
     """Return runs of another instrument as a fit of states takes them."""
-    fitted = [run.fitted for run in runs]
+    fitted = [(*run.fitted, run.conditions) for run in runs]
     return [
         part
-        for rows, truth in fitted
-        for part in RunEvidence.of_rows(source.bank, rows, truth[:, None])
+        for rows, truth, conditions in fitted
+        for part in RunEvidence.of_rows(source.bank, rows, truth[:, None], conditions)
     ]
 
 
@@ -164,65 +170,84 @@ def adapted_states(source: BankEstimator, runs: Sequence[RunEvidence]) -> BankEs
     stiff = stiffness(source.bank)
 
     def pulled(part: Sequence[RunEvidence]) -> FloatArray:
-        flat = FLAT * _change_elsewhere(source, part)
-        return pull([run.normal for run in part], source.weights, source.scale, stiff, flat)
+        normals, as_the_source = [run.normal for run in part], _elsewhere(source, part)
+        return pull(normals, source.weights, source.scale, stiff, as_the_source)
 
-    weights = pulled(runs)
-    interval = None if source.interval is None else _interval(source.interval, runs, pulled)
-    lowest = np.min([source.ranges[0], *(run.ranges[0] for run in runs)], axis=0)
-    highest = np.max([source.ranges[1], *(run.ranges[1] for run in runs)], axis=0)
-    ranges = np.array([lowest, highest])
+    def ranges(part: Sequence[RunEvidence]) -> FloatArray:
+        return ranges_of([source.ranges, *(run.ranges for run in part)])
+
+    def error(part: Sequence[RunEvidence], run: RunEvidence) -> FloatArray:
+        return run.estimate(source.bank, pulled(part), ranges(part)) - run.truth
+
+    interval = None
+    if source.interval is not None:
+        as_it_is = [source.of_design(run.design, run.rows).value for run in runs]
+        misfit = [float(np.var(e - r.truth)) for e, r in zip(as_it_is, runs, strict=True)]
+        interval = _interval(source.interval, runs, error, float(np.mean(misfit)))
+    new = {name for run in runs for name in other_levels(source.only, run.conditions)}
     return replace(
-        source, weights=weights, interval=interval, ranges=ranges, instrument="", origin=None
+        source,
+        weights=pulled(runs),
+        interval=interval,
+        ranges=ranges(runs),
+        instrument="",
+        origin=None,
+        only={name: level for name, level in source.only.items() if name not in new},
     )
 
 
-def _change_elsewhere(source: BankEstimator, runs: Sequence[RunEvidence]) -> FloatArray:
-    """Return the mean square of what weights add at angles that runs lack, shape (size, size).
+def _elsewhere(source: BankEstimator, runs: Sequence[RunEvidence]) -> tuple[FloatArray, FloatArray]:
+    """Return normal equations of the source's shape at angles that runs lack.
 
-    Samples of the runs are moved to angles over three times the range of source and runs, and
-    compared with themselves at the nearest angle that the runs have.
+    Samples of the runs are moved to angles over three times the range of source and runs. There the
+    estimate is to differ from that at the nearest angle the runs have as the source's does.
     """
     rows = np.concatenate([run.rows for run in runs])[::EVERY_ROW]
     angle = rows[:, 0]
     low, high = angle.min(), angle.max()
     lowest, highest = min(low, source.ranges[0, 0]), max(high, source.ranges[1, 0])
     span = highest - lowest
-    total = np.zeros((source.bank.size, source.bank.size))
+    gram, cross = np.zeros((source.bank.size, source.bank.size)), np.zeros(source.bank.size)
     angles = np.linspace(lowest - span, highest + span, ANGLES)
     for moved in angles[(angles < low) | (angles > high)]:
         there, near = rows.copy(), rows.copy()
         there[:, 0], near[:, 0] = moved, np.clip(moved, low, high)
         change = source.bank.design(there) - source.bank.design(near)
-        total += change.T @ change / (len(rows) * ANGLES)
-    return total
+        of_source = source.of_rows(there).value - source.of_rows(near).value
+        gram += change.T @ change
+        cross += change.T @ of_source
+    weight = FLAT / (len(rows) * ANGLES)
+    return weight * gram, weight * cross
 
 
 def _interval(
     source: Interval,
     runs: Sequence[RunEvidence],
-    pulled: Callable[[Sequence[RunEvidence]], FloatArray],
+    error: Callable[[Sequence[RunEvidence], RunEvidence], FloatArray],
+    misfit: float,
 ) -> Interval | None:
     """Return the source's interval, wider away from the runs adapted with.
 
     It is stated at the angles and poses of both the source and these runs; None where they share
-    none. Loads and speeds that no run of the new instrument has cost what unfitted ones cost on the
-    source. Where several runs are given, each by weights adapted with the others shows if that is
-    enough; the interval is never narrower.
+    none. Places that no run of the new instrument has cost what unfitted ones cost on the source,
+    or, where it is more, the variance of the source's error within the new runs: the prior variance
+    of the difference between the instruments, of which the score is the share that is left. Where
+    several runs are given, each by weights adapted with the others shows if that is enough; the
+    interval is never narrower.
     """
     places = [run.places for run in runs]
     shared = cut_to(source.beyond, np.concatenate(places))
     if shared is None:
         return None
-    source = replace(source, beyond=shared)
+    source = replace(source, beyond=shared, price=max(source.price, NORMAL_95**2 * misfit))
     visits = Visits(places, shared)
     found = with_scores(source, visits.scores(np.arange(len(runs))).values)
     ratios = []
     for k, run in enumerate(runs if len(runs) > 1 else []):
         others = [j for j in range(len(runs)) if j != k]
         wide = with_scores(source, visits.scores(np.array(others)).values)
-        error = run.design @ pulled([runs[j] for j in others]) - run.truth
-        square = (NORMAL_95 * error / wide.half_width(run.design, run.places)) ** 2
+        missed = error([runs[j] for j in others], run)
+        square = (NORMAL_95 * missed / wide.half_width(run.design, run.places)) ** 2
         if np.isfinite(square).any():
             ratios.append(np.nanmean(square))
     return scaled(found, max(float(np.mean(ratios)), 1.0) ** 0.5) if ratios else found

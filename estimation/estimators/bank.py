@@ -1,5 +1,6 @@
 """Products of physical states as an estimator, with an interval and a range of validity."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.bank.beyond import coordinates
+from estimation.bank.edges import only_levels, other_levels
 from estimation.bank.fitting import Pool, Settings, chosen, solve
 from estimation.bank.interval import COVERAGE, Interval
 from estimation.bank.states import Bank
@@ -18,7 +20,7 @@ from estimation.derived import zero_phase_channels
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.estimators.left_out_runs import INNER_FOLDS, interval_of
 from estimation.estimators.origin import Origin
-from estimation.estimators.run_evidence import RunEvidence
+from estimation.estimators.run_evidence import RunEvidence, ranges_of, within_ranges
 from estimation.filters import PAPER, LowPass
 from estimation.live_channels import CausalChannels, causal_channels
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
@@ -35,7 +37,8 @@ class Estimates:
     Attributes:
         value: The estimate, in the target's unit.
         half_width: Half the width of the interval that covers 95 %; NaN where unknown: far from the
-            fitted conditions, opening, at rest, or on another instrument.
+            fitted conditions, opening, at rest, on another instrument, or in a recording that
+            states another level of a condition than the only one fitted.
         inside: Whether position, load, speed and acceleration lie in the range fitted on.
     """
 
@@ -58,6 +61,8 @@ class BankEstimator:
         instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
         low_pass: Filter of every channel.
         origin: Where it comes from; None where nobody stated it.
+        only: Level of each condition that all runs fitted on had alike.
+        of_any: Whether it is used on instruments it was not fitted on: nothing is in its range.
     """
 
     SCHEMA: ClassVar[str] = "rig.bank/4"
@@ -71,6 +76,8 @@ class BankEstimator:
     instrument: str = ""
     low_pass: LowPass = PAPER
     origin: Origin | None = None
+    only: Mapping[str, float] = field(default_factory=dict)
+    of_any: bool = False
 
     def __post_init__(self) -> None:
         for name, shape in {
@@ -108,7 +115,7 @@ class BankEstimator:
             channels = causal_channels(recording, names, self.low_pass, tracked=True)
         else:
             channels = zero_phase_channels(recording, names, self.low_pass)
-        return self.of_rows(rows_of(channels, self.bank))
+        return self.at(recording.conditions).of_rows(rows_of(channels, self.bank))
 
     def of_rows(self, rows: FloatArray) -> Estimates:
         """Return the estimates for rows of filtered channels, shape (n, channels)."""
@@ -116,20 +123,29 @@ class BankEstimator:
 
     def of_design(self, design: FloatArray, rows: FloatArray) -> Estimates:
         """Return the estimates for a design of the bank and the rows it was made of."""
+        design = within_ranges(self.bank, design, rows, self.ranges)
         width = np.full(len(rows), np.nan)
         if self.interval is not None:
             width = self.interval.half_width(design, coordinates(self.bank, rows))
         judged = rows[:, : self.bank.judged]
         within = (judged >= self.ranges[0]) & (judged <= self.ranges[1])
-        return Estimates(design @ self.weights, width, np.asarray(within.all(axis=1)))
+        inside = within.all(axis=1) & (not self.of_any)
+        return Estimates(design @ self.weights, width, np.asarray(inside))
+
+    def at(self, conditions: Mapping[str, float | str]) -> "BankEstimator":
+        """Return the estimator for a run: without an interval if it was fitted at one other level.
+
+        Args:
+            conditions: Conditions of the run.
+        """
+        return replace(self, interval=None) if other_levels(self.only, conditions) else self
 
     def for_any_instrument(self) -> "BankEstimator":
         """Return the estimator for use on instruments it was not fitted on.
 
         Nothing states how wrong it is there: it has no interval, and no sample is inside its range.
         """
-        nowhere = np.outer([np.inf, -np.inf], np.ones(self.bank.judged))
-        return replace(self, instrument="", interval=None, ranges=nowhere)
+        return replace(self, instrument="", interval=None, of_any=True)
 
     def stepper(self, sample_rate_hz: float) -> "BankStepper":
         """Return the estimator as it runs live."""
@@ -152,6 +168,7 @@ class BankEstimator:
                 "ranges": self.ranges,
                 "scale": self.scale,
                 "low_pass": np.array([self.low_pass.cutoff_hz, float(self.low_pass.order)]),
+                "only": np.array(json.dumps(dict(self.only))),
                 **interval,
                 **origin,
             },
@@ -182,6 +199,7 @@ class BankEstimator:
                 str(arrays["instrument"]),
                 LowPass(cutoff_hz, int(order)),
                 Origin.from_arrays(arrays),
+                json.loads(str(arrays.get("only", "{}"))),
             )
         except (KeyError, ValueError) as error:
             raise NetworkError(f"The file {path} holds no state estimator.", str(error)) from error
@@ -253,10 +271,16 @@ def fit_runs(
         folds = [Pool.of([r.normal for r in runs[k::INNER_FOLDS]]) for k in range(INNER_FOLDS)]
         settings = settings or chosen(whole, folds, bank.shape)
         interval = interval_of(runs, whole, bank, settings, coverage)
-    lowest = np.min([run.ranges[0] for run in runs], axis=0)
-    highest = np.max([run.ranges[1] for run in runs], axis=0)
     weights = solve(whole, bank.shape, settings or Settings())[:, 0]
-    return BankEstimator(bank, target, weights, interval, np.array([lowest, highest]), whole.spread)
+    return BankEstimator(
+        bank,
+        target,
+        weights,
+        interval,
+        ranges_of([run.ranges for run in runs]),
+        whole.spread,
+        only=only_levels([run.conditions for run in runs]),
+    )
 
 
 @dataclass(frozen=True)

@@ -250,7 +250,7 @@ def _bank(estimator: BankEstimator) -> str:
         "WRIST_ORDERS": str(bank.wrist_orders),
         "WRIST_POWERS": str(states.WRIST_POWERS),
         "WRIST_TURN": f"{2 * np.pi / states.WRIST_PERIOD_RAD:.9g}f",
-        "POSE": f"row[{states.JUDGED}]" if bank.pose else "0.0f",
+        "POSE": f"name_held(row, {states.JUDGED})" if bank.pose else "0.0f",
         "STATES": str(len(states.STATES)),
         "LAGS": str(len(states.LAGS)),
         "JUDGED": str(bank.judged),

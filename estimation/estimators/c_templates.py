@@ -146,12 +146,18 @@ static inline float name_added(const float *row) {
     return total;
 }
 
+/* the nearest value fitted: a polynomial carried beyond it grows */
+static inline float name_held(const float *row, int k) {
+    if (row[k] < name_lowest[k]) return name_lowest[k];
+    return row[k] > name_highest[k] ? name_highest[k] : row[k];
+}
+
 static inline name_estimate name_model(const float *row) {
-    float state[@STATES@], product[NAME_PRODUCTS];
+    float state[@STATES@], product[NAME_PRODUCTS], angle = name_held(row, 0);
     const float *drive = row + @JUDGED@, *past = drive + 4;
     float speed = row[2] / @GEAR@, load = row[1] / @LOAD@;
     float travel = drive[0] + @SLID@ * fmaxf((drive[1] - @LEAVES@) / @LEAVING@, 0.0f);
-    state[0] = (row[0] - @CENTRE@) / @SCALE@;
+    state[0] = (angle - @CENTRE@) / @SCALE@;
     state[1] = load - 1.0f;
     state[2] = speed - 1.0f;
     state[3] = row[3] / @ACCELERATION@;
@@ -173,7 +179,7 @@ static inline name_estimate name_model(const float *row) {
         product[k] = product[name_parent[k]] * state[name_factor[k]];
         total += name_weight[k] * product[k];
     }
-    float turn = @TURN@ * row[0], sine = sinf(turn), cosine = cosf(turn), s = 0.0f, c = 1.0f;
+    float turn = @TURN@ * angle, sine = sinf(turn), cosine = cosf(turn), s = 0.0f, c = 1.0f;
     const float *w = name_weight + NAME_PRODUCTS;
     for (int k = 0; k < NAME_ORDERS; k++, w += 6) {
         float next = s * cosine + c * sine;
@@ -182,7 +188,7 @@ static inline name_estimate name_model(const float *row) {
         total += s * (w[0] + w[2] * state[1] + w[4] * state[2]);
         total += c * (w[1] + w[3] * state[1] + w[5] * state[2]);
     }
-    turn = @WRIST_TURN@ * row[0], sine = sinf(turn), cosine = cosf(turn), s = 0.0f, c = 1.0f;
+    turn = @WRIST_TURN@ * angle, sine = sinf(turn), cosine = cosf(turn), s = 0.0f, c = 1.0f;
     for (int k = 0; k < NAME_WRIST_ORDERS; k++) {
         float next = s * cosine + c * sine, amplitude = 1.0f;
         c = c * cosine - s * sine;

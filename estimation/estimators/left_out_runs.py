@@ -11,7 +11,7 @@ from estimation.bank.edges import edges
 from estimation.bank.fitting import Pool, Settings, solve
 from estimation.bank.interval import Interval, calibrate, student, with_scores
 from estimation.bank.states import Bank
-from estimation.estimators.run_evidence import RunEvidence
+from estimation.estimators.run_evidence import RunEvidence, ranges_of
 from estimation.recording import FloatArray
 
 INNER_FOLDS = 5
@@ -35,7 +35,8 @@ def interval_of(
     def errors(left_out: NDArray[np.int_]) -> list[FloatArray]:
         rest = whole.without(Pool.of([runs[k].normal for k in left_out]))
         weights = solve(rest, bank.shape, settings)[:, 0]
-        return [runs[k].design @ weights - runs[k].truth for k in left_out]
+        fitted = ranges_of([run.ranges for k, run in enumerate(runs) if k not in left_out])
+        return [runs[k].estimate(bank, weights, fitted) - runs[k].truth for k in left_out]
 
     order = np.arange(len(runs))
     folds = [order[k::INNER_FOLDS] for k in range(INNER_FOLDS)]

@@ -1,13 +1,13 @@
 """What a fit of physical states takes of one run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from estimation.bank.beyond import coordinates
 from estimation.bank.fitting import Normal
-from estimation.bank.states import Bank
+from estimation.bank.states import Bank, held_within
 from estimation.recording import FloatArray
 
 
@@ -57,3 +57,32 @@ class RunEvidence:
             cls(rows, design, truth, whole.only(k), ranges, places, conditions or {})
             for k, truth in enumerate(np.ascontiguousarray(truths.T))
         ]
+
+    def estimate(self, bank: Bank, weights: FloatArray, ranges: FloatArray) -> FloatArray:
+        """Return the estimates by weights that were fitted in these ranges, shape (n,)."""
+        return np.asarray(within_ranges(bank, self.design, self.rows, ranges) @ weights)
+
+
+def ranges_of(ranges: Sequence[FloatArray]) -> FloatArray:
+    """Return the lowest and highest value of each judged channel, shape (2, judged)."""
+    lowest, highest = zip(*ranges, strict=True)
+    return np.array([np.min(lowest, axis=0), np.max(highest, axis=0)])
+
+
+def within_ranges(
+    bank: Bank, design: FloatArray, rows: FloatArray, ranges: FloatArray
+) -> FloatArray:
+    """Return a design as at the nearest angle and pose fitted, shape (n, size).
+
+    Args:
+        bank: The states and products.
+        design: Its products of the rows, shape (n, size).
+        rows: Filtered channels, shape (n, channels).
+        ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
+    """
+    held = held_within(bank, rows, ranges)
+    moved = np.flatnonzero((held != rows).any(axis=1) & np.isfinite(rows).all(axis=1))
+    if moved.size:
+        design = design.copy()
+        design[moved] = bank.design(held[moved])
+    return design

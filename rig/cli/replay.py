@@ -169,7 +169,13 @@ def _estimators(
         return []
     if model is None and not quiet:
         remarks().print(f"Estimate of the model in use, {path.name}.", soft_wrap=True)
-    estimators = estimators_of(path, recording.sample_rate_hz)
+    estimators = estimators_of(path, recording.sample_rate_hz, recording.conditions)
+    for name, level in estimators[0].other_levels.items() if not quiet else ():
+        remarks().print(
+            f"No interval: {path.name} was fitted at one level of {name}, and this run is at"
+            f" {level:g}. `rig fit` on runs at several levels gives one.",
+            markup=False,
+        )
     if not any_instrument:
         require_own(estimators[0].instrument, recording)
     return estimators

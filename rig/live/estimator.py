@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import model_file
+from estimation.bank.edges import other_levels
 from estimation.channels import ESTIMATED
 from estimation.estimator import Stepper, load
 from estimation.estimators.bank import BankEstimator, BankStepper
@@ -21,17 +22,26 @@ from rig.live.block import FloatArray
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints
 from rig.live.replay import within_range
 
+NOT_STATED: Mapping[str, float | str] = {}
+
 
 class ModelEstimator:
     """Feeds blocks to an estimator's causal stream. Satisfies `rig.live.replay.EstimateStream`."""
 
-    def __init__(self, path: Path, sample_rate_hz: float, balance: str | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        sample_rate_hz: float,
+        balance: str | None = None,
+        conditions: Mapping[str, float | str] = NOT_STATED,
+    ) -> None:
         """Read an estimator and begin before the first sample.
 
         Args:
             path: Model file, or a state estimator or a network (`.npz`).
             sample_rate_hz: Nominal rate of the device's clock, Hz.
             balance: Which model of a file of several; by default the first.
+            conditions: Conditions of the run, where a header states them.
 
         Raises:
             EstimationError: The file is not an estimator, the model is not fitted, or it cannot run
@@ -40,9 +50,13 @@ class ModelEstimator:
         self.model: Model | None = None  # only a physical model has effects to watch
         self.usual_half_width: float | None = None
         self.instrument = ""  # a physical model has none
+        self.other_levels: Mapping[str, float] = {}  # conditions of the run that no run fitted had
         self._stream: Stepper
         if path.suffix == ".npz":
             estimator = load(path)
+            if isinstance(estimator, BankEstimator):
+                self.other_levels = other_levels(estimator.only, conditions)
+                estimator = estimator.at(conditions)
             self._stream, self.target_channel = estimator.stepper(sample_rate_hz), estimator.target
             if isinstance(estimator, BankEstimator | NetworkEstimator):
                 self.instrument = estimator.instrument
@@ -104,14 +118,21 @@ class ModelEstimator:
         return self._stream.step(time_s, columns)
 
 
-def estimators_of(path: Path, sample_rate_hz: float) -> list[ModelEstimator]:
+def estimators_of(
+    path: Path, sample_rate_hz: float, conditions: Mapping[str, float | str] = NOT_STATED
+) -> list[ModelEstimator]:
     """Return the estimators of a file, each before its first sample.
+
+    Args:
+        path: Model file, or a state estimator or a network (`.npz`).
+        sample_rate_hz: Nominal rate of the device's clock, Hz.
+        conditions: Conditions of the run, where a header states them.
 
     Raises:
         EstimationError: As for `ModelEstimator`.
     """
     if path.suffix == ".npz":
-        return [ModelEstimator(path, sample_rate_hz)]
+        return [ModelEstimator(path, sample_rate_hz, conditions=conditions)]
     return [ModelEstimator(path, sample_rate_hz, m.balance) for m in models_in_use(path)]
 
 

@@ -136,6 +136,21 @@ def test_an_interval_looks_beyond_the_levels_that_were_fitted():
     assert shares[1] > shares[0]
 
 
+def test_no_interval_is_stated_at_a_second_level_of_a_condition_fitted_at_one(runs, tmp_path):
+    one = [r for r in runs if r.conditions["frequency_hz"] == runs[0].conditions["frequency_hz"]]
+    again = [replace(run, name=f"again {run.name}") for run in one]
+    BankRecipe(TARGET, BANK).fit(Campaign.of([*one, *again])).save(tmp_path / "one.npz")
+    fitted = BankEstimator.load(tmp_path / "one.npz")
+    (other, *_) = [r for r in runs if r not in one]
+    assert np.isfinite(fitted.estimate(one[0]).half_width).any()
+    assert np.isfinite(fitted.estimate(replace(other, conditions={})).half_width).any()
+    assert np.isnan(fitted.estimate(other).half_width).all()
+    assert np.isfinite(fitted.estimate(other).value).all()
+    both = BankRecipe(TARGET, BANK).fit(Campaign.of(runs))
+    slow = replace(other, conditions={**other.conditions, "frequency_hz": 0.01})
+    assert np.isfinite(both.estimate(slow).half_width).any()
+
+
 def test_samples_beyond_what_was_fitted_are_told(fitted, runs):
     closing = processed(runs[1], [])["spindle_velocity_rad_s"] > 0.3
     assert fitted.estimate(runs[1]).inside[closing].mean() > 0.9
@@ -213,6 +228,21 @@ def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, r
         adapted(fitted, [])
 
 
+def test_an_instrument_far_from_the_source_gets_a_wide_interval_away_from_its_run(fitted, runs):
+    """One run cannot show how wrong the estimate is elsewhere; the source's error there can."""
+
+    def other(run: Recording, more: float) -> Recording:
+        return run.with_columns(**{TARGET: run[TARGET] + more * run["motor_current_a"]})
+
+    widths = []
+    for more in (0.0, 5.0):
+        one = evidence(fitted, other(runs[1], more))
+        assert one is not None
+        new = adapted(fitted, [one])
+        widths.append(np.nanmean(closing_error(new, other(runs[6], more))[1]))
+    assert widths[1] > widths[0]
+
+
 def moved(run: Recording, angle_rad: float) -> Recording:
     """Return a run as if it were made elsewhere along the travel."""
     return run.with_columns(spindle_angle_rad=run["spindle_angle_rad"] + angle_rad)
@@ -237,6 +267,20 @@ def test_no_interval_is_stated_at_angles_that_no_run_had(fitted, runs):
     width = fitted.estimate(moved(runs[1], 1.0)).half_width
     assert np.isnan(width[far]).all()
     assert np.isfinite(width[closing & ~far]).mean() > 0.5
+
+
+def test_an_estimate_beyond_the_fitted_angles_is_that_at_the_nearest_one(fitted, runs):
+    """A polynomial of the angle, carried on, would grow to many times the largest torque."""
+    low, high = fitted.ranges[:, 0]
+    rows = np.random.default_rng(0).uniform(*fitted.ranges, (20, BANK.judged))
+    rows = np.hstack([rows, np.zeros((20, len(BANK.channels) - BANK.judged))])
+    for far, near in ((high + 3.0, high), (low - 3.0, low)):
+        there, here = rows.copy(), rows.copy()
+        there[:, 0], here[:, 0] = far, near
+        found = fitted.of_rows(there)
+        np.testing.assert_array_equal(found.value, fitted.of_rows(here).value)
+        assert not found.inside.any()
+        assert np.isnan(found.half_width).all()
 
 
 def test_a_damaged_file_is_refused(fitted, tmp_path):

@@ -72,8 +72,10 @@ def bank(runs) -> BankEstimator:
     return BankRecipe(TARGET, Bank("motor_current_a"), causal=True).fit(Campaign.of(runs[1:]))
 
 
-def test_the_compiled_state_estimator_gives_the_same(bank, runs, tmp_path):
-    found, wanted = compiled(bank, runs[0], tmp_path), bank.estimate(runs[0], causal=True)
+@pytest.mark.parametrize("beyond_rad", [0.0, 1.0])
+def test_the_compiled_state_estimator_gives_the_same(bank, runs, tmp_path, beyond_rad):
+    run = runs[0].with_columns(spindle_angle_rad=runs[0]["spindle_angle_rad"] + beyond_rad)
+    found, wanted = compiled(bank, run, tmp_path), bank.estimate(run, causal=True)
     assert np.abs(found[:, 0] - wanted.value).max() <= 1e-5 * np.abs(wanted.value).max()
     np.testing.assert_allclose(found[:, 1], wanted.half_width, rtol=1e-4)
     assert np.mean(found[:, 2] == wanted.inside) > 0.999  # a sample may lie on a bound

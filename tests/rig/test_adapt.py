@@ -54,6 +54,29 @@ def test_replay_refuses_another_instrument_unless_allowed(folders, states, capsy
     assert main([*words, "--plain", "--any-instrument"]) == 0
 
 
+def test_replay_states_why_a_run_at_another_level_has_no_interval(folders, tmp_path, capsys):
+    slow, fast = (read_first(folders[0], f"{k:02}") for k in (0, 8))
+    level = slow.conditions["frequency_hz"]
+    assert level != fast.conditions["frequency_hz"]
+    same = [run for run in open_campaign(folders[0]) if run.conditions["frequency_hz"] == level]
+    (tmp_path / "slow").mkdir()
+    for run in same:
+        write_recording(tmp_path / "slow" / f"{run.name}.mcap", run)
+    path = tmp_path / "slow.npz"
+    assert main(["fit", str(tmp_path / "slow"), "--model", "states", "--out", str(path)]) == 0
+    for name, states_why in (("00", False), ("08", True)):
+        words = ["replay", str(folders[0] / f"{name}.mcap"), "--model", str(path), "--speed", "0"]
+        capsys.readouterr()
+        assert main([*words, "--plain"]) == 0
+        assert ("was fitted at one level of frequency_hz" in capsys.readouterr().err) is states_why
+
+
+def read_first(folder, name: str) -> Recording:
+    """Return a recording of a folder."""
+    (found,) = open_campaign(folder / f"{name}.mcap")
+    return found
+
+
 def test_adapt_reports_the_runs_not_used_and_keeps_the_estimator(folders, states, tmp_path):
     found, new = tmp_path / "a.json", tmp_path / "new.npz"
     words = ["adapt", str(states), str(folders[1]), "--runs", "01,05"]

@@ -187,10 +187,8 @@ class _Run:
 
 
 def _on_run(fitted: BankEstimator, run: RunEvidence) -> _Run:
-    error = run.design @ fitted.weights - run.truth
-    width = np.full(len(error), np.nan)
-    if fitted.interval is not None:
-        width = fitted.interval.half_width(run.design, run.places)
+    found = fitted.at(run.conditions).of_design(run.design, run.rows)
+    error, width = found.value - run.truth, found.half_width
     stated = np.isfinite(width)
     return _Run(
         float(np.mean(error**2)),
