@@ -1,8 +1,9 @@
 """An archive of simulated campaigns: index, search, a fit of each, and changes over time.
 
-`python -m benchmarks.archive [--campaigns N,...] [--runs N] [--out FILE]` writes archives of some
-sizes into a temporary folder, times each step with one process, two processes and a Dask cluster of
-two workers of this machine, ends a worker during the last one, and counts the changes found.
+`python -m benchmarks.archive [--campaigns N,...] [--runs N] [--diagnosed N] [--out FILE]` writes
+archives of some sizes into a temporary folder, times each step with one process, two processes and
+a Dask cluster of two workers of this machine, ends a worker during the last one, and counts the
+changes found. A few campaigns of more runs are diagnosed.
 """
 
 import argparse
@@ -30,10 +31,12 @@ from rig.diagnosis.refit import refit_all
 from rig.log.convert import write_recording
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable, to_page
+from rig.reports.diagnosed import diagnose_all
 from rig.simulation.campaign import simulate_reference_campaign
 from rig.simulation.parameters import PlantParameters
 
-SIZES, RUNS = (12, 24, 48), 2
+SIZES, RUNS = (100, 300, 1000), 2
+DIAGNOSED, RUNS_TO_DIAGNOSE = 6, 10
 DAY_NS = 86_400_000_000_000
 START_NS = 1_750_000_000_000_000_000
 CHANGED_AT = {"torque_constant_n_m_a": (0.4, 0.93), "motor_friction_n_m": (0.7, 1.3)}
@@ -131,6 +134,27 @@ def found_changes(root: Path) -> list[list[str]]:
     return rows
 
 
+def diagnosed(count: int) -> list[list[str]]:
+    """Return a row of times for each way to diagnose so many campaigns."""
+    rows = []
+    with tempfile.TemporaryDirectory(prefix="rig-archive-") as place:
+        root = Path(place) / "logs"
+        write_archive(root, count, RUNS_TO_DIAGNOSE)
+        for name, start in {
+            "one process": engine,
+            "two processes": partial(engine, 2),
+            "two Dask workers": dask,
+        }.items():
+            for path in root.glob("*/diagnosis/*"):
+                path.unlink()
+            begun = time.monotonic()
+            done = diagnose_all(folders(root), Path(place) / f"{name}.jsonl", start)
+            seconds = time.monotonic() - begun
+            good = sum(not one.failed for one in done.values())
+            rows.append([name, f"{good} of {count}", f"{seconds:.0f}", f"{seconds / count:.1f}"])
+    return rows
+
+
 def measure(sizes: list[int], runs: int) -> tuple[list[list[str]], list[list[str]], str]:
     """Return the rows of times, those of changes, and a sentence on the lost worker."""
     rows = []
@@ -162,6 +186,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.archive", description=__doc__)
     parser.add_argument("--campaigns", default=",".join(map(str, SIZES)), metavar="N,...")
     parser.add_argument("--runs", type=int, default=RUNS, help="runs of a campaign, 20 s each")
+    parser.add_argument(
+        "--diagnosed", type=int, default=DIAGNOSED, help="campaigns that are diagnosed"
+    )
     parser.add_argument("--out", type=Path)
     asked = parser.parse_args()
     rows, moved, lost = measure([int(n) for n in asked.campaigns.split(",")], asked.runs)
@@ -173,6 +200,12 @@ def main() -> int:
             "Changes found in the largest",
             ["parameter", "planted: factor at campaign", "found", "alarm at"],
             moved,
+        ),
+        TextTable(
+            f"Campaigns of {RUNS_TO_DIAGNOSE} runs diagnosed",
+            ["by", "diagnosed", "s", "s a campaign"],
+            diagnosed(asked.diagnosed),
+            "As `rig campaigns --diagnose` does it: every equation, pages kept.",
         ),
     ]
     text = to_page(

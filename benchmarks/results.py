@@ -86,6 +86,13 @@ PAGES = (
         10,
     ),
     Page(
+        "archive",
+        "python -m benchmarks.archive --out docs/results/archive.md",
+        "benchmarks/archive.py rig/campaigns rig/diagnosis/each.py rig/diagnosis/refit.py"
+        " rig/reports/diagnosed.py",
+        30,
+    ),
+    Page(
         "bench",
         "python -m benchmarks --out docs/results/bench.md",
         "benchmarks/bench_*.py drivers/framing.py drivers/framing_compiled.py rig/log rig/importers"
@@ -97,6 +104,13 @@ PAGES = (
         "python -m benchmarks.changes --first 500 --pairs 36 --out docs/results/changes.md",
         "benchmarks/changes.py estimation/changes estimation/causes benchmarks/rigs",
         5,
+    ),
+    Page(
+        "changes-measured",
+        "python -m benchmarks.measured_changes --data {data}"
+        " --out docs/results/changes-measured.md",
+        "benchmarks/measured_changes.py estimation/changes estimation/causes",
+        6,
     ),
     Page("core-mutants", "python -m benchmarks.core_mutants", _CORE, 60),
     Page(

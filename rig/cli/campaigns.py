@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rig.cli.diagnose_all import show_diagnoses
 from rig.cli.options import SchedulerOption, WorkersOption
 from rig.cli.refit import show_refit
 from rig.cli.shipped import complete_campaign, complete_model
@@ -36,7 +37,7 @@ def campaigns(
         bool, typer.Option("--compare", help="Show the campaigns found side by side.")
     ] = False,
     diagnose: Annotated[
-        bool, typer.Option("--diagnose", help="Diagnose the one campaign found, and keep the page.")
+        bool, typer.Option("--diagnose", help="Diagnose the campaigns found, and keep the pages.")
     ] = False,
     refit: Annotated[
         str | None,
@@ -69,6 +70,9 @@ def campaigns(
         show_refit(
             [campaign for campaign in found if campaign.runs], root, refit, workers, scheduler, json
         )
+        return
+    if diagnose and len(recorded := [campaign for campaign in found if campaign.runs]) > 1:
+        show_diagnoses(recorded, root, workers, scheduler, json)
         return
     if diagnose:
         _diagnose(_only(found).folder)

@@ -7,10 +7,11 @@ a copy, another name or another folder does not make them new.
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from estimation.diagnosis.split import Sealed, samples_hash
 from estimation.file_kinds import LEDGER
@@ -33,6 +34,23 @@ def state_folder() -> Path:
 def default_ledger() -> Path:
     """Return the access log, in the state folder."""
     return state_folder() / "looks.jsonl"
+
+
+Look = Mapping[str, Any]
+"""One use of runs, a line of the ledger."""
+
+
+def look_at(recordings: Sequence[Recording], sealed: Sealed) -> Look:
+    """Describe a use of runs, as the ledger holds it."""
+    return {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "data_hash": sealed.data_hash,
+        "seal": sealed.seal,
+        "seed": sealed.seed,
+        "discover": sealed.discover,
+        "confirm": sealed.confirm,
+        "runs": {r.name: samples_hash(r) for r in recordings},
+    }
 
 
 @dataclass(frozen=True)
@@ -80,15 +98,14 @@ class Ledger:
         Raises:
             LedgerError: The ledger cannot be read or written.
         """
-        look = {
-            "date": datetime.now(UTC).isoformat(timespec="seconds"),
-            "data_hash": sealed.data_hash,
-            "seal": sealed.seal,
-            "seed": sealed.seed,
-            "discover": sealed.discover,
-            "confirm": sealed.confirm,
-            "runs": {r.name: samples_hash(r) for r in recordings},
-        }
+        self.enter(look_at(recordings, sealed))
+
+    def enter(self, look: Look) -> None:
+        """Enter a use that `look_at` described.
+
+        Raises:
+            LedgerError: The ledger cannot be read or written.
+        """
         try:
             before = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
             write_text_atomic(self.path, before + json.dumps(look) + "\n")

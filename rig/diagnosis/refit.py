@@ -1,16 +1,14 @@
 """One model fitted on every campaign, each result kept with its logs.
 
 A campaign whose logs and model are those of a kept result is not fitted again, so a call that was
-interrupted goes on where it stopped. Results are written as they come; when a process of the pool
-is lost, only what it was working on is done again.
+interrupted goes on where it stopped.
 """
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, as_completed
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 from estimation.errors import EstimationError
@@ -18,13 +16,9 @@ from estimation.files import write_text_atomic
 from estimation.fitting import fit
 from estimation.model_file import parse
 from rig.campaigns.index import ENDINGS
+from rig.diagnosis.each import Start, for_each
 from rig.errors import RigError
 from rig.importers.registry import open_campaign
-
-ATTEMPTS = 4
-"""Pools that are started before a campaign that ends them is given up."""
-
-Start = Callable[[], AbstractContextManager[Executor | None]]
 
 
 @dataclass(frozen=True)
@@ -66,28 +60,22 @@ def refit_all(
         BrokenExecutor: Processes end again and again.
         OSError: A result cannot be written.
     """
-    keys = {folder: _key(folder, model) for folder in folders}
-    found = {folder: kept for folder in folders if (kept := _kept(folder, model, keys[folder]))}
-    for attempt in range(1, ATTEMPTS + 1):
-        missing = [folder for folder in folders if folder not in found]
-        if not missing:
-            break
-        try:
-            with start() as executor:
-                tasks = [(model, folder, keys[folder]) for folder in missing]
-                for folder, found[folder] in _done(tasks, executor):
-                    place = _place(folder, model)
-                    place.parent.mkdir(exist_ok=True)
-                    write_text_atomic(place, json.dumps(asdict(found[folder])) + "\n")
-                    on_done(folder)
-        except BrokenExecutor:
-            if attempt == ATTEMPTS:
-                raise
+    found = {folder: kept for folder in folders if (kept := _kept(folder, model))}
+
+    def keep(folder: Path, fitted: Refit) -> None:
+        found[folder], place = fitted, _place(folder, model)
+        place.parent.mkdir(exist_ok=True)
+        write_text_atomic(place, json.dumps(asdict(fitted)) + "\n")
+        on_done(folder)
+
+    missing = [folder for folder in folders if folder not in found]
+    for_each(missing, partial(fit_folder, model), start, keep)
     return {folder: found[folder] for folder in folders}
 
 
-def fit_folder(model: str, folder: Path, key: str) -> Refit:
+def fit_folder(model: str, folder: Path) -> Refit:
     """Return a model fitted on a folder's campaign, or why it could not be."""
+    key = _key(folder, model)
     try:
         fitted = fit(parse(model), open_campaign(folder, skip_bad=True), bootstrap=0)
     except (EstimationError, RigError) as error:
@@ -101,17 +89,6 @@ def fit_folder(model: str, folder: Path, key: str) -> Refit:
     evidence = fitted.evidence
     assert evidence is not None  # noqa: S101  a fit states it
     return Refit(key, values, units, evidence.rmse, len(evidence.runs))
-
-
-def _done(
-    tasks: Sequence[tuple[str, Path, str]], executor: Executor | None
-) -> Iterator[tuple[Path, Refit]]:
-    if executor is None:
-        yield from ((task[1], fit_folder(*task)) for task in tasks)
-        return
-    running = {executor.submit(fit_folder, *task): task[1] for task in tasks}
-    for future in as_completed(running):
-        yield running[future], future.result()
 
 
 def _logs(folder: Path) -> list[Path]:
@@ -130,9 +107,9 @@ def _place(folder: Path, model: str) -> Path:
     return folder / "fit" / f"{hashlib.sha256(model.encode()).hexdigest()[:12]}.json"
 
 
-def _kept(folder: Path, model: str, key: str) -> Refit | None:
+def _kept(folder: Path, model: str) -> Refit | None:
     try:
         kept = Refit(**json.loads(_place(folder, model).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None
-    return kept if kept.key == key else None
+    return kept if kept.key == _key(folder, model) else None

@@ -101,3 +101,12 @@ def test_a_change_is_found_at_its_campaign_and_noise_is_none():
     found = [[one.first for one in changes(row)] for row in noise]
     assert sum(any(abs(first - 40) <= 1 for first in row) for row in found) >= 95
     assert changes([1.0] * 50) == []
+
+
+def test_a_long_series_with_outliers_has_no_change_but_the_planted_one():
+    random = np.random.default_rng(1)
+    series = 1.0 + 0.02 * random.standard_t(2.0, size=(20, 800))
+    assert sum(bool(changes(row)) for row in series) <= 1
+    series[:, 500:] *= 1.05
+    found = [[one.first for one in changes(row)] for row in series]
+    assert sum(len(row) == 1 and abs(row[0] - 500) <= 10 for row in found) >= 18

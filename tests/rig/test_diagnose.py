@@ -88,6 +88,33 @@ def test_a_folder_of_logs_keeps_its_diagnosis_with_them(tmp_path, monkeypatch, c
     assert campaign["diagnosis"]["verdict"]
 
 
+def test_every_campaign_found_is_diagnosed_once(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("RIG_STATE_DIR", str(tmp_path / "state"))
+    root = tmp_path / "logs"
+    one_run = tmp_path / "one.toml"
+    one_run.write_text(
+        'name = "one"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [0.5]\nloads_a = [0.4]\n'
+        "duration_s = 4.0\n"
+    )
+    for k, protocol in enumerate(("quick", "quick", str(one_run))):
+        words = ["record", "--sim", "-p", protocol, "-o", str(root / f"day-{k}")]
+        assert main([*words, "--seed", str(k)]) == 0
+    words = ["campaigns", "--root", str(root), "--diagnose", "--json"]
+    capsys.readouterr()
+    assert main(words) == 0
+    rows = json.loads(capsys.readouterr().out)["campaigns"]
+    failed = {Path(row["folder"]).name: row["failed"] for row in rows}
+    assert "too few" in failed.pop("day-2")
+    assert set(failed.values()) == {""}
+    pages = [root / name / "diagnosis/diagnosis.html" for name in failed]
+    assert all(page.read_text().startswith("<!DOCTYPE html>") for page in pages)
+    assert len((tmp_path / "state/looks.jsonl").read_text().splitlines()) == len(pages)
+    made = [page.stat().st_mtime_ns for page in pages]
+    assert main(words) == 0  # a second call has nothing to do
+    assert [page.stat().st_mtime_ns for page in pages] == made
+    assert json.loads(capsys.readouterr().out)["campaigns"] == rows
+
+
 def test_every_equation_that_is_decided_goes_into_the_model_file(campaign, tmp_path):
     path = tmp_path / "found.model.toml"
     found = run(tmp_path, "--model-out", str(path), "--quick")
