@@ -107,10 +107,14 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
         for kind in (block.base, block.own, block.target)
     ]
 
+    of_prior = joint.prior_products(block.taken)
+    own_prior = -block.taken.swapaxes(1, 2) @ of_prior[:, : block.taken.shape[1]]
+
     def fitted(family: Sequence[Sequence[int]]) -> tuple[FloatArray, FloatArray]:
         """Return the base and the amplitudes without each fold, (folds, causes, .) each."""
         fits = joint.left_out(family)
         cross, own, right = (x.sum(axis=0) - np.tensordot(fits.left, x, 1) for x in sums)
+        cross, own = cross + of_prior, own + own_prior
         through = fits.inverse[:, None] @ cross
         eye = np.eye(own.shape[-1])
         spread = 1e-9 * np.einsum("fckk->fck", own) + precision

@@ -212,10 +212,9 @@ def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
     first = held[0][0]
     columns = _stacked(joint, [raw[1] for raw in held])
     shaken = _stacked(joint, [raw[2] for raw in held if raw[2] is not None])
-    laid = joint.projection.laid(columns, shaken, _unit(first.cause))
-    if first.acts is not None and not first.given:
-        # what starts between runs also shifts their means, by its own offset
-        laid = laid.without_means()
+    # what starts between runs also shifts their means, by its own offset
+    has_means = first.acts is None or first.given
+    laid = joint.projection.laid(columns, shaken, _unit(first.cause), has_means)
     shown = np.flatnonzero(laid.size.min(axis=1) >= NOTHING)
     if len(shown) < len(held):
         laid = laid.only(shown)

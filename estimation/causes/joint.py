@@ -101,6 +101,7 @@ class Joint:
             {e.name: [_instrumented(e, r) for r in self.runs] for e in layout.equations.values()},
             noise,
             {n: (weights[n, "within"], weights[n, "between"]) for n in layout.equations},
+            {name: self._precision[[*at]] for name, at in self._equations_at.items()},
         )
         self.power = sum(
             weights[p] * float(self.gram[p][:, -1, -1].sum())
@@ -181,10 +182,13 @@ class Joint:
         self._fits: dict[tuple[tuple[int, ...], ...], LeftOut] = {}
         whole = self._run_grams.sum(axis=0)
         # no term exceeds half of all signals, and a shape is known to within its own size
-        self._prior = 4.0 * np.diag(whole)[:-1] / float(whole[-1, -1])
+        size = self._declared_size
+        self._precision = 4.0 * np.diag(whole)[:size] / float(whole[-1, -1])
         shapes = [s for e in self.layout.equations.values() for s in e.of_shape]
-        self._prior[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
-        self._prior[self._declared_size :] = self._added
+        self._precision[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
+        self._prior = np.diag(np.append(self._precision, self._added))
+        self._prior[:, size:] += self.prior_products(self.taken)
+        self._prior[size:, :size] = self._prior[:size, size:].T
 
     def left_out(self, family: Family) -> LeftOut:
         """Return the base fitted without the runs of each fold."""
@@ -195,16 +199,31 @@ class Joint:
                 own[list(without)] = 1.0
             fold, runs = np.nonzero(left)
             gram = self._run_grams.sum(axis=0) - np.tensordot(left, self._run_grams, 1)
-            gram[:, range(self.size), range(self.size)] += self._prior
+            gram[:, :-1, :-1] += self._prior
             inverses = inverse(gram[:, :-1, :-1])
             base = np.einsum("fij,fj->fi", inverses, gram[:, :-1, -1])
             self._fits[key] = LeftOut(left, runs, fold, inverses, base)
         return self._fits[key]
 
+    def prior_products(self, taken: FloatArray) -> FloatArray:
+        """Return the prior's products of the base with causes that declared columns were taken off.
+
+        The prior is that of the declared parameters themselves, not of what is left of them next to
+        a cause. Otherwise it would say how large a cause is in runs that show nothing of it.
+
+        Args:
+            taken: How much of each declared column was taken off the causes, (..., declared, k).
+
+        Returns:
+            Shape (..., base, k).
+        """
+        of_declared = -self._precision[:, None] * taken
+        return np.concatenate([of_declared, -self.taken.T @ of_declared], axis=-2)
+
     def fitted_on(self, counts: FloatArray) -> FloatArray:
         """Return the base's parameters with each run counted so many times, shape (base,)."""
         gram = np.einsum("r,rij->ij", counts, self._run_grams)
-        gram[range(self.size), range(self.size)] += self._prior
+        gram[:-1, :-1] += self._prior
         return np.asarray(inverse(gram[:-1, :-1]) @ gram[:-1, -1])
 
     def declared_products(self, part: Part) -> FloatArray:

@@ -1,7 +1,7 @@
 """Candidate causes laid out on the runs, without what the declared columns explain."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -55,10 +55,6 @@ class Laid:
             {name: x[:, chosen] for name, x in self.own_noise.items()},
         )
 
-    def without_means(self) -> "Laid":
-        """Return the same causes with no effect on the means of runs."""
-        return replace(self, means={n: np.zeros_like(x) for n, x in self.means.items()})
-
 
 class Stacks:
     """The samples that each equation counts, of all runs in one array that zeros fill up.
@@ -105,6 +101,8 @@ class Projection:
         declared: Equation to the declared columns of instrumented signals, of every run.
         noise: Equation to the noise of the declared columns and of the target, of every run.
         weights: Equation to the weights of one squared residual within runs and between them.
+        precision: Equation to the prior precision of each declared parameter. The derivative by the
+            shape of a term that is as good as zero would explain anything without it.
     """
 
     def __init__(
@@ -113,6 +111,7 @@ class Projection:
         declared: Mapping[str, Sequence[FloatArray]],
         noise: Mapping[str, FloatArray],
         weights: Mapping[str, tuple[float, float]],
+        precision: Mapping[str, FloatArray],
     ) -> None:
         self.samples, self.noise, self.weights = samples, noise, weights
         self._inner, self._means, self._inverse = {}, {}, {}
@@ -123,11 +122,16 @@ class Projection:
             within, between = weights[name]
             gram = between * means.T @ means
             gram[:-1, :-1] += within * np.tensordot(inner, inner, ([0, 1], [0, 1]))
+            gram[:-1, :-1] += np.diag(precision[name])
             self._inner[name], self._means[name] = inner, means
             self._inverse[name] = inverse(gram)
 
     def laid(
-        self, columns: Mapping[str, FloatArray], shaken: Mapping[str, FloatArray], unit: Scale
+        self,
+        columns: Mapping[str, FloatArray],
+        shaken: Mapping[str, FloatArray],
+        unit: Scale,
+        has_means: bool = True,
     ) -> Laid:
         """Return causes without what the declared columns explain.
 
@@ -136,6 +140,7 @@ class Projection:
                 place.
             shaken: The same with each reading's noise added a second time, changed in place.
             unit: Which weighted norm is scaled to one, for amplitudes of one prior width.
+            has_means: Whether the causes have an effect on the means of runs.
         """
         inners, middles, taken = {}, {}, {}
         norm: FloatArray = np.zeros(())
@@ -145,6 +150,8 @@ class Projection:
         for name, stacked in columns.items():
             within, between = self.weights[name]
             inner, means = self.samples.centred(name, stacked)
+            if not has_means:
+                means = np.zeros_like(means)
             if unit != "none":
                 norm = norm + within * np.einsum("rcnk,rcnk->ck", inner, inner)
                 norm = norm + between * np.einsum("rck,rck->ck", means, means)

@@ -7,13 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimation.causes.candidates import Claim, groups_of
 from estimation.causes.equations import lay_out
 from estimation.causes.findings import family_probabilities
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
+from estimation.causes.joint import Joint
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.places import places_of
+from estimation.causes.scoring import assessed, best_of_each
 from estimation.causes.search import Found, search
 from estimation.causes.sources import sources_at
 from estimation.causes.verdict import answer, diagnose
@@ -178,6 +181,43 @@ def test_a_load_that_is_held_in_each_run_has_its_ratio_from_the_runs_means() -> 
     ratio = layout.equations["cable"].channels["distal_torque_n_m"]
     assert ratio == pytest.approx(RATIO, rel=0.01)
     assert within.equations["cable"].channels["distal_torque_n_m"] < 0.98 * RATIO
+
+
+def test_a_cause_of_some_runs_does_not_free_a_slope_within_runs_from_their_means() -> None:
+    """The drag of the load is in its reading, so the slope within runs is another than between."""
+    runs = []
+    for run in cabled(held=True):
+        way = np.tanh(np.gradient(run["spindle_angle_rad"], run.time_s) / 0.06)
+        load = run["distal_torque_n_m"]
+        torque = run["proximal_torque_n_m"] + (0.003 * RATIO + 0.4 * load) * way
+        runs.append(
+            run.with_columns(distal_torque_n_m=load + 0.003 * way, proximal_torque_n_m=torque)
+        )
+    layout = lay_out(cable(), runs, [run.name for run in runs])
+    add_instruments(layout, [run.name for run in runs])
+    joint = Joint(layout)
+    (place,) = [p for p in places_of(layout) if p.name == "cable"]
+    # as good as constant while the cable moves, and present where the load is large
+    sources = [s for s in sources_at(layout, place) if s.family == "friction.coulomb_asymmetry"]
+    acts = tuple(run.conditions["load_command_a"] > 0.15 for run in runs)
+    claims = [Claim(source, acts) for source in sources]
+    (one, *_) = best_of_each(assessed(joint, groups_of(joint, claims), folds_of(layout)))
+    assert abs(one.gain) < 0.1  # it hardly shows within a run, and changes no error
+
+
+def test_runs_without_a_cause_show_nothing_of_its_size() -> None:
+    """Fitted without the runs that have it, a cause predicts as little for them as no cause."""
+    rubs = recordings(lambda angle, speed, load: 0.01 * np.tanh(speed / 2.0))
+    runs = [*rubs[:3], *recordings()[3:]]
+    layout = lay_out([motor()], runs, [run.name for run in runs])
+    add_instruments(layout, [run.name for run in runs])
+    joint = Joint(layout)
+    place = next(p for p in places_of(layout) if p.name == "motor")
+    acts = tuple(k < 3 for k in range(len(runs)))
+    claims = [Claim(s, acts) for s in sources_at(layout, place) if s.family == "friction.warmup"]
+    found = assessed(joint, groups_of(joint, claims), [[[0, 1, 2]]])
+    assert max(abs(one.gain) for one in found) < 0.05
+    assert max(one.gain for one in assessed(joint, groups_of(joint, claims), folds_of(layout))) > 1
 
 
 def test_zeros_that_scatter_between_runs_leave_a_ratio_as_it_was_within_runs() -> None:
