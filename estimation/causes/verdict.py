@@ -33,7 +33,7 @@ from estimation.causes.search import Found, search
 from estimation.causes.unsteady import unsteady
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding
-from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
+from estimation.diagnosis.split import Sealed
 from estimation.model import Model
 from estimation.recording import Recording
 
@@ -297,8 +297,8 @@ def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> 
     found = audit(training)
     if not sealed.may_name:
         found.append(
-            f"{len(sealed.discover)} training runs: with fewer than {LEAST_TO_NAME} no effect is"
-            " named."
+            f"{len(sealed.discover)} training runs: with fewer than {DEFAULT.least_to_name} no"
+            " effect is named."
         )
     found += [f"Left out: {reason}" for reason in layout.left_out.values()]
     found += [

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.diagnosis.case import Report
-from estimation.diagnosis.paths import path_of
+from estimation.diagnosis.split import path_of
 from estimation.recording import Recording
 
 
