@@ -13,18 +13,15 @@ import numpy as np
 from benchmarks.diagnosis.case import KINDS, write_recordings
 from benchmarks.diagnosis.excitation import RUNS, plans_of, wrist_motion
 from benchmarks.diagnosis.truths import CATALOGUED, OUTSIDE, TRUTHS
-from estimation.recording import FloatArray, Instrument, Recording
-from rig.protocols import trajectory
+from estimation.recording import FloatArray, Recording
 from rig.protocols.motion import motion_of
 from rig.protocols.protocol import RunPlan, load_protocol
-from rig.simulation.bench import SimulatedBench
+from rig.simulation.campaign import bench_at, simulated_run
 from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import NAMES, HiddenEffect
 from rig.simulation.hidden_kinds import KINDS as HIDDEN
 from rig.simulation.parameters import PlantParameters, SensorParameters, vary
 from rig.simulation.plant import TICK_S
-from rig.simulation.play import play
-from rig.simulation.sensors import spindle_count_of
 
 WEAK = 0.3
 """Strength of a weak case for one of a strong one."""
@@ -175,7 +172,11 @@ def record(
     sensors = _sensors(answer.chain, rig_seed)
     for index, plan in zip(range(len(plans)) if places is None else places, plans, strict=True):
         moved = replace(plant, **wrist_motion(answer.excitation, index))
-        made = _record(plan, moved, sensors, answer.in_run(index), rig_seed * 1009 + index, index)
+        start_rad = float(plan.target_angle_rad[0])
+        effects, seed = answer.in_run(index), rig_seed * 1009 + index
+        bench = bench_at(start_rad, moved, sensors, effects, seed)
+        started_at_ns = EPOCH_NS + round(index * APART_S * 1e9)
+        made = replace(simulated_run(bench, plan, "simulated"), started_at_ns=started_at_ns)
         if answer.excitation == "wrist":
             made = made.with_columns(wrist_pitch_rad=_wrist(plan, moved))
         yield _skewed(made, rig_seed * 1013 + index) if answer.chain == "skewed" else made
@@ -210,33 +211,6 @@ def _wrist(plan: RunPlan, plant: PlantParameters) -> FloatArray:
     step = 2.0 * np.pi / WRIST_COUNTS
     read: FloatArray = np.floor(pitch / step) * step
     return read
-
-
-def _record(
-    plan: RunPlan,
-    plant: PlantParameters,
-    sensors: SensorParameters,
-    effects: tuple[HiddenEffect, ...],
-    seed: int,
-    index: int,
-) -> Recording:
-    start_rad = float(plan.target_angle_rad[0])
-    count = spindle_count_of(start_rad, sensors)
-    bench = SimulatedBench(plant, sensors, effects, seed, count)
-    motion = motion_of(plan, start_rad)
-    columns = play(
-        bench, motion.target_angle_rad[: motion.last], motion.load_command_a[: motion.last]
-    )
-    return Recording(
-        plan.name,
-        np.arange(motion.last - motion.first) / trajectory.SAMPLE_RATE_HZ,
-        {name: values[motion.first :] for name, values in columns.items()},
-        conditions=plan.conditions,
-        rig="simulated rig",
-        instrument=Instrument(model="Maryland", serial="SIM-TOOL-1", side="left"),
-        started_at_ns=EPOCH_NS + round(index * APART_S * 1e9),
-        source="simulated",
-    )
 
 
 def _skewed(recording: Recording, seed: int) -> Recording:

@@ -17,7 +17,7 @@ from rig.configuration.config import load_config
 from rig.diagnosis.menu import menu, room_of, within
 from rig.diagnosis.simulated import simulated_rig
 from rig.protocols.protocol import Protocol, protocol_toml
-from rig.simulation.twin import Twin
+from rig.simulation.fitted_rig import FittedRig
 
 SEED = 7_000_000
 """Seed of the simulated sensors' noise."""
@@ -76,7 +76,7 @@ def write_protocol(diagnosis: Diagnosis, path: Path) -> str:
     return f"Next: rig record --protocol {path}"
 
 
-def _worth(rig: Twin, asked: Question, last_s: float, protocol: Protocol) -> float | None:
+def _worth(rig: FittedRig, asked: Question, last_s: float, protocol: Protocol) -> float | None:
     """Return the expected separation of an experiment; None beyond the limits of the rig."""
     plans = protocol.plans()
     played = [rig.play(plan, SEED + k) for k, plan in enumerate(plans)]

@@ -11,13 +11,13 @@ from estimation.fitting import fit
 from estimation.model import Model
 from estimation.recording import Recording
 from rig.errors import RigError
-from rig.simulation.twin import Twin, build_twin
+from rig.simulation.fitted_rig import FittedRig, fitted_rig
 
 PLAYED = ("motor", "gearbox", "cable", "stretch")
 """Equations of the simulated rig's own parts; also the names of their shipped models."""
 
 
-def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> Twin | None:
+def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> FittedRig | None:
     """Return the simulated rig with the fitted equations.
 
     An equation that is not diagnosed is taken from the shipped models and fitted on the same runs:
@@ -43,6 +43,6 @@ def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> Twin |
                 parts.append(model or fit(shipped, campaign, bootstrap=0))
             except EstimationError:
                 continue
-        return build_twin(parts, campaign)
+        return fitted_rig(parts, list(campaign.evidence))
     except (RigError, EstimationError):
         return None

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from drivers.teensy import control, reference_board
 from drivers.teensy.logic import Drive
 from drivers.teensy.reference_board import COLUMNS
+from estimation.recording import FloatArray
 from rig.errors import UsageError
 from rig.simulation import (
     hidden,
@@ -31,7 +32,7 @@ from rig.simulation import (
     plant,
     sensors,
 )
-from rig.simulation.parameters import PlantParameters, SensorParameters
+from rig.simulation.parameters import REFERENCE_GAINS, PlantParameters, SensorParameters
 
 REFERENCE_START_COUNT = 1366
 """Spindle count at which the reference campaign's runs start: 60 degrees open."""
@@ -177,6 +178,24 @@ class SimulatedBench:
     def state(self) -> NDArray[np.float64]:
         """A copy of the plant's true state, see `rig.simulation.places`."""
         return self._state.copy()
+
+    def play(
+        self, target_angle_rad: FloatArray, load_command_a: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Run the armed bench along a trajectory with the reference gains and a fresh controller.
+
+        Args:
+            target_angle_rad: Spindle trajectory at 1 kHz, closing positive, shape (n,).
+            load_command_a: Load current, shape (n,).
+
+        Returns:
+            SI channels as from `sensors.columns_of`, each of shape (n,).
+        """
+        per_rad = self.sensors.spindle_count_per_turn / sensors.TURN_RAD
+        target = np.round(-target_angle_rad * per_rad).astype(np.int32)
+        load_ma = np.round(1e3 * load_command_a).astype(np.int32)
+        counts = self.advance(target.size, target, load_ma, Drive.armed(REFERENCE_GAINS))
+        return sensors.columns_of(counts, target, self.sensors)
 
     def advance(
         self,

@@ -16,8 +16,8 @@ from rig.diagnosis.noise import noise_floors, repeats
 from rig.diagnosis.propose import propose, write_protocol
 from rig.diagnosis.simulated import simulated_rig
 from rig.protocols.protocol import load_protocol, protocol_toml
+from rig.simulation.fitted_rig import FittedRig
 from rig.simulation.hidden import HiddenEffect
-from rig.simulation.twin import Twin
 from tests.rig.rippled import MOTOR, record
 
 pytestmark = pytest.mark.long
@@ -42,7 +42,7 @@ def doubtful(answered: Answer) -> Answer:
 
 
 @pytest.fixture(scope="module")
-def rig(answered: Answer, rippled: list[Recording]) -> Twin:
+def rig(answered: Answer, rippled: list[Recording]) -> FittedRig:
     fitted = [e.model for e in answered.layout.equations.values()]
     made = simulated_rig(fitted, rippled)
     assert made is not None
@@ -84,7 +84,7 @@ def test_the_noise_floor_is_below_the_error_that_remains(
 
 
 def test_every_experiment_of_the_menu_is_a_protocol_within_the_limits(
-    rippled: list[Recording], rig: Twin, tmp_path
+    rippled: list[Recording], rig: FittedRig, tmp_path
 ) -> None:
     limits = load_config().limits
     offered = menu(room_of(rippled, limits))

@@ -19,7 +19,6 @@ from rig.simulation.hidden import (
 )
 from rig.simulation.hidden_kinds import KINDS, Kind
 from rig.simulation.parameters import PlantParameters
-from rig.simulation.play import play
 
 pytestmark = pytest.mark.integration
 
@@ -34,7 +33,7 @@ def sweep(
     close = OPEN_RAD + speed_rad_s * trajectory.times(1.0 / speed_rad_s)
     target = np.concatenate([close, np.full(200, close[-1]), close[::-1]])
     plant = PlantParameters(wrist_swing_rad=0.5)
-    return play(SimulatedBench(plant, effects=effects), target, np.full(target.size, load_a))
+    return SimulatedBench(plant, effects=effects).play(target, np.full(target.size, load_a))
 
 
 def closing(columns: Columns, low_rad: float = -0.7, high_rad: float = -0.15) -> NDArray[np.bool_]:

@@ -11,7 +11,6 @@ from rig.protocols import trajectory
 from rig.simulation import places
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.parameters import PlantParameters, SensorParameters, vary
-from rig.simulation.play import play
 
 pytestmark = pytest.mark.integration
 
@@ -89,7 +88,7 @@ def test_closing_torque_balances_load_ratio_and_friction() -> None:
     p = bench.parameters
     start_rad, speed_rad_s, load_a = -1000 * 2 * np.pi / 8192, 0.2, 0.5
     ramp = start_rad + speed_rad_s * trajectory.times(2.5)
-    play(bench, ramp, np.full(ramp.size, load_a))
+    bench.play(ramp, np.full(ramp.size, load_a))
     state = bench.state
     cable = p.load_torque_n_m_a * load_a + p.load_friction_n_m + p.jaw_friction_n_m
     at_spindle = (
@@ -108,7 +107,7 @@ def test_friction_holds_without_creep_or_chatter() -> None:
     bench = SimulatedBench(start_count=1000)
     rest_rad = -1000 * 2 * np.pi / 8192
     closing = trajectory.minimum_jerk(rest_rad, rest_rad + 0.4, 1.0)
-    play(bench, closing, np.full(closing.size, 0.1))
+    bench.play(closing, np.full(closing.size, 0.1))
     idle, drive = np.zeros(300, np.int32), Drive.idle()
     bench.advance(300, idle, idle, drive)
     before = bench.state
@@ -125,7 +124,7 @@ def test_friction_holds_without_creep_or_chatter() -> None:
 @pytest.mark.parametrize("frequency_hz", [0.1, 0.5])
 def test_the_controller_follows_the_reference_sinusoid(frequency_hz: float, load_a: float) -> None:
     target = trajectory.sine(10.0, -np.pi / 3, np.pi / 6, frequency_hz)
-    columns = play(SimulatedBench(), target, np.full(target.size, load_a))
+    columns = SimulatedBench().play(target, np.full(target.size, load_a))
     error_rad = (columns["target_angle_rad"] - columns["spindle_angle_rad"])[1000:]
     assert np.degrees(np.sqrt(np.mean(error_rad**2))) < 0.7
     assert np.degrees(np.abs(error_rad).max()) < 2.5
@@ -161,7 +160,7 @@ def test_a_finer_step_gives_the_same_motion() -> None:
     target = trajectory.sine(4.0, -np.pi / 3, np.pi / 6, 0.5)
     load = np.full(target.size, 0.5)
     runs = [
-        play(SimulatedBench(replace(PlantParameters(), substeps_ratio=steps)), target, load)
+        SimulatedBench(replace(PlantParameters(), substeps_ratio=steps)).play(target, load)
         for steps in (20.0, 80.0)
     ]
     for name, tolerance in (("spindle_angle_rad", 3e-3), ("jaw_angle_rad", 3e-3)):

@@ -8,7 +8,6 @@ from rig.protocols import trajectory
 from rig.simulation import sensors
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.parameters import REFERENCE_GAINS, SensorParameters
-from rig.simulation.play import play
 
 pytestmark = pytest.mark.integration
 
@@ -45,7 +44,7 @@ def closing(parameters: SensorParameters, load_ma: int = 500) -> np.ndarray:
 
 def test_channels_are_closing_positive_and_agree() -> None:
     target = trajectory.sine(4.0, -np.pi / 3, np.pi / 6, 0.25)
-    columns = play(SimulatedBench(sensors_parameters=QUIET), target, np.full(4000, 0.5))
+    columns = SimulatedBench(sensors_parameters=QUIET).play(target, np.full(4000, 0.5))
     close = slice(600, 1500)
     for name in ("spindle_angle_rad", "motor_angle_rad", "jaw_angle_rad", "target_angle_rad"):
         assert columns[name][close][-1] > columns[name][close][0]
