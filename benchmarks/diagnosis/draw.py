@@ -135,11 +135,7 @@ def _cycled(names: list[str], number: int, seed: int) -> str:
 
 def _shaped(name: str, random: np.random.Generator, share: float) -> HiddenEffect:
     kind = HIDDEN[NAMES.index(name)]
-    shape = [float(random.uniform(part.low, part.high)) for part in kind.shapes]
-    shape = [
-        float(round(value)) if part.whole else value
-        for value, part in zip(shape, kind.shapes, strict=True)
-    ]
+    shape = [part.drawn(random) for part in kind.shapes]
     strength = TRUTHS[name].scale * random.uniform(0.85, 1.15) * share
     return HiddenEffect(name, float(strength), tuple(shape))
 

@@ -7,6 +7,7 @@ row is written, then the physics moves 1 ms with that command.
 import hashlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numba
@@ -42,27 +43,22 @@ class BenchInputError(UsageError):
     """The bench was asked for something it cannot run."""
 
 
-def _fingerprint() -> str:
-    """Return a hash of every source the compiled loops are made of.
+SOURCES = (
+    control, reference_board, hidden_cable, hidden_drive, hidden_kinds, hidden_sensors, noise,
+    parameters, places, plant, sensors,
+)  # fmt: skip
+"""What the compiled loops are made of."""
+
+
+def hash_of(modules: Iterable[ModuleType]) -> str:
+    """Return a hash of every source that compiled loops are made of.
 
     Numba's cache checks only the file of a function. The loops hold this hash as a
     closure variable, which is part of the cache's key, so a change in any of the files recompiles.
     It is the only closure variable: a function held that way would change the key in each process.
     """
     digest = hashlib.sha256()
-    for module in (
-        control,
-        reference_board,
-        hidden_cable,
-        hidden_drive,
-        hidden_kinds,
-        hidden_sensors,
-        noise,
-        parameters,
-        places,
-        plant,
-        sensors,
-    ):
+    for module in modules:
         digest.update(Path(str(module.__file__)).read_bytes())
     return digest.hexdigest()
 
@@ -105,7 +101,8 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         state, rig, first_tick, commands, drive, rows
     ):
         _ = source
-        p, s, effects, seed = rig
+        p, s, table, seed = rig
+        effects = table[0]
         target, load_ma = commands
         board, control_state, gains = drive
         for k in range(rows.shape[0]):
@@ -120,7 +117,8 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         state, rig, first_tick, ticks, call, tick_us
     ):
         _ = source
-        p, s, effects, seed = rig
+        p, s, table, seed = rig
+        effects = table[0]
         function, board = call
         inputs = np.zeros(7, np.int32)
         outputs = np.zeros(2, np.int32)
@@ -139,7 +137,7 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
     return with_controller, with_board
 
 
-_run_with_controller, _run_with_board = _build_loops(_fingerprint())
+_run_with_controller, _run_with_board = _build_loops(hash_of(SOURCES))
 
 
 class SimulatedBench:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import UsageError
-from rig.simulation.hidden_kinds import KINDS, STRENGTH
+from rig.simulation.hidden_kinds import KINDS, STRENGTH, SUMS, TABLE, WEAKEST
 
 NAMES: tuple[str, ...] = tuple(kind.name for kind in KINDS)
 
@@ -49,44 +49,41 @@ def draw(seed: int) -> HiddenEffect:
     generator = np.random.default_rng(seed)
     kinds = [kind for kind in KINDS if kind.alone]
     kind = kinds[int(generator.integers(len(kinds)))]
-    strength = float(generator.uniform(kind.weakest, kind.strongest))
-    shape = []
-    for part in kind.shapes:
-        value = float(generator.uniform(part.low, part.high))
-        shape.append(float(round(value)) if part.whole else value)
-    return HiddenEffect(kind.name, strength, tuple(shape))
+    strength = float(generator.uniform(WEAKEST, kind.strongest))
+    return HiddenEffect(kind.name, strength, tuple(part.drawn(generator) for part in kind.shapes))
 
 
-def table(effects: Iterable[HiddenEffect]) -> NDArray[np.float64]:
-    """Return the table the compiled plant reads, shape (number of kinds, 3).
+def table(effects: Iterable[HiddenEffect]) -> NDArray[np.void]:
+    """Return the table the compiled plant reads: one record of `hidden_kinds.TABLE`.
 
     Raises:
         UnknownHiddenEffectError: A name is unknown, a strength is negative or not finite, a kind is
             named twice, or a shape has too many numbers.
     """
-    rows = np.zeros((len(KINDS), 3))
-    for row, kind in zip(rows, KINDS, strict=True):  # read at strength 0 too, to no effect
-        row[1 : 1 + len(kind.shapes)] = [shape.middle for shape in kind.shapes]
+    rows = np.zeros(1, TABLE)
+    for kind in KINDS:  # read at strength 0 too, to no effect
+        rows[kind.name][0, 1 : 1 + len(kind.shapes)] = [shape.middle for shape in kind.shapes]
     for effect in effects:
         if effect.name not in NAMES:
             raise UnknownHiddenEffectError(
                 f"Unknown hidden effect {effect.name!r}.", f"Known: {', '.join(NAMES)}."
             )
-        place = NAMES.index(effect.name)
-        shapes = KINDS[place].shapes
+        shapes, row = KINDS[NAMES.index(effect.name)].shapes, rows[effect.name][0]
         if not 0.0 <= effect.strength < math.inf:
             raise UnknownHiddenEffectError(
                 f"Hidden effect {effect.name!r} has strength {effect.strength}.",
                 "A strength is a finite number, 0 or more.",
             )
-        if rows[place, STRENGTH]:
+        if row[STRENGTH]:
             raise UnknownHiddenEffectError(f"Hidden effect {effect.name!r} is named twice.")
         if len(effect.shape) > len(shapes):
             raise UnknownHiddenEffectError(
                 f"Hidden effect {effect.name!r} is shaped by {len(effect.shape)} numbers.",
                 f"It takes: {', '.join(shape.name for shape in shapes)}.",
             )
-        rows[place, : 1 + len(effect.shape)] = [effect.strength, *effect.shape]
+        row[: 1 + len(effect.shape)] = [effect.strength, *effect.shape]
+    for name, parts in SUMS.items():
+        rows[name] = any(rows[part][0, STRENGTH] for part in parts)
     return rows
 
 

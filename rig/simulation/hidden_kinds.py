@@ -66,12 +66,12 @@ def _kind(name: str, *shapes: Shape, strongest: float = 1.4, alone: bool = True)
     return Kind(name, shapes, strongest, alone)
 
 
-_TIMES = Shape("periods_per_turn", 2.0, 6.0, whole=True)
+_ORDER = Shape("periods_per_turn", 2.0, 6.0, whole=True)
 _PHASE = Shape("phase_rad", 0.0, 2.0 * math.pi)
 _SPOT = Shape("spindle_angle_rad", -0.75, -0.3)
 
 KINDS = (
-    _kind("motor_ripple", _TIMES, _PHASE),
+    _kind("motor_ripple", _ORDER, _PHASE),
     _kind("gear_load_friction", Shape("knee_torque_n_m", 0.02, 0.05)),
     _kind("gear_stribeck", Shape("motor_speed_rad_s", 6.0, 14.0)),
     _kind(
@@ -89,7 +89,7 @@ KINDS = (
     _kind("end_stop_spring", Shape("contact_angle_rad", 0.8, 1.0)),
     _kind("motor_asymmetry", Shape("motor_speed_rad_s", 0.5, 2.0)),
     _kind("motor_drag", Shape("motor_speed_rad_s", 16.0, 24.0)),
-    _kind("current_ripple", _TIMES, _PHASE),
+    _kind("current_ripple", _ORDER, _PHASE),
     _kind("winding_heat", Shape("time_s", 3.0, 8.0)),
     _kind("torque_lag", Shape("time_s", 0.0014, 0.0022), strongest=1.2),
     _kind("gear_stiffening", Shape("twist_rad", 0.008, 0.016)),

@@ -17,7 +17,7 @@ from rig.simulation.hidden import (
     draw,
     table,
 )
-from rig.simulation.hidden_kinds import KINDS, Kind
+from rig.simulation.hidden_kinds import KINDS, WEAKEST, Kind
 from rig.simulation.parameters import PlantParameters
 
 pytestmark = pytest.mark.integration
@@ -150,7 +150,7 @@ def test_draw_is_seeded_covers_every_kind_and_stays_in_range() -> None:
     assert {effect.name for effect in drawn} == {kind.name for kind in KINDS if kind.alone}
     for effect in drawn:
         kind = KINDS[NAMES.index(effect.name)]
-        assert kind.weakest <= effect.strength <= kind.strongest
+        assert WEAKEST <= effect.strength <= kind.strongest
         assert len(effect.shape) == len(kind.shapes)
         for value, shape in zip(effect.shape, kind.shapes, strict=True):
             assert shape.low <= value <= shape.high
