@@ -6,9 +6,9 @@ import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe, order_over
 from benchmarks.rigs.drives import wave
-from benchmarks.rigs.faults import Fault
 from benchmarks.rigs.hidden import Table
 from benchmarks.rigs.plant import Plant, over
+from benchmarks.rigs.sensors import Fault
 from rig.simulation.forms import POINTS, Random, course, grid, power
 
 TURN = 2.0 * np.pi
