@@ -184,8 +184,8 @@ class Fault:
 
     Attributes:
         reading: Channel of the sensor.
-        kind: `function`: amplitude x table(source); `delay`: late by the amplitude, s; `lag`: behind
-            a lag of the amplitude, s; `creep`: a share of the amplitude that comes slowly.
+        kind: `function`: amplitude x table(source); `delay`: late by the amplitude, s; `lag`:
+            behind a lag of the amplitude, s; `creep`: a share of the amplitude that comes slowly.
         source: Channel that the table is over, its own or another one, or `run_time` or
             `campaign_time`.
         table: Of a function.

@@ -99,14 +99,6 @@ def test_the_bent_current_sensor_changes_only_what_is_measured(plain: Columns) -
     assert mean(bent, "motor_current_a") > 1.08 * mean(plain, "motor_current_a")
 
 
-def test_the_end_stop_spring_is_felt_only_past_contact(plain: Columns) -> None:
-    stopped = sweep([HiddenEffect("end_stop_spring", 1.0, (0.8,))])
-    before = [mean(c, "proximal_torque_n_m", -0.7, -0.6) for c in (stopped, plain)]
-    past = [mean(c, "proximal_torque_n_m", -0.15, -0.1) for c in (stopped, plain)]
-    assert before[0] == pytest.approx(before[1], abs=1e-4)
-    assert past[0] > past[1] + 5e-3
-
-
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
 def test_every_effect_is_visible_and_the_rig_stays_under_control(
     kind: Kind, plain: Columns
@@ -123,15 +115,6 @@ def test_the_late_jaw_encoder_answers_its_delay_later(plain: Columns) -> None:
     inside = closing(plain)
     behind = plain["jaw_angle_rad"][inside] - late["jaw_angle_rad"][inside]
     assert behind.mean() == pytest.approx(20e-3 * 0.5 * 0.913, rel=0.1)
-
-
-def test_the_asymmetric_motor_costs_current_on_opening_only(plain: Columns) -> None:
-    uneven = sweep([HiddenEffect("motor_asymmetry", 1.0, (0.5,))])
-    change = uneven["motor_current_a"] - plain["motor_current_a"]
-    opening = np.arange(change.size) > 0.6 * change.size
-    constant = PlantParameters().torque_constant_n_m_a
-    assert abs(change[closing(plain)].mean()) < 1e-3
-    assert change[opening][:800].mean() == pytest.approx(-0.3e-3 / constant, rel=0.15)
 
 
 @pytest.mark.parametrize("name", NAMES)
