@@ -22,8 +22,8 @@ from rig.protocols.motion import motion_of
 from rig.protocols.protocol import Protocol, RunPlan, load_protocol
 from rig.simulation.campaign import bench_at, simulated_run
 from rig.simulation.fitted import DECLARED_PLANT
+from rig.simulation.hidden import KINDS as HIDDEN
 from rig.simulation.hidden import NAMES, HiddenEffect
-from rig.simulation.hidden_kinds import KINDS as HIDDEN
 from rig.simulation.parameters import PlantParameters, SensorParameters, vary
 from rig.simulation.plant import TICK_S
 

@@ -25,7 +25,6 @@ from rig.simulation import (
     hidden,
     hidden_cable,
     hidden_drive,
-    hidden_kinds,
     hidden_sensors,
     noise,
     parameters,
@@ -44,7 +43,7 @@ class BenchInputError(UsageError):
 
 
 SOURCES = (
-    control, reference_board, hidden_cable, hidden_drive, hidden_kinds, hidden_sensors, noise,
+    control, reference_board, hidden, hidden_cable, hidden_drive, hidden_sensors, noise,
     parameters, places, plant, sensors,
 )  # fmt: skip
 """What the compiled loops are made of."""

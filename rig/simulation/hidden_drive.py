@@ -5,7 +5,7 @@ from typing import Any
 
 import numba
 
-from rig.simulation.hidden_kinds import FIRST, SECOND, STRENGTH, Row
+from rig.simulation.hidden import FIRST, SECOND, STRENGTH, Row
 
 
 @numba.njit()

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.simulation import hidden_cable, hidden_drive
-from rig.simulation.hidden_kinds import FIRST, STRENGTH
+from rig.simulation.hidden import FIRST, STRENGTH
 from rig.simulation.parameters import PlantParameters
 from rig.simulation.places import (
     AGE,

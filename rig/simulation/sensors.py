@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.simulation import hidden_sensors, places, plant
-from rig.simulation.hidden_kinds import STRENGTH
+from rig.simulation.hidden import STRENGTH
 from rig.simulation.noise import normal
 from rig.simulation.parameters import SensorParameters
 

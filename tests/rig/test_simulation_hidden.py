@@ -11,13 +11,15 @@ from rig.protocols import trajectory
 from rig.simulation import places
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import (
+    KINDS,
     NAMES,
+    WEAKEST,
     HiddenEffect,
+    Kind,
     UnknownHiddenEffectError,
     draw,
     table,
 )
-from rig.simulation.hidden_kinds import KINDS, WEAKEST, Kind
 from rig.simulation.parameters import PlantParameters
 
 pytestmark = pytest.mark.integration
