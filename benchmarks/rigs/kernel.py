@@ -192,7 +192,7 @@ def _build(source: str) -> Callable[..., bool]:
         x = np.zeros(len(hidden.VARIABLES))
         x[V_DWELL] = 1.0
         values, signs = np.zeros(MOST), np.zeros(MOST)
-        torques, levels, speeds = np.zeros(3), np.zeros(3), np.zeros(3)  # motor, spindle, jaw
+        torques, limits, speeds = np.zeros(3), np.zeros(3), np.zeros(3)  # motor, spindle, jaw
         widths = np.array([p.motor_width, p.spindle_width, p.spindle_width])
         slowed = ws
         for tick in range(setpoints.shape[0]):
@@ -238,7 +238,7 @@ def _build(source: str) -> Callable[..., bool]:
 
                 constant = p.constant
                 torques[:] = 0.0
-                levels[0], levels[1], levels[2] = p.motor_friction, p.spindle_friction, 0.0
+                limits[0], limits[1], limits[2] = p.motor_friction, p.spindle_friction, 0.0
                 speeds[0], speeds[1], speeds[2] = wm, ws, wq
                 for k in range(rows.number):
                     place, rubs = rows.kinds[k, 0], rows.kinds[k, 2] != 0
@@ -251,8 +251,8 @@ def _build(source: str) -> Callable[..., bool]:
                         continue
                     body = 0 if place == P_MOTOR else 1 if place == P_SPINDLE else 2
                     if rubs:
-                        value = max(value, -levels[body])
-                        levels[body] += value
+                        value = max(value, -limits[body])
+                        limits[body] += value
                         values[k] = _signed(value, speeds[body], widths[body])
                     else:
                         torques[body] += value
@@ -270,17 +270,17 @@ def _build(source: str) -> Callable[..., bool]:
 
                 share = dt / p.motor_inertia
                 wm += share * (constant * current - p.motor_viscous * wm - T / p.ratio - torques[0])
-                wm -= braking(wm, share * levels[0], p.motor_width)
+                wm -= braking(wm, share * limits[0], p.motor_width)
                 share = dt / p.spindle_inertia
                 before = ws
                 ws += share * (T - lever * C - p.spindle_viscous * ws - torques[1])
-                ws -= braking(ws, share * levels[1], p.spindle_width)
+                ws -= braking(ws, share * limits[1], p.spindle_width)
                 slowed += dt / ACCELERATION_LAG_S * ((ws - before) / dt - slowed)
                 x[V_ACCELERATION] = slowed
                 share = dt / jaw_inertia
                 before = wq
                 wq += share * (C - loading - load.viscous * wq - torques[2])
-                wq -= braking(wq, share * levels[2], p.spindle_width)
+                wq -= braking(wq, share * limits[2], p.spindle_width)
                 if step == 0:
                     turning = p.load_inertia * (wq - before) / dt
                     out[tick, DISTAL] = loading + load.viscous * before + turning
