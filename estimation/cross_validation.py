@@ -9,9 +9,9 @@ from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
 from estimation.estimator import Estimator, Recipe
 from estimation.fitting import fit
-from estimation.model import Model, balance_channels, estimate, settled
+from estimation.model import Model, counted_error
 from estimation.recording import FloatArray
-from estimation.scores import Score, score
+from estimation.scores import Score, rmse, score
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,17 +49,12 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
     errors: dict[str, FloatArray] = {}
     for split in campaign.folds(folds, seed):
         fitted = fit(declared, split.train, bootstrap=0)
-        for recording in split.test:
-            run = balance_channels(fitted, recording)
-            places = settled(fitted, run)
-            error = run[fitted.target] - estimate(fitted, run)
-            errors[recording.name] = error[places]
-    whole = np.concatenate(list(errors.values()))
+        errors |= {run.name: counted_error(fitted, run) for run in split.test}
     centred = {name: error - error.mean() for name, error in errors.items() if error.size}
     return HeldOutError(
-        rmse=_rms(np.concatenate(list(centred.values()))),
-        rmse_with_means=_rms(whole),
-        rmse_by_run={name: _rms(error) for name, error in sorted(centred.items())},
+        rmse=rmse(np.concatenate(list(centred.values())), 0.0),
+        rmse_with_means=rmse(np.concatenate(list(errors.values())), 0.0),
+        rmse_by_run={name: rmse(error, 0.0) for name, error in sorted(centred.items())},
         runs=len(errors),
         folds=folds,
     )
@@ -103,7 +98,3 @@ def closing_pairs(
             (estimator.predict(recording, causal)[closing], run[estimator.target][closing])
         )
     return pairs
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -20,6 +20,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from estimation.channels import ending_of
@@ -27,7 +28,6 @@ from estimation.filters import PAPER, LowPass, fill_gaps, filter_recording, holo
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SPINDLE_SPEED, closing, in_motion
 from estimation.signals import Combination, Samples, Signals, reference
-from estimation.window import ALIKE, lowest, since_lowest
 
 CAMPAIGN_TIME = "campaign_time_s"
 """Time since the campaign's first run began; a clock, so no filter touches it."""
@@ -45,6 +45,10 @@ TURNING = "motor_angle_rad"
 
 TRAVEL_WINDOW_S = 0.5
 """Window of a travel, s. A longer memory could identify the run."""
+
+ALIKE = 1e-9
+"""Values that differ by less are alike where the place of the lowest matters. A filtered angle at
+rest differs by its rounding, which is another one for samples one by one, in batches, or in C."""
 
 CLOCKS = ("time_s", CAMPAIGN_TIME)
 
@@ -296,3 +300,29 @@ def looks_back(names: Iterable[str]) -> bool:
 def window_samples(sample_rate_hz: float) -> int:
     """Return the number of samples in the window of a travel."""
     return max(1, round(TRAVEL_WINDOW_S * sample_rate_hz))
+
+
+def since_lowest(values: FloatArray, window: int) -> FloatArray:
+    """Return each value less the lowest of itself and the `window - 1` before it."""
+    return np.asarray(values - values[lowest(values, window)])
+
+
+@njit(cache=True)
+def lowest(values: FloatArray, window: int, alike: float = 0.0) -> NDArray[np.int64]:
+    """Return the place of the lowest of each value and the `window - 1` before it.
+
+    Of those that differ by no more than `alike` it is the last. Values that rise are kept in a
+    queue, so each one is looked at twice at the most.
+    """
+    found = np.empty(len(values), np.int64)
+    queue = np.empty(len(values), np.int64)
+    first, end = 0, 0
+    for i in range(len(values)):
+        while end > first and values[queue[end - 1]] >= values[i] - alike:
+            end -= 1
+        queue[end] = i
+        end += 1
+        if queue[first] <= i - window:
+            first += 1
+        found[i] = queue[first]
+    return found

@@ -17,6 +17,7 @@ from estimation.bank import states
 from estimation.bank.beyond import STANDING_RAD_S
 from estimation.derived import (
     AGO,
+    ALIKE,
     FALL,
     RISE,
     TRAVEL,
@@ -35,7 +36,6 @@ from estimation.estimators.network import NetworkEstimator
 from estimation.kalman import tracker
 from estimation.recording import FloatArray
 from estimation.signals import Signals, reference
-from estimation.window import ALIKE
 
 TURNING_TRAVEL, TURNING_TURNED = (
     TURNING.replace("_angle_rad", suffix) for suffix in (TRAVEL, TURNED)

@@ -13,10 +13,10 @@ from estimation.causes.verdict import diagnose
 from estimation.derived import zero_phase_channels
 from estimation.diagnosis.split import split
 from estimation.effects import effect
+from estimation.estimators.model import Stream
 from estimation.fitting import fit
 from estimation.model import Model, Term, predict
 from estimation.recording import Recording
-from estimation.stream import Stream
 from tests.estimation import synthetic
 
 pytestmark = pytest.mark.integration

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from estimation.campaign import Campaign
 from estimation.effects import effect
+from estimation.estimators.model import Stream
 from estimation.fit_problem import FitError
 from estimation.fitting import fit
 from estimation.model import Model, NotFittedError, Term, predict
 from estimation.model_file import read
 from estimation.recording import Flag, MissingChannelError, Stretch
 from estimation.shape_search import descended
-from estimation.stream import Stream
 from tests.estimation.synthetic import TRUE, campaign, run
 
 

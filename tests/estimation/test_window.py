@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.window import ALIKE, lowest, since_lowest
+from estimation.derived import ALIKE, lowest, since_lowest
 
 STEPS = st.lists(st.integers(-3, 3), min_size=1, max_size=60)
 
