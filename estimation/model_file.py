@@ -155,22 +155,16 @@ def _model(top: Table) -> Model:
     processing = top.table("processing")
     evidence = top.table("fit")
     target = top.take("target", str)
-    model = Model(
-        name=top.take("name", str),
-        balance=top.take("balance", str),
-        target=target,
-        description=top.take("description", str, ""),
+    samples = processing.choice("samples", ("", *get_args(Samples))) or None
+    return top.made(
+        Model,
         terms=tuple(_term(entry, target) for entry in top.tables("effects")),
         run_offsets=processing.take("run_offsets", bool, True),
-        counted=cast(
-            Samples | None, processing.choice("samples", ("", *get_args(Samples))) or None
-        ),
+        counted=cast(Samples | None, samples),
         low_pass=processing.made(LowPass),
         evidence=_evidence(evidence) if evidence.content else None,
         signals=_signals(top),
     )
-    top.finish()
-    return model
 
 
 def _signals(top: Table) -> Signals:

@@ -116,10 +116,6 @@ def parse(text: str, where: str = "machine") -> Plant:
 
 def _plant(top: Table) -> Plant:
     machine = top.table("machine")
-    name, description = machine.take("name", str), machine.take("description", str, "")
-    cutoff_hz, order = machine.number("cutoff_hz", 50.0), machine.take("order", int, 3)
-    run_offsets = machine.take("run_offsets", bool, True)
-    machine.finish()
     top.ignore("data")
     parts: dict[str, tuple[Any, ...]] = {
         "axes": tuple(t.made(Axis) for t in top.tables("axis", [])),
@@ -131,14 +127,7 @@ def _plant(top: Table) -> Plant:
         "derived": read_combinations(top.tables("derived", [])),
     }
     top.finish()
-    return Plant(
-        name=name,
-        description=description,
-        cutoff_hz=cutoff_hz,
-        order=order,
-        run_offsets=run_offsets,
-        **parts,
-    )
+    return machine.made(Plant, **parts)
 
 
 def _channel(table: Table) -> Table:
