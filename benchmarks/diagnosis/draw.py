@@ -224,9 +224,7 @@ def _record(
     count = spindle_count_of(start_rad, sensors)
     bench = SimulatedBench(plant, sensors, effects, seed, count)
     motion = motion_of(plan, start_rad)
-    columns = play(
-        bench, motion.target_angle_rad[: motion.last], motion.load_command_a[: motion.last]
-    )
+    columns = play(bench, *(values[: motion.last] for values in motion.setpoints))
     return Recording(
         plan.name,
         np.arange(motion.last - motion.first) / trajectory.SAMPLE_RATE_HZ,

@@ -7,16 +7,14 @@ import math
 from dataclasses import dataclass, fields
 from typing import Self
 
-from calibration.linear import CalibrationSet
 from drivers.registry import drivers
 from drivers.teensy.profile import Profile
-from drivers.teensy.reference import REFERENCE, Limits
+from drivers.teensy.reference import REFERENCE
 from rig.configuration.config import Config
 from rig.errors import UsageError
-from rig.machines.machine import MachinePlan
 from rig.machines.reference import ReferenceMachine
-from rig.machines.safety import board_limits
 from rig.protocols.motion import Motion
+from rig.protocols.protocol import Plan
 from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
 
@@ -43,7 +41,7 @@ def sampled_at(rate_hz: float) -> SampledProfile:
 
 
 class DriveMachine(ReferenceMachine):
-    """Implements `rig.machines.machine.Machine`.
+    """A drive in place of the reference rig's motor and spindle.
 
     Args:
         rate_hz: Samples a second; divides 1000, the rate of the trajectories.
@@ -76,11 +74,7 @@ class DriveMachine(ReferenceMachine):
         """Return the protocol without load."""
         return "unloaded"
 
-    def board_limits(self, config: Config, calibrations: CalibrationSet) -> Limits:  # type: ignore[override]
-        """Return the limits of the core that runs in this computer."""
-        return board_limits(config, calibrations, 1 / self.profile.rate_hz)
-
-    def motion(self, plan: MachinePlan, here: tuple[float, ...]) -> Motion:
+    def motion(self, plan: Plan, here: tuple[float, ...]) -> Motion:
         """Return approach, run and release, at the drive's rate."""
         return self._taken(super().motion(plan, here))
 
@@ -89,9 +83,9 @@ class DriveMachine(ReferenceMachine):
         return self._taken(super().settling(here))
 
     def _taken(self, motion: Motion) -> Motion:
-        angle, load = (column[:: self._every] for column in motion.setpoints)
+        setpoints = tuple(column[:: self._every] for column in motion.setpoints)
         first, last = (math.ceil(index / self._every) for index in (motion.first, motion.last))
-        return Motion(angle, load, first, last)
+        return Motion(setpoints, first, last)
 
 
 def rate_of(config: Config) -> float:

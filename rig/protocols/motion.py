@@ -18,28 +18,21 @@ RELAX_CYCLES = 12
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Setpoints of a whole motion at 1 kHz.
+    """Setpoints of a whole motion: approach, the run, release.
 
     Attributes:
-        target_angle_rad: Spindle, closing-positive, shape (n,).
-        load_command_a: Load motor, shape (n,).
+        setpoints: One array of shape (n,) for each field of a setpoint, closing-positive, SI units.
         first: Index of the run's first setpoint.
         last: Index behind its last.
     """
 
-    target_angle_rad: NDArray[np.float64]
-    load_command_a: NDArray[np.float64]
+    setpoints: tuple[NDArray[np.float64], ...]
     first: int
     last: int
 
-    @property
-    def setpoints(self) -> tuple[NDArray[np.float64], ...]:
-        """Spindle and load motor."""
-        return self.target_angle_rad, self.load_command_a
-
 
 def motion_of(plan: RunPlan, here_rad: float) -> Motion:
-    """Return the motion that makes a run, beginning where the spindle stands.
+    """Return the motion of spindle and load motor at 1 kHz that makes a run.
 
     Args:
         plan: The run.
@@ -54,7 +47,8 @@ def motion_of(plan: RunPlan, here_rad: float) -> Motion:
     whole_angle = np.concatenate([approach, angle, retreat, _relaxation(start)])
     loads = np.concatenate([_hold(load_up, approach.size), load, load_down])
     first = approach.size
-    return Motion(whole_angle, _hold(loads, whole_angle.size), first, first + angle.size)
+    setpoints = whole_angle, _hold(loads, whole_angle.size)
+    return Motion(setpoints, first, first + angle.size)
 
 
 def settling(here_rad: float) -> Motion:
@@ -64,7 +58,7 @@ def settling(here_rad: float) -> Motion:
     locked in gear and cable, some 30 mN m at the spindle on the simulated rig.
     """
     angle = _relaxation(here_rad)
-    return Motion(angle, np.zeros(angle.size), 0, angle.size)
+    return Motion((angle, np.zeros(angle.size)), 0, angle.size)
 
 
 def _relaxation(centre_rad: float) -> NDArray[np.float64]:

@@ -59,6 +59,9 @@ class RunPlan:
         return self.samples / trajectory.SAMPLE_RATE_HZ
 
 
+Plan = RunPlan | JointPlan
+
+
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -267,9 +270,9 @@ class Protocol(BaseModel):
             )
         return [plan for plan in self.any_plans() if isinstance(plan, RunPlan)]
 
-    def any_plans(self) -> list[RunPlan | JointPlan]:
+    def any_plans(self) -> list[Plan]:
         """Return every run in order, of whatever rig, numbered likewise."""
-        plans: Iterator[RunPlan | JointPlan] = (p for table in self.runs for p in table.plans())
+        plans: Iterator[Plan] = (p for table in self.runs for p in table.plans())
         return [
             replace(
                 plan,

@@ -56,7 +56,7 @@ def _simulate(
 ) -> Recording:
     bench = SimulatedBench(parameters, effects=effects, seed=seed * 100_003 + index)
     motion = motion_of(plan, float(plan.target_angle_rad[0]))
-    columns = play(bench, motion.target_angle_rad, motion.load_command_a)
+    columns = play(bench, *motion.setpoints)
     run = slice(motion.first, motion.last)
     columns = {name: values[run] for name, values in columns.items()}
     return Recording(

@@ -173,9 +173,7 @@ def simulate(
         plant, sensors, seed=seed, start_count=spindle_count_of(reference.start_rad, sensors)
     )
     motion = motion_of(reference.plan, float(reference.plan.target_angle_rad[0]))
-    played = play(
-        bench, motion.target_angle_rad[: motion.last], motion.load_command_a[: motion.last]
-    )
+    played = play(bench, *(values[: motion.last] for values in motion.setpoints))
     logged = motion.first + reference.tick
     return Recording(
         reference.plan.name,

@@ -50,7 +50,7 @@ def record(*effects: HiddenEffect) -> list[Recording]:
             DECLARED_PLANT, None, effects, k, spindle_count_of(start, bench.sensors)
         )
         motion = motion_of(plan, start)
-        columns = play(bench, motion.target_angle_rad, motion.load_command_a)
+        columns = play(bench, *motion.setpoints)
         part = slice(motion.first, motion.last)
         made.append(
             Recording(
