@@ -56,13 +56,8 @@ class Tool:
         names = [*(f"bias_{axis}" for axis in AXES), "mass_kg"]
         names += [f"centre_{axis}_m" for axis in "xyz"]
         values = [*self.bias, self.mass_kg, *self.centre_m]
-        return Fit(
-            "tool",
-            {name: float(value) for name, value in zip(names, values, strict=True)},
-            tuple(map(tuple, self.covariance.tolist())),
-            self.residual[0],
-            self.poses,
-        )
+        parameters = {name: float(value) for name, value in zip(names, values, strict=True)}
+        return Fit.of("tool", parameters, self.covariance, self.residual[0], self.poses)
 
 
 def fit_tool(gravity: ArrayLike, wrench: ArrayLike, residual_limit: float = 0.05) -> Tool:

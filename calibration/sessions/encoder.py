@@ -76,7 +76,7 @@ class EncoderSession:
         periods, waved = _best_wave(runs, pair)
         amplitude = float(np.hypot(*waved.values[-2:]))
         # smaller than half a count it may be the quantum's own pattern
-        has_wave = is_better(waved, plain) and amplitude > abs(line.slope) / 2
+        has_wave = is_better(waved.held_out, plain.held_out) and amplitude > abs(line.slope) / 2
         is_waved = has_wave and not self.line_only
         used = waved if is_waved else plain
         names = ["ratio", "offset_rad", "compliance_rad_n_m", "lost_motion_rad"]

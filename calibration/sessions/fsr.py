@@ -10,7 +10,6 @@ from calibration.fsr_memory import CREEP_START_S, FsrMemory, fit_memory
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError, check_points
-from calibration.record import Fit
 from estimation.filters import LowPass, zero_phase
 
 FSR = "fsr_v"
@@ -93,18 +92,9 @@ class FsrSession:
             pure, self.degree, force_at_zero_n=self.force_at_zero_n, rail_v=self.rail_v
         )
         curve = fitted.curve
-        fit = curve.as_fit()
-        size = len(fit.parameters)
-        covariance = np.zeros((size + 2, size + 2))
-        covariance[:size, :size] = fit.covariance
-        covariance[size, size] = memory.gap_standard_error_n**2
-        covariance[size + 1, size + 1] = creep.standard_error**2 if creep else 0.0
-        whole = Fit(
-            "polynomial",
-            {**fit.parameters, "loading_gap_n": memory.gap_n, "creep_ratio": memory.creep_ratio},
-            tuple(map(tuple, covariance.tolist())),
-            fit.residual_rms,
-            fit.points,
+        whole = curve.as_fit().extended(
+            {"loading_gap_n": memory.gap_n, "creep_ratio": memory.creep_ratio},
+            [memory.gap_standard_error_n, creep.standard_error if creep else 0.0],
         )
         low, high = curve.interval_n(np.array([(curve.low_v + curve.high_v) / 2]))
         held_out = ", ".join(f"{d}: {e:.4f}" for d, e in fitted.held_out_rmse_n.items())

@@ -10,7 +10,6 @@ from calibration.ft import AXES, at_point, fit_tool
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError
-from calibration.record import Fit
 
 POSES = (
     (0, 0, 1),
@@ -93,17 +92,7 @@ class FtSession:
             **{f"jaw_{axis}_m": v for axis, v in zip("xyz", self.jaw_m, strict=True)},
             **{f"jaw_turn_{axis}_rad": v for axis, v in zip("xyz", self.jaw_turn_rad, strict=True)},
         }
-        fit = tool.as_fit()
-        size = len(fit.parameters) + len(jaw)
-        covariance = np.zeros((size, size))
-        covariance[: len(fit.parameters), : len(fit.parameters)] = fit.covariance
-        whole = Fit(
-            "tool",
-            {**fit.parameters, **jaw},
-            tuple(map(tuple, covariance.tolist())),
-            fit.residual_rms,
-            fit.points,
-        )
+        whole = tool.as_fit().extended(jaw)
         number = np.arange(len(down), dtype=np.float64)
         series = {axis: (number, left[:, k]) for k, axis in enumerate(AXES[:3])}
         return Conclusion(

@@ -79,7 +79,8 @@ class GearboxSession:
         zero_n_m, whole, without = _best_zero(twists)
         _refuse_no_slope(whole.values[0], whole.residual_rms, every)
         drift = refuse_drift(whole, float(np.ptp(every)) * abs(float(whole.values[0])))
-        has_gap = is_better(whole, without) and abs(whole.values[1]) > whole.half_widths()[1]
+        is_wide = abs(whole.values[1]) > whole.half_widths()[1]
+        has_gap = is_wide and is_better(whole.held_out, without.held_out)
         used = without if self.stiffness_only else whole
         fit = _as_fit(used, int(every.size))
         found: dict[str, float | str] = {
@@ -110,13 +111,8 @@ def _as_fit(found: Regression, points: int) -> Fit:
     values["offset_rad"] = found.values[-1]
     jacobian = np.diag([*slopes, 1.0])
     covariance = jacobian @ found.covariance @ jacobian.T
-    return Fit(
-        "gearbox",
-        {name: float(value) for name, value in values.items()},
-        tuple(map(tuple, covariance.tolist())),
-        found.residual_rms,
-        points,
-    )
+    parameters = {name: float(value) for name, value in values.items()}
+    return Fit.of("gearbox", parameters, covariance, found.residual_rms, points)
 
 
 def _carries(torque_n_m: FloatArray, zero_n_m: float) -> NDArray[np.bool_]:

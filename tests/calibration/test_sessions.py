@@ -174,8 +174,8 @@ def test_a_regression_takes_runs_as_evidence():
     # the offsets differ from run to run by ten times the noise: 0.1 / sqrt(12), not 0.01 / 60
     assert np.sqrt(fit.covariance[1, 1]) == pytest.approx(0.1 / np.sqrt(12), rel=0.5)
     useless = [(np.column_stack([x, rng.normal(size=300)]), y) for x, y in runs]
-    assert not is_better(regress(useless), fit)
-    assert is_better(fit, regress([(x[:, 1:], y) for x, y in runs]))
+    assert not is_better(regress(useless).held_out, fit.held_out)
+    assert is_better(fit.held_out, regress([(x[:, 1:], y) for x, y in runs]).held_out)
 
 
 def pressed(k, gap=0.0, creep=0.0, memory_noise=0.002):
