@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.grasper.coupling import Coupling, GrasperError, Limits
+from rig.grasper.coupling import Coupling, GrasperError
 
 JOINTS = ("roll", "wrist_pitch", "wrist_yaw", "jaw")
 ACTUATORS = ("actuator_1", "actuator_2", "actuator_3", "actuator_4")
@@ -124,14 +124,6 @@ TOOLS: tuple[Tool, ...] = (
     ),
 )
 
-_WRIST = ((-260.0, 260.0), (-80.0, 80.0), (-80.0, 80.0))
-LIMITS: dict[str, Limits] = {
-    "400049": Limits.degrees(*_WRIST, (-20.0, 80.0)),
-    "420049": Limits.degrees(*_WRIST, (-20.0, 80.0)),
-    "400006": Limits.degrees(*_WRIST, (-40.0, 80.0)),
-}
-"""Limits of the models for which all four are known."""
-
 
 def dvrk_coupling(model: str) -> Coupling:
     """Return the coupling of an instrument model.
@@ -145,6 +137,6 @@ def dvrk_coupling(model: str) -> Coupling:
     for tool in TOOLS:
         if model in tool.models:
             name = f"{tool.name} {model}"
-            return Coupling(name, JOINTS, ACTUATORS, np.array(tool.rows), LIMITS.get(model))
+            return Coupling(name, JOINTS, ACTUATORS, np.array(tool.rows))
     known = ", ".join(sorted(number for tool in TOOLS for number in tool.models))
     raise GrasperError(f"There is no coupling for the model {model!r}.", f"Known: {known}.")

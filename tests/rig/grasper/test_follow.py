@@ -17,17 +17,17 @@ from rig.bench.logger import open_logger
 from rig.cli.main import main
 from rig.configuration.config import load_config
 from rig.errors import ExitCode, UsageError
-from rig.grasper import following
+from rig.grasper import follow
 from rig.grasper.coupling import GrasperError
 from rig.grasper.follow import setpoints
 from rig.grasper.machine import axes_of_joints
-from rig.grasper.master import master_of
+from rig.grasper.settings import master_section
 from rig.log.reader import read_log
 from tests.rig.simulated import is_armed
 
 pytestmark = pytest.mark.integration
 
-CHIEF = master_of(load_config(Path("grasper")))
+CHIEF = master_section(load_config(Path("grasper")))
 HERE = (0.1, 0.0, -0.05)
 
 
@@ -43,7 +43,7 @@ def potentiometers():
 def link(monkeypatch, library):
     """The simulated grasper's link, to look at its board afterwards."""
     link = open_logger(load_config(Path("grasper")))
-    monkeypatch.setattr(following, "open_logger", lambda config: link)
+    monkeypatch.setattr(follow, "open_logger", lambda config: link)
     return link
 
 
@@ -121,9 +121,9 @@ def test_a_broken_wire_disarms_the_motors(link, monkeypatch, tmp_path):
         return batch
 
     device.read = broken
-    monkeypatch.setattr(following, "open_section", lambda section: device)
+    monkeypatch.setattr(follow, "open_section", lambda section: device)
     with pytest.raises(GrasperError, match="rail"):
-        following.follow_master(
+        follow.follow_master(
             load_config(Path("grasper")), None, 5.0, 0.2, tmp_path, followed.append
         )
     assert followed[-1] > 0.1
@@ -140,7 +140,7 @@ def test_ctrl_c_quits_with_disarmed_motors(link, monkeypatch, capsys):
                 os.kill(os.getpid(), signal.SIGINT)
             yield piece
 
-    monkeypatch.setattr(following, "setpoints", asked)
+    monkeypatch.setattr(follow, "setpoints", asked)
     assert main(["grasper", "follow", "--sim"]) == ExitCode.INTERRUPTED
     assert len(pieces) == 20
     assert not is_armed(link.board, GRASPER)
@@ -159,7 +159,7 @@ def test_what_cannot_be_followed_is_refused(config, url, said, library, tmp_path
     bench = load_config(Path("grasper")).changed(logger={"url": "usb:16c0:0483"})
     chosen = bench if config == "bench" else load_config(Path(config))
     with pytest.raises(UsageError, match=said):
-        following.follow_master(chosen, url, 1.0, 0.2, tmp_path)
+        follow.follow_master(chosen, url, 1.0, 0.2, tmp_path)
 
 
 def test_a_silent_master_is_reported(potentiometers):

@@ -8,7 +8,7 @@ import pytest
 from rig.configuration.config import SHIPPED, load_config
 from rig.errors import UsageError
 from rig.grasper.coupling import GrasperError
-from rig.grasper.master import Master, master_of
+from rig.grasper.settings import master_section
 
 
 def configured(**master):
@@ -16,12 +16,14 @@ def configured(**master):
 
 
 def test_zero_and_turn_of_each_potentiometer_are_the_configurations():
-    chief = master_of(configured(zero_counts=(2000, 2048, 2100), rad_per_count=(1e-3, -1e-3, 2e-3)))
+    chief = master_section(
+        configured(zero_counts=(2000, 2048, 2100), rad_per_count=(1e-3, -1e-3, 2e-3))
+    )
     np.testing.assert_allclose(chief.joint_rad([2100, 2148, 2000]), [0.1, -0.1, -0.2])
 
 
 def test_a_turn_of_300_degrees_is_the_default():
-    assert np.degrees(master_of(configured()).joint_rad([4094, 2048, 1])).tolist() == (
+    assert np.degrees(master_section(configured()).joint_rad([4094, 2048, 1])).tolist() == (
         pytest.approx([149.89, 0.0, -149.96], abs=0.01)
     )
 
@@ -29,7 +31,7 @@ def test_a_turn_of_300_degrees_is_the_default():
 @pytest.mark.parametrize("counts", [[0, 2048, 2048], [2048, 4095, 2048], [2048, 2048, np.nan]])
 def test_a_potentiometer_at_its_rail_commands_nothing(counts):
     with pytest.raises(GrasperError, match="rail"):
-        Master((2048.0,) * 3, (1e-3,) * 3).joint_rad(counts)
+        master_section(configured()).joint_rad(counts)
 
 
 @pytest.mark.parametrize("turn", ["0", "nan", "1.0"])
