@@ -40,29 +40,6 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class LoggerSection(Section):
-    """The board or drive that moves and samples the rig, and its URL.
-
-    Attributes:
-        driver: `teensy` for the 1 kHz logger board, `epos4` for a drive on CANopen whose
-            position loop runs in this computer; with the profiles `drive` and
-            `sensor` any driver, such as `dynamixel`.
-        url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...`, `socket://host:port` or
-            `can:...`.
-        options: The driver's own options.
-        bit_rate: Bit rate the device is set to, bit/s, where it is on a CAN bus; the one it comes
-            with from the factory if none.
-        profile: What the board samples and moves: a name in the entry point group
-            `rig.machine_settings`, such as the reference rig or the 3-DOF grasper.
-    """
-
-    driver: str = "teensy"
-    url: str
-    profile: Profile = "reference"
-    options: dict[str, Any] = Field(default_factory=dict)
-    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
-
-
 class DeviceSection(Section):
     """A further device whose channels are recorded with the logger's.
 
@@ -78,6 +55,23 @@ class DeviceSection(Section):
     url: str
     options: dict[str, Any] = Field(default_factory=dict)
     bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
+
+
+class LoggerSection(DeviceSection):
+    """The board or drive that moves and samples the rig, and its URL.
+
+    Attributes:
+        driver: `teensy` for the 1 kHz logger board, `epos4` for a drive on CANopen whose
+            position loop runs in this computer; with the profiles `drive` and
+            `sensor` any driver, such as `dynamixel`.
+        url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...`, `socket://host:port` or
+            `can:...`.
+        profile: What the board samples and moves: a name in the entry point group
+            `rig.machine_settings`, such as the reference rig or the 3-DOF grasper.
+    """
+
+    driver: str = "teensy"
+    profile: Profile = "reference"
 
 
 class ControllerSection(Section):

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from rig.grasper.coupling import Coupling, GrasperError
-from rig.grasper.dvrk import TOOLS, dvrk_coupling
+from rig.grasper.dvrk import dvrk_coupling, dvrk_couplings
 from rig.grasper.wrist import CablePath, Planetary, planetary_grasper
 
 PATH = CablePath(0.004, 0.004, 0.005, 0.01, 0.006, 0.008)
 GRASPERS = [
     planetary_grasper(PATH),
     planetary_grasper(replace(PATH, d2_m=0.003)),
-    *(dvrk_coupling(model) for tool in TOOLS for model in tool.models),
+    *dvrk_couplings().values(),
 ]
 graspers = st.sampled_from(GRASPERS)
 
