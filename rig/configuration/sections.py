@@ -66,6 +66,9 @@ class LoggerSection(DeviceSection):
             `sensor` any driver, such as `dynamixel`.
         url: `sim://`, `usb:VID:PID:SERIAL`, `/dev/serial/by-id/...`, `socket://host:port` or
             `can:...`.
+        options: The driver's own options.
+        bit_rate: Bit rate the device is set to, bit/s, where it is on a CAN bus; the one it comes
+            with from the factory if none.
         profile: What the board samples and moves: a name in the entry point group
             `rig.machine_settings`, such as the reference rig or the 3-DOF grasper.
     """
