@@ -227,7 +227,9 @@ def _checked(runs: Sequence[FsrRun], degree: int, rail_v: float) -> tuple[FloatA
 def _fitted(runs: Sequence[FsrRun], degree: int, force_at_zero_n: float | None) -> Regression:
     """Fit the powers of the voltage; the constant one only where the force at 0 V is not held."""
     first, zero_n = (0, 0.0) if force_at_zero_n is None else (1, force_at_zero_n)
-    powers = [polynomial.polyvander(run.fsr_v, degree)[:, first:] for run in runs]
+    powers: list[FloatArray] = [
+        np.asarray(polynomial.polyvander(run.fsr_v, degree)[:, first:]) for run in runs
+    ]
     return regress([(x, run.force_n - zero_n) for x, run in zip(powers, runs, strict=True)])
 
 

@@ -27,6 +27,8 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 MINIMUM_READINGS = 100
 MINIMUM_STEPS = 6
 MINIMUM_LEVELS = 4
+RAILS_COUNTS = (-32768.0, 32767.0)
+"""Least and greatest count of the converter."""
 SHUNT_TOLERANCE = 0.01
 """Greatest relative deviation from the certificate that passes."""
 LINEARITY_LIMIT, HYSTERESIS_LIMIT, DRIFT_LIMIT = 0.01, 0.01, 0.005
@@ -43,7 +45,6 @@ def check_shunt(
     shunted: ArrayLike,
     certificate_v_v: float,
     counts_per_v_v: float,
-    rails_counts: tuple[float, float] | None = None,
 ) -> float:
     """Return the change a shunt makes over the one its certificate states, less one.
 
@@ -53,7 +54,6 @@ def check_shunt(
         certificate_v_v: Change by the certificate, V/V. A shunt of Rs across one arm of an
             equal-arm bridge of R gives R / (4 Rs + 2 R) (Yokogawa DL850E manual; Vishay TN-514).
         counts_per_v_v: Gain of amplifier and converter.
-        rails_counts: Least and greatest count of the converter.
 
     Raises:
         BadDataError: Too few readings, at a rail, drifting, no change beyond the noise, or another
@@ -61,7 +61,7 @@ def check_shunt(
     """
     means, errors = [], []
     for name, values in (("unloaded", unloaded), ("shunted", shunted)):
-        readings = _at_rest(values, name, rails_counts)
+        readings = _at_rest(values, name)
         means.append(float(readings.mean()))
         errors.append(float(readings.std(ddof=1)) / np.sqrt(readings.size))
     change = means[1] - means[0]
@@ -127,21 +127,18 @@ class TorqueResult:
     residual_n_m: FloatArray
 
 
-def fit_torque(
-    steps: Sequence[Step], rails_counts: tuple[float, float] | None = None
-) -> TorqueResult:
+def fit_torque(steps: Sequence[Step]) -> TorqueResult:
     """Fit the line through the steps' mean readings, each step one piece of evidence.
 
     Args:
         steps: In the order they were made: up through the levels and down again.
-        rails_counts: Least and greatest count of the converter.
 
     Raises:
         BadDataError: The data are not sufficient for a calibration; its `rule` is the reason.
     """
     check_points(len(steps), MINIMUM_STEPS, "steps")
     for k, step in enumerate(steps):
-        _at_rest(step.counts, f"step {k + 1}", rails_counts)
+        _at_rest(step.counts, f"step {k + 1}")
     torques = finite([step.torque_n_m for step in steps], "the torques")
     counts = np.array([step.counts.mean() for step in steps])
     noise = float(np.median([step.counts.std(ddof=1) for step in steps]))
@@ -181,15 +178,14 @@ def fit_torque(
     return TorqueResult(fit, linearity, hysteresis, drift, low, high, torques, residual)
 
 
-def _at_rest(values: ArrayLike, name: str, rails_counts: tuple[float, float] | None) -> FloatArray:
+def _at_rest(values: ArrayLike, name: str) -> FloatArray:
     """Return readings, refused where they are few, at a rail, or do not rest.
 
     Their halves may differ by the noise of one reading, and by a count.
     """
     readings = finite(values, f"the readings of {name}")
     check_points(readings.size, MINIMUM_READINGS, f"readings of {name}")
-    if rails_counts is not None:
-        check_rails(readings, *rails_counts, f"the readings of {name}", pile_up=False)
+    check_rails(readings, *RAILS_COUNTS, f"the readings of {name}", pile_up=False)
     first, last = np.array_split(readings, 2)
     moved = abs(float(last.mean() - first.mean()))
     if moved > max(float(np.std(np.diff(readings))) / np.sqrt(2), 1.0):

@@ -25,6 +25,8 @@ TORQUE, COMMAND = GEAR.torque, "motor_command_ratio"
 LOADS_A = (0.1, 0.3, 0.5, 0.7, 0.9)
 SPEEDS_RAD_S = (0.5, 1.0)
 LEAST_RUNS = 6
+RESIDUAL_LIMIT = 0.1
+"""Greatest residual that passes, share of the span of torque."""
 MOST_LATE = 6
 """Delays tried, samples."""
 
@@ -39,7 +41,6 @@ class CurrentSession:
         repeats: Number of moves of each.
         motor_constant_n_m_a: Torque constant of the data sheet; with the ratio gives an efficiency.
         gear_ratio: Ratio of the gear by its label.
-        residual_limit: Greatest residual that passes, share of the span of torque.
     """
 
     loads_a: tuple[float, ...] = LOADS_A
@@ -47,7 +48,6 @@ class CurrentSession:
     repeats: int = 1
     motor_constant_n_m_a: float | None = None
     gear_ratio: float = GEAR.ratio
-    residual_limit: float = 0.1
 
     kind = "current"
     devices = ("logger",)
@@ -76,9 +76,7 @@ class CurrentSession:
             )
         span = float(np.ptp(torques))
         fix = "Look for a tight spot, a loose coupling, or another effect with `rig diagnose`."
-        check_limit(
-            "not_linear", torque.residual_rms / span, self.residual_limit, "The residual", fix
-        )
+        check_limit("not_linear", torque.residual_rms / span, RESIDUAL_LIMIT, "The residual", fix)
         drift = refuse_drift(torque, span)
         driver = _driver(runs)
         low, high = float(currents.min()), float(currents.max())

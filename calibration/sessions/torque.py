@@ -37,7 +37,6 @@ class TorqueSession:
         shunt_v_v: Change by the shunt, V/V, from the certificate; None for no check.
         counts_per_v_v: Gain of amplifier and converter; needed with a shunt.
         temperature_k: Temperature of the sensor; None if it was not measured.
-        rails_counts: Least and greatest count of the converter.
     """
 
     sensor: str = "proximal"
@@ -47,7 +46,6 @@ class TorqueSession:
     shunt_v_v: float | None = None
     counts_per_v_v: float | None = None
     temperature_k: float | None = None
-    rails_counts: tuple[float, float] = (-32768.0, 32767.0)
 
     kind = "torque"
     devices = ("logger",)
@@ -122,10 +120,8 @@ class TorqueSession:
                 loads.append(Load(float(torque), counts))
         deviation: float | None = None
         if self.shunt_v_v is not None and self.counts_per_v_v is not None:
-            deviation = check_shunt(
-                shunt[0.0], shunt[1.0], self.shunt_v_v, self.counts_per_v_v, self.rails_counts
-            )
-        fitted = fit_torque(loads, self.rails_counts)
+            deviation = check_shunt(shunt[0.0], shunt[1.0], self.shunt_v_v, self.counts_per_v_v)
+        fitted = fit_torque(loads)
         found: dict[str, float | str] = {
             "linearity_ratio": fitted.linearity,
             "hysteresis_ratio": _or_words(fitted.hysteresis, "no load was reached both ways"),

@@ -15,17 +15,16 @@ import numpy as np
 from calibration.chain import CURRENT, PAIRS
 from calibration.fsr_curve import FsrCurve
 from calibration.fsr_memory import FsrMemory
-from calibration.ft import AXES, STANDARD_GRAVITY_M_S2
 from calibration.procedure import Measurement, Procedure, Result
 from calibration.record import CalibrationRecord
 from calibration.sessions.current import TORQUE, CurrentSession
 from calibration.sessions.encoder import EncoderSession
 from calibration.sessions.fsr import SMOOTH, FsrSession
-from calibration.sessions.ft import FtSession
+from calibration.sessions.ft import AXES, FtSession
 from calibration.sessions.gearbox import GearboxSession
 from calibration.sessions.motion import stands
 from calibration.sessions.torque import TorqueSession
-from calibration.torque import weight_torque_n_m
+from calibration.torque import STANDARD_GRAVITY_M_S2, weight_torque_n_m
 from estimation.derived import zero_phase_channels
 from estimation.effects import effect
 from estimation.filters import LowPass

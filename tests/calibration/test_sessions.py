@@ -6,13 +6,12 @@ import pytest
 from calibration.fsr import Creep, FsrRun
 from calibration.fsr_curve import FsrCurve
 from calibration.fsr_memory import FsrMemory, fit_memory
-from calibration.ft import at_point, fit_tool
 from calibration.linear import shipped_calibration_set
 from calibration.procedure import AbortedError, Measurement, carry_out
 from calibration.quality import BadDataError
 from calibration.regression import is_better, regress
 from calibration.sessions.encoder import EncoderSession
-from calibration.sessions.ft import FtSession
+from calibration.sessions.ft import FtSession, at_point, fit_tool
 from calibration.sessions.gearbox import GearboxSession
 from calibration.sessions.torque import TorqueSession
 from estimation.recording import Flag, Recording
