@@ -18,7 +18,7 @@ from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError, check_change, check_levels, check_limit
 from calibration.regression import Regression, refuse_drift, regress
-from calibration.sessions.motion import moves, need_channel, steady
+from calibration.sessions.motion import condition, joined, moves, residuals, steady
 from estimation.recording import FloatArray
 
 TORQUE, COMMAND = GEAR.torque, "motor_command_ratio"
@@ -59,12 +59,11 @@ class CurrentSession:
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
         """Return the torque a current gives, and the current a command gives."""
         runs = [steady(m, (CURRENT, TORQUE, COMMAND)) for m in measurements]
-        currents = need_channel(np.concatenate([run[CURRENT] for run in runs]), CURRENT)
-        torques = need_channel(np.concatenate([run[TORQUE] for run in runs]), TORQUE)
+        currents = joined(runs, CURRENT)
+        torques = joined(runs, TORQUE)
         check_change(currents, 0.05, "The current")
         check_change(torques, 0.02, "The torque")
-        loads = np.array([float(m.recording.conditions["load_command_a"]) for m in measurements])
-        check_levels(loads, 3, "The load")
+        check_levels(condition(measurements, "load_command_a"), 3, "The load")
         torque = regress([equation(run) for run in runs], LEAST_RUNS)
         gain, friction = torque.values[:2]
         if gain <= 0:
@@ -92,11 +91,11 @@ class CurrentSession:
         }
         names = ("torque_constant_n_m_a", "friction_n_m", "damping_n_m_s_rad", "offset_n_m")
         torque_fit = torque.as_fit("current", *names)
-        residuals = _residuals(measurements, [run[CURRENT] for run in runs], torque)
+        series = residuals(measurements, [run[CURRENT] for run in runs], torque)
         return Conclusion(
             (Result("spindle_torque_n_m", CURRENT, torque_fit, low, high), driver),
             found,
-            Residuals("motor current, A", "residual, mN m", residuals),
+            Residuals("motor current, A", "residual, mN m", series),
         )
 
 
@@ -131,10 +130,9 @@ class DriveCurrentSession:
         ]
         late = int(np.argmin([_current_by_command(runs).residual_rms for runs in tried]))
         runs = tried[late]
-        currents = need_channel(np.concatenate([run[CURRENT] for run in runs]), CURRENT)
+        currents = joined(runs, CURRENT)
         check_change(currents, 0.005, "The current")
-        speeds = np.array([float(m.recording.conditions["speed_rad_s"]) for m in measurements])
-        check_levels(speeds, 2, "The speed")
+        check_levels(condition(measurements, "speed_rad_s"), 2, "The speed")
         turning = regress([_turning(run) for run in runs], LEAST_RUNS)
         friction, damping, zero = turning.values.tolist()
         half = turning.half_widths().tolist()
@@ -151,9 +149,9 @@ class DriveCurrentSession:
             else f"{friction * constant:.3g} N m by the data sheet's constant",
         }
         velocities = [run["spindle_velocity_rad_s"] for run in runs]
-        residuals = _residuals(measurements, velocities, turning)
+        series = residuals(measurements, velocities, turning)
         return Conclusion(
-            (_driver(runs),), found, Residuals("speed, rad/s", "residual, mA", residuals)
+            (_driver(runs),), found, Residuals("speed, rad/s", "residual, mA", series)
         )
 
 
@@ -179,14 +177,6 @@ def _driver(runs: Sequence[Mapping[str, FloatArray]]) -> Result:
     commands = np.concatenate([run[COMMAND] for run in runs])
     fit = _current_by_command(runs).as_fit("driver", "gain_a", "offset_a")
     return Result(CURRENT, COMMAND, fit, float(commands.min()), float(commands.max()))
-
-
-def _residuals(
-    measurements: Sequence[Measurement], variables: Sequence[FloatArray], fit: Regression
-) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return each run's variable and residual, in thousandths."""
-    rows = zip(measurements, variables, fit.residuals, strict=True)
-    return {m.recording.name: (values, left * 1e3) for m, values, left in rows}
 
 
 def _late_by(measurement: Measurement, samples: int) -> Measurement:
