@@ -21,15 +21,13 @@ from rig.log.schema import Field, Stream
 from rig.log.streams import COUNTS
 from rig.machines.machine import FloatArray, Machine
 from rig.machines.safety import InCounts, choices, motor_limits
-from rig.protocols import trajectory
 from rig.protocols.joints import JointPlan
-from rig.protocols.motion import RELAX_CYCLES, RELAX_HZ, Motion
+from rig.protocols.motion import Motion, path_of, relaxed
 from rig.protocols.protocol import Plan
 
 AXES = ("yaw", "jaw_1", "jaw_2")
 """What motor 1, 2 and 3 turn."""
 APPROACH_SPEED_RAD_S = 0.5
-SHORTEST_MOVE_S = 0.5
 RELAX_RAD = 0.03
 """Less than what is open before the jaws touch anything."""
 
@@ -124,15 +122,12 @@ class GrasperMachine(Machine):
                 "Choose a protocol for it, such as grasper.",
             )
         run = axes_of_joints(plan.joint_rad)
-        approach = _move(np.array(here), run[0])
-        parts = [approach, run, _move(run[-1], run[0]), _relaxation(run[0])]
-        first = len(approach)
-        whole = np.concatenate(parts)
+        whole, first = path_of(run, here, GRASPER.rate_hz, APPROACH_SPEED_RAD_S, RELAX_RAD)
         return Motion(tuple(whole.T), first, first + len(run))
 
     def settling(self, here: tuple[float, ...]) -> Motion:
         """Return a little motion of every motor about where it stands."""
-        whole = _relaxation(np.array(here))
+        whole = relaxed(np.array(here), GRASPER.rate_hz, RELAX_RAD)
         return Motion(tuple(whole.T), 0, len(whole))
 
     def too_narrow(self, limits: ArmLimits, sample: np.void) -> tuple[ArmLimits, Trip]:
@@ -153,17 +148,3 @@ class GrasperMachine(Machine):
         assert isinstance(limits, GrasperLimits)  # noqa: S101
         one, two, three = (dataclasses.replace(axis, max_force=TOP) for axis in limits.axes)
         return dataclasses.replace(limits, axes=(one, two, three), stale_ticks=TOP)
-
-
-def _move(start_rad: FloatArray, stop_rad: FloatArray) -> FloatArray:
-    """Return a move of all axes that ends for all at once, shape (n, 3)."""
-    farthest = float(np.abs(stop_rad - start_rad).max())
-    duration_s = max(farthest / APPROACH_SPEED_RAD_S, SHORTEST_MOVE_S)
-    there = trajectory.minimum_jerk(0.0, 1.0, duration_s, GRASPER.rate_hz)
-    move: FloatArray = start_rad + there[:, None] * (stop_rad - start_rad)
-    return move
-
-
-def _relaxation(centre_rad: FloatArray) -> FloatArray:
-    swing = trajectory.relaxation(0.0, RELAX_RAD, RELAX_HZ, RELAX_CYCLES, GRASPER.rate_hz)
-    return centre_rad + swing[:, None]

@@ -4,7 +4,7 @@ The drive's shaft counts as motor and as spindle. It has no load motor.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import replace
 from typing import Self
 
 from drivers.registry import drivers
@@ -18,26 +18,9 @@ from rig.protocols.protocol import Plan
 from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
 
-@dataclass(frozen=True, eq=False)
-class SampledProfile(Profile):
-    """The reference rig's profile with a tick of its core, and samples at another rate.
-
-    Attributes:
-        sampled_hz: Samples a second.
-    """
-
-    sampled_hz: float = 1000.0
-
-    @property
-    def rate_hz(self) -> float:
-        """Samples a second."""
-        return self.sampled_hz
-
-
-def sampled_at(rate_hz: float) -> SampledProfile:
-    """Return the profile of a drive that is sampled at a rate."""
-    same = {field.name: getattr(REFERENCE, field.name) for field in fields(REFERENCE)}
-    return SampledProfile(**same, sampled_hz=rate_hz)
+def sampled_at(rate_hz: float) -> Profile:
+    """Return the reference rig's profile, with the tick of its core, sampled at another rate."""
+    return replace(REFERENCE, sampled_hz=rate_hz)
 
 
 class DriveMachine(ReferenceMachine):
