@@ -12,7 +12,7 @@ from urllib.parse import parse_qsl
 from pydantic import ConfigDict, ValidationError, create_model
 
 from calibration.linear import SHIPPED as SHIPPED_CALIBRATIONS
-from drivers.registry import CanUse, Driver, drivers, fakes
+from drivers.registry import Driver, drivers, fakes
 from rig.configuration.config import SHIPPED, Config, is_simulated
 from rig.configuration.machine_settings import settings_of
 from rig.configuration.sections import DeviceSection
@@ -150,7 +150,8 @@ def _bus_problems(
         if use is None or not section.url.startswith("can:"):
             continue
         bus, _, query = section.url.partition("?")
-        place = _place(name, section, use, known[section.driver].options)
+        options = {**known[section.driver].options, **section.options}
+        place = _OnBus(name, use.identifiers(options), section.bit_rate or use.bit_rate)
         said = dict(parse_qsl(query)).get("bitrate")
         if said is not None and said != str(place.bit_rate):
             found.append(
@@ -173,11 +174,6 @@ def _bus_problems(
                 )
             )
     return found
-
-
-def _place(name: str, section: DeviceSection, use: CanUse, defaults: Mapping[str, Any]) -> _OnBus:
-    identifiers = use.identifiers({**defaults, **section.options})
-    return _OnBus(name, identifiers, section.bit_rate or use.bit_rate)
 
 
 def _clash(bus: str, one: _OnBus, other: _OnBus) -> list[Problem]:

@@ -35,18 +35,16 @@ class Coupling:
     Attributes:
         name: Name.
         joints: Names of the joints, n of them.
-        actuators: Names of the actuators, n of them.
         jacobian: A, joint velocity over actuator velocity, shape (n, n).
     """
 
     name: str
     joints: tuple[str, ...]
-    actuators: tuple[str, ...]
     jacobian: FloatArray
 
     def __post_init__(self) -> None:
         size = len(self.joints)
-        if self.jacobian.shape != (size, size) or len(self.actuators) != size:
+        if self.jacobian.shape != (size, size):
             raise GrasperError(f"{self.name}: {size} joints need a matrix of {size} x {size}.")
         finite = np.isfinite(self.jacobian).all()
         if not finite or np.linalg.matrix_rank(self.jacobian) < size:

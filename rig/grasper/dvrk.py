@@ -13,7 +13,6 @@ import numpy as np
 from rig.grasper.coupling import Coupling, GrasperError
 
 JOINTS = ("roll", "wrist_pitch", "wrist_yaw", "jaw")
-ACTUATORS = ("actuator_1", "actuator_2", "actuator_3", "actuator_4")
 
 
 @cache
@@ -21,7 +20,7 @@ def dvrk_couplings() -> dict[str, Coupling]:
     """Return the coupling of every instrument model, by its number."""
     tools = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())["tool"]
     return {
-        model: Coupling(f"{tool['name']} {model}", JOINTS, ACTUATORS, np.array(tool["matrix"]))
+        model: Coupling(f"{tool['name']} {model}", JOINTS, np.array(tool["matrix"]))
         for tool in tools
         for model in tool["models"].split()
     }

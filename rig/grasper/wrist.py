@@ -257,4 +257,4 @@ def planetary_grasper(path: CablePath, planetary: Planetary = EQUAL_GEARS) -> Co
     jaw = DRUM_M / path.d3_m / GEARHEAD_RATIO
     jaws = np.array([[along, jaw, 0.0], [along, 0.0, jaw]])
     jacobian = np.vstack([[yaw, 0.0, 0.0], JAWS_TO_PITCH_AND_GRASP @ jaws])
-    return Coupling("planetary grasper", JOINTS, MOTORS, jacobian)
+    return Coupling("planetary grasper", JOINTS, jacobian)

@@ -88,7 +88,7 @@ def test_the_cadiere_forceps_torques_and_the_printed_equation_4():
 
 def test_what_makes_no_grasper_is_refused():
     with pytest.raises(GrasperError, match="cannot be inverted"):
-        Coupling("flat", ("a", "b"), ("x", "y"), np.ones((2, 2)))
+        Coupling("flat", ("a", "b"), np.ones((2, 2)))
     with pytest.raises(GrasperError, match="overlap"):
         planetary_grasper(replace(PATH, l3_m=0.004))
     with pytest.raises(GrasperError, match="last axis"):
