@@ -23,6 +23,7 @@ from calibration.quality import (
     check_rails,
     finite,
 )
+from calibration.record import Fit
 from calibration.regression import Regression, is_better, refuse_drift, regress
 from estimation.recording import FloatArray
 
@@ -138,15 +139,10 @@ def fit_fsr(
     fit = fits[chosen]
     known = 0 if force_at_zero_n is None else 1  # a coefficient held fixed has no variance
     covariance = block_diag(np.zeros((known, known)), fit.covariance)
-    curve = FsrCurve(
-        coefficients=tuple(_coefficients(fit, force_at_zero_n)),
-        low_v=low,
-        high_v=high,
-        covariance=tuple(map(tuple, covariance.tolist())),
-        residual_rms_n=fit.residual_rms,
-        runs=len(runs),
-        points=fit.size,
-    )
+    coefficients = _coefficients(fit, force_at_zero_n)
+    names = {f"c{k}": value for k, value in enumerate(coefficients)}
+    kept = Fit.of("polynomial", names, covariance, fit.residual_rms, fit.size)
+    curve = FsrCurve(tuple(coefficients), low, high, kept, len(runs))
     fix = "Let the sensor rest between runs, and record again."
     drift = refuse_drift(fit, span, DRIFT_LIMIT, fix)
     rmse = {d: float(np.sqrt(fit.held_out.mean())) for d, fit in fits.items()}

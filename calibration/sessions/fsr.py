@@ -92,7 +92,8 @@ class FsrSession:
             pure, self.degree, force_at_zero_n=self.force_at_zero_n, rail_v=self.rail_v
         )
         curve = fitted.curve
-        whole = curve.as_fit().extended(
+        assert curve.fit is not None  # noqa: S101  it was fitted
+        whole = curve.fit.extended(
             {"loading_gap_n": memory.gap_n, "creep_ratio": memory.creep_ratio},
             [memory.gap_standard_error_n, creep.standard_error if creep else 0.0],
         )
