@@ -98,14 +98,14 @@ class FtSession:
         found: dict[str, float | str] = {
             "counts_per_n": said["counts_per_n"],
             "counts_per_n_m": said["counts_per_n_m"],
-            "torque_residual_n_m": tool.residual[1],
+            "torque_residual_n_m": tool.torque_residual_n_m,
             "greatest_weight_torque_at_jaw_n_m": float(np.abs(at_jaw[:, 3:]).max()),
         }
         jaw = {
             **{f"jaw_{axis}_m": v for axis, v in zip("xyz", self.jaw_m, strict=True)},
             **{f"jaw_turn_{axis}_rad": v for axis, v in zip("xyz", self.jaw_turn_rad, strict=True)},
         }
-        whole = tool.as_fit().extended(jaw)
+        whole = tool.fit.extended(jaw)
         number = np.arange(len(down), dtype=np.float64)
         series = {axis: (number, left[:, k]) for k, axis in enumerate(AXES[:3])}
         return Conclusion(
@@ -136,17 +136,15 @@ class Tool:
         bias: Reading with nothing on it, N and N m, shape (6,).
         mass_kg: Mass.
         centre_m: Centre of mass from the sensor's origin, shape (3,).
-        covariance: Of bias, mass and centre in that order, shape (10, 10).
-        residual: Root mean square residual of forces (N) and torques (N m).
-        poses: Number of poses.
+        fit: All of these, with the root mean square residual of the forces, N.
+        torque_residual_n_m: Root mean square residual of the torques.
     """
 
     bias: FloatArray
     mass_kg: float
     centre_m: FloatArray
-    covariance: FloatArray
-    residual: tuple[float, float]
-    poses: int
+    fit: Fit
+    torque_residual_n_m: float
 
     def weight(self, gravity: ArrayLike) -> FloatArray:
         """Return the wrench of the weight, shape (..., 6), for directions of shape (..., 3)."""
@@ -156,14 +154,6 @@ class Tool:
     def contact(self, wrench: ArrayLike, gravity: ArrayLike) -> FloatArray:
         """Return readings less bias and weight, shape (..., 6)."""
         return np.asarray(wrench, np.float64) - self.bias - self.weight(gravity)
-
-    def as_fit(self) -> Fit:
-        """Return it as a calibration record keeps it."""
-        names = [*(f"bias_{axis}" for axis in AXES), "mass_kg"]
-        names += [f"centre_{axis}_m" for axis in "xyz"]
-        values = [*self.bias, self.mass_kg, *self.centre_m]
-        parameters = {name: float(value) for name, value in zip(names, values, strict=True)}
-        return Fit.of("tool", parameters, self.covariance, self.residual[0], self.poses)
 
 
 def fit_tool(gravity: ArrayLike, wrench: ArrayLike) -> Tool:
@@ -210,14 +200,12 @@ def fit_tool(gravity: ArrayLike, wrench: ArrayLike) -> Tool:
     covariance[:3, :3], covariance[3:6, 3:6] = force_cov[:3, :3], torque_cov[:3, :3]
     covariance[6, 6] = force_cov[3, 3]
     covariance[7:, 7:] = torque_cov[3:, 3:] / mass**2
-    return Tool(
-        np.concatenate([force[:3], torque[:3]]),
-        mass,
-        centre,
-        covariance,
-        (force_left, torque_left),
-        len(down),
-    )
+    bias = np.concatenate([force[:3], torque[:3]])
+    names = [*(f"bias_{axis}" for axis in AXES), "mass_kg", *(f"centre_{k}_m" for k in "xyz")]
+    values = np.array([*bias, mass, *centre]).tolist()
+    parameters = dict(zip(names, values, strict=True))
+    fit = Fit.of("tool", parameters, covariance, force_left, len(down))
+    return Tool(bias, mass, centre, fit, torque_left)
 
 
 def at_point(
