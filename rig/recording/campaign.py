@@ -33,9 +33,9 @@ from rig.log.run import RunEnd, RunInfo
 from rig.log.schema import Stream
 from rig.log.streams import COUNTS, FLIGHT_STREAM, SAMPLE, sample_stream
 from rig.log.writer import PART_SUFFIX, LogWriter
-from rig.machines.machine import MachineMotion, MachinePlan
 from rig.machines.reading import Reading
-from rig.protocols.protocol import Protocol
+from rig.protocols.motion import Motion
+from rig.protocols.protocol import Plan, Protocol
 from rig.recording.flight import FlightStream
 
 MANIFEST = "campaign.json"
@@ -92,7 +92,7 @@ class RunResult:
         return tuple(d.channel for d in self.drift if not d.passes)
 
 
-def check_disk_space(folder: Path, plans: Iterable[MachinePlan]) -> None:
+def check_disk_space(folder: Path, plans: Iterable[Plan]) -> None:
     """Refuse to begin what the disk cannot hold.
 
     Raises:
@@ -131,7 +131,7 @@ def read_manifest(folder: Path) -> tuple[Protocol, Config]:
 
 def open_campaign_folder(
     folder: Path, protocol: Protocol, config: Config, resume: bool
-) -> list[MachinePlan]:
+) -> list[Plan]:
     """Prepare a campaign's folder and return the runs that are still to be made.
 
     Raises:
@@ -172,7 +172,7 @@ def open_campaign_folder(
 
 def record_campaign(
     session: Session,
-    plans: Iterable[MachinePlan],
+    plans: Iterable[Plan],
     folder: Path,
     notes: str = "",
     on_progress: Progress | None = None,
@@ -196,7 +196,7 @@ def record_campaign(
 
 def _record_run(
     session: Session,
-    plan: MachinePlan,
+    plan: Plan,
     path: Path,
     epoch_ns: int,
     notes: str,
@@ -256,14 +256,14 @@ def _crossing_in(
         raise
 
 
-def _of_run(reading: Reading, motion: MachineMotion) -> Reading:
+def _of_run(reading: Reading, motion: Motion) -> Reading:
     """Return the samples that belong to the run itself, not to its approach or release."""
     return reading.where((reading.setpoint >= motion.first) & (reading.setpoint < motion.last))
 
 
 def _new_log(
     session: Session,
-    plan: MachinePlan,
+    plan: Plan,
     path: Path,
     started_at_ns: int,
     before: Mapping[str, SensorZero],
@@ -352,7 +352,7 @@ def _mean_counts(zeros: Mapping[str, SensorZero]) -> dict[str, float]:
     return {f"{name}_counts": zero.mean_counts for name, zero in zeros.items()}
 
 
-def _log_path(folder: Path, plan: MachinePlan) -> Path:
+def _log_path(folder: Path, plan: Plan) -> Path:
     return folder / f"{plan.name}.mcap"
 
 

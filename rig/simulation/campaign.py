@@ -41,9 +41,7 @@ def simulated_run(bench: SimulatedBench, plan: RunPlan, source: str) -> Recordin
         source: Source of the recording.
     """
     motion = motion_of(plan, float(plan.target_angle_rad[0]))
-    columns = bench.play(
-        motion.target_angle_rad[: motion.last], motion.load_command_a[: motion.last]
-    )
+    columns = bench.play(*(values[: motion.last] for values in motion.setpoints))
     return Recording(
         plan.name,
         np.arange(motion.last - motion.first) / SAMPLE_RATE_HZ,

@@ -2,9 +2,10 @@
 
 Each effect is a compiled function (`hidden_drive`, `hidden_cable`, `hidden_sensors`) of the plant's
 own quantities and one row of a table, kept here: a strength and up to two numbers that shape it.
-Strength 0 does not change the plant at all. Strength 1 is clear but not dominant. On the default rig, low-passed at 50 Hz, effects of drive and gear are
-a quarter to three quarters of the residual variance of a linear equation of motor current; effects
-of cable and jaw add 4 to 7 mN m rms to proximal torque or 1 to 5 mrad to the jaw angle.
+Strength 0 does not change the plant at all. Strength 1 is clear but not dominant. On the default
+rig, low-passed at 50 Hz, effects of drive and gear are a quarter to three quarters of the residual
+variance of a linear equation of motor current; effects of cable and jaw add 4 to 7 mN m rms to
+proximal torque or 1 to 5 mrad to the jaw angle.
 
 The forms are these modules' own and are deliberately not those an estimator would try first
 (rational functions in place of exponentials, side bands, contact damping), so that finding an

@@ -89,11 +89,7 @@ def test_the_noise_floor_is_below_the_error_that_remains(
 
 
 def test_every_experiment_of_the_menu_is_a_protocol_within_the_limits(
-<<<<<<< HEAD
     answered: Answer, rippled: list[Recording], tmp_path
-=======
-    rippled: list[Recording], rig: FittedRig, tmp_path
->>>>>>> simulation
 ) -> None:
     rig = simulated_rig([e.model for e in answered.layout.equations.values()], rippled)
     assert rig is not None
