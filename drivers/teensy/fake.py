@@ -11,7 +11,7 @@ refuses REFERENCE.
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,11 +129,11 @@ class PythonBoard:
         if kind is Kind.HELLO:
             self._last_command = None  # another program, whose numbers begin anew
             now = replace(self._identity, status=self._status, offer=self._offer)
-            self._send(protocol.encode_hello_reply(sequence, now))
+            self._send(_hello_reply(sequence, now))
         elif kind is Kind.PING:
             if self._is_live(int(fields["session"])) and self._is_new(sequence):
                 self._hear(sequence)
-            self._send(protocol.encode_pong(sequence, int(fields["token"]), self._now_us))
+            self._send(protocol.encode(Kind.PONG, sequence, fields["token"], self._now_us))
         elif kind is Kind.TRIP:
             self._send(self._trip_report(sequence))
         elif self._last_command is not None and self._last_command[:2] == (kind, sequence):
@@ -145,10 +145,12 @@ class PythonBoard:
             self._acknowledge(kind, sequence, result)
 
     def _trip_report(self, sequence: int) -> bytes:
-        silent_us = self._silent_us
+        silent_us = min(self._silent_us, protocol.TOP)
         numbers = (silent_us, self._watchdog_us, self._trip_us, silent_us)
         code = self._trip
-        return protocol.encode_trip_report(sequence, code, 255, numbers if code else (0, 0, 0, 0))
+        return protocol.encode(
+            Kind.TRIP_REPORT, sequence, code, 255, *(numbers if code else (0, 0, 0, 0))
+        )
 
     def _execute(self, kind: Kind, payload: bytes, fields: np.void) -> Result:
         if kind is Kind.ARM:
@@ -239,7 +241,7 @@ class PythonBoard:
 
     def _acknowledge(self, command: int, sequence: int, result: Result) -> None:
         ack = Ack(sequence, command, result, self._status, self._queue_free())
-        self._send(protocol.encode_ack(ack))
+        self._send(protocol.encode(Kind.ACK, *astuple(ack)))
 
     def _send(self, payload: bytes) -> None:
         frame = encode_frame(payload)
@@ -330,6 +332,12 @@ class PythonBoard:
         self._dropped = (self._dropped + ticks - fitting) % 2**16
         if fitting:
             self._out += encode_frames(samples.view(np.uint8).reshape(fitting, -1))
+
+
+def _hello_reply(sequence: int, identity: Identity) -> bytes:
+    numbers = (identity.protocol_hash, protocol.FIRMWARE_VERSION, identity.build_hash)
+    state = (identity.serial.encode(), identity.boot, identity.status, identity.offer)
+    return protocol.encode(Kind.HELLO_REPLY, sequence, *numbers, *state)
 
 
 def _reason_of_refusal(payload: bytes) -> Result:
