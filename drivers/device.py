@@ -4,7 +4,7 @@ A driver is made from an open link, controls one device, and does nothing in the
 passes in `read`. Simulation swaps the link and nothing else.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 from typing import Literal, Protocol, runtime_checkable
@@ -46,6 +46,33 @@ class Channel:
     lower: float
     upper: float
     description: str
+
+
+AXES = ("force_x_n", "force_y_n", "force_z_n", "torque_x_n_m", "torque_y_n_m", "torque_z_n_m")
+"""Channels of a force and torque sensor."""
+
+
+def wrench_channels(rate_hz: float, tops: Sequence[float]) -> tuple[Channel, ...]:
+    """Return three forces and three torques, given the largest value of each, N and N m."""
+    kinds = [("N", "force")] * 3 + [("N m", "torque")] * 3
+    return tuple(
+        Channel(name, unit, rate_hz, -top, top, text)
+        for name, (unit, text), top in zip(AXES, kinds, tops, strict=True)
+    )
+
+
+def moved_wrench(wrench: NDArray[np.float64], point_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a wrench about another point, axes unchanged, shape (..., 6).
+
+    The force stays; the torque becomes T' = T + r x F, with r from the new point to the old one,
+    here `-point_m`.
+
+    Args:
+        wrench: Force and torque about the sensor's origin, N and N m, shape (..., 6).
+        point_m: The new point in the sensor's axes, m, shape (3,).
+    """
+    force, torque = wrench[..., :3], wrench[..., 3:]
+    return np.concatenate((force, torque + np.cross(-point_m, force)), axis=-1)
 
 
 @dataclass(frozen=True, slots=True)

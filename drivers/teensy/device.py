@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.counters import Arrivals, DeviceCounters
+from drivers.counters import DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
 from drivers.registry import Driver
+from drivers.streaming import LONGEST_SILENCE_S, Arrivals
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, STATUS_SATURATED, STATUS_WATCHDOG_TRIPPED
@@ -16,8 +17,6 @@ from drivers.teensy.reference import REFERENCE
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 
-LONGEST_SILENCE_S = 0.1
-"""A hundred samples."""
 ADC_BITS = 12
 
 

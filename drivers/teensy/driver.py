@@ -8,13 +8,14 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.counters import LinkCounters
 from drivers.errors import (
     CommandRefusedError,
     DisarmUnconfirmedError,
     DriverError,
     FrameError,
 )
-from drivers.link import FramedLink, LinkCounters
+from drivers.link import FramedLink
 from drivers.teensy import protocol
 from drivers.teensy.continuity import Continuity
 from drivers.teensy.profile import ArmLimits, Profile
