@@ -269,11 +269,8 @@ def open_ati_can(
 ) -> AtiCan:
     """Open the sensor on a CAN bus.
 
-    Args:
-        url: The bus, e.g. `can:socketcan:can0`.
-        base: The sensor's base identifier; 0x20 from the factory.
-        calibration: Which of its 16 calibrations to use.
-        rate_hz: How often it is asked; at 250 kbit/s a question takes above 1 ms of the bus.
+    Options are those of `AtiCan`; at 250 kbit/s a question takes above 1 ms of the bus. A URL is
+    e.g. `can:socketcan:can0`.
 
     Raises:
         LinkError: The bus cannot be opened, or the options are no sensor's.

@@ -169,15 +169,8 @@ def open_ati_serial(
 ) -> AtiSerial:
     """Open the sensor on an RS-485 adapter, 8 bits, even parity.
 
-    Args:
-        url: The adapter.
-        calibration: Which of its calibrations to use, from 1.
-        rate_hz: Frames a second it sends.
-        baud_rate: 1250000 as delivered; 115200 and 19200 can be set.
-        matrix_by_rows: See `Assumptions`; the next three too. Check them with a known weight.
-        force_unit: Code of the force unit where the sensor's own is not to be believed.
-        torque_unit: Code of the torque unit, likewise.
-        lock_answers: Whether it answers the function that locks its storage.
+    Options are those of `AtiSerial` and its `Assumptions`, which a known weight checks, and the bit
+    rate: 1250000 as delivered; 115200 and 19200 can be set.
 
     Raises:
         LinkError: The adapter cannot be opened or has no such speed.

@@ -140,13 +140,7 @@ def open_qia128(
 ) -> Qia128:
     """Open the amplifier on a serial adapter.
 
-    Args:
-        url: The adapter.
-        rated_load: Load at full scale, from the certificate.
-        unit: Unit of `rated_load`.
-        rate_hz: Rate it is set to, samples a second.
-        baud_rate: Bit rate of its UART; no public source gives it.
-        serial: Serial number from its label, for one that does not report it as assumed.
+    Options are those of `Qia128`, and the bit rate of its UART; no public source gives it.
 
     Raises:
         LinkError: The adapter cannot be opened.
