@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.ati_net import protocol
-from drivers.ati_net.sequence import RecordSequence
-from drivers.ati_net.stream_watch import StreamWatch
+from drivers.ati_net.stream import RecordSequence, StreamWatch
 from drivers.device import AXES, Batch, Channel, DeviceIdentity, SampleFlag, wrench_channels
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.registry import Driver

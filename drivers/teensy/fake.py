@@ -35,6 +35,7 @@ from drivers.teensy.protocol import (
     Trip,
 )
 from drivers.teensy.reference_board import REFERENCE_LOGIC
+from drivers.transport.simulated import Outbox
 
 TRANSMIT_CAPACITY = 65536
 """Bytes the board holds for a host that does not read."""
@@ -45,7 +46,7 @@ _ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 _SILENT = STATUS_WATCHDOG_TRIPPED | Trip.HOST_SILENT << TRIP_SHIFT
 
 
-class PythonBoard:
+class PythonBoard(Outbox):
     """A board for simulation on a bench, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
@@ -62,6 +63,7 @@ class PythonBoard:
         protocol_hash: int | None = None,
         logic: BoardLogic = REFERENCE_LOGIC,
     ) -> None:
+        super().__init__()
         self._bench = bench
         self._logic = logic
         self._profile = logic.profile
@@ -69,7 +71,6 @@ class PythonBoard:
         self._identity = Identity("SIM-0001", "", own_hash, boot=1)
         self._next_tick_us = start_tick_us
         self._stream = FrameStream(0)  # no command is frequent
-        self._out = bytearray()
         self._dropped = 0
         self._streaming = False
         self._sequence = 0
@@ -91,12 +92,6 @@ class PythonBoard:
         """Take bytes from the host and carry out the commands they complete."""
         for payload in self._stream.feed(data).others:
             self._answer(payload)
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        data = bytes(self._out)
-        self._out.clear()
-        return data
 
     def advance(self, ticks: int) -> None:
         """Let that many of the profile's ticks pass."""

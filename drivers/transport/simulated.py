@@ -32,6 +32,22 @@ class Board(Protocol):
         ...
 
 
+class Outbox:
+    """A fake that sends: bytes that wait for the host, and a world that stands still."""
+
+    def __init__(self) -> None:
+        self._out = bytearray()
+
+    def advance(self, ticks: int) -> None:
+        """Let that many ticks pass: nothing happens by itself."""
+
+    def transmit(self) -> bytes:
+        """Give the bytes that wait for the host."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+
 class Pace:
     """Keeps a simulated device from running ahead of a person who watches.
 

@@ -11,7 +11,7 @@ from drivers.ati_net import protocol
 from drivers.ati_net.driver import AtiNet
 from drivers.ati_net.fake import CalibrationFake, RdtFake, fake_calibration
 from drivers.ati_net.protocol import Calibration
-from drivers.ati_net.sequence import RESTART_STEP, RecordSequence
+from drivers.ati_net.stream import RESTART_STEP, RecordSequence
 from drivers.counters import DeviceCounters
 from drivers.device import SampleFlag
 from drivers.errors import DriverError, FrameError, LinkError, LinkLostError, LinkTimeoutError
