@@ -12,6 +12,7 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.counters import DeviceCounters
 from drivers.errors import LinkError
 
 
@@ -231,3 +232,57 @@ def stop_and_let_go(stop: Callable[[], None], let_go: Callable[[], None]) -> Non
         pass  # it is gone already
     finally:
         let_go()
+
+
+class Clocked(Protocol):
+    """The way to a device: a transport or a CAN bus."""
+
+    @property
+    def now_s(self) -> float:
+        """Its clock, s."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it."""
+        ...
+
+
+class LinkedDevice:
+    """What every driver of a device on one link has.
+
+    A driver gives `channels`, `identify` and `stop`.
+
+    Args:
+        way: The way to the device, closed with it.
+        rate_hz: Samples a second.
+    """
+
+    def __init__(self, way: Clocked, rate_hz: float) -> None:
+        self._way = way
+        self._rate_hz = rate_hz
+        self._counters = DeviceCounters()
+        self._identified = self._closed = False
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What a sample has."""
+        raise NotImplementedError
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened on the way."""
+        return self._counters.as_dict()
+
+    def identify(self) -> DeviceIdentity:
+        """Ask who is there."""
+        raise NotImplementedError
+
+    def stop(self) -> None:
+        """Let no more samples come."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Stop where that can still be done, and let go of the way."""
+        if not self._closed:
+            self._closed = True
+            stop_and_let_go(self.stop, self._way.close)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.counters import DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, stop_and_let_go
+from drivers.device import Batch, LinkedDevice
 from drivers.errors import DriverError, LinkTimeoutError
 from drivers.transport.transport import Transport
 
@@ -52,7 +52,7 @@ class Arrivals:
         return numbers
 
 
-class StreamedDevice:
+class StreamedDevice(LinkedDevice):
     """A device that streams by itself.
 
     A driver gives `channels`, `identify`, `begin`, `receive` and `stop`.
@@ -64,27 +64,11 @@ class StreamedDevice:
     """
 
     def __init__(self, transport: Transport, rate_hz: float, title: str) -> None:
+        super().__init__(transport, rate_hz)
         self._transport = transport
-        self._rate_hz = rate_hz
         self._title = title
-        self._counters = DeviceCounters()
         self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
         self._bad_at_start = 0
-        self._identified = self._closed = False
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """What a sample has."""
-        raise NotImplementedError
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Counters of the link."""
-        return self._counters.as_dict()
-
-    def identify(self) -> DeviceIdentity:
-        """End the stream where that can be done, and ask who is there."""
-        raise NotImplementedError
 
     def begin(self) -> None:
         """Let the stream begin."""
@@ -127,16 +111,6 @@ class StreamedDevice:
             flags,
             self._counters.crc_errors - self._bad_at_start,
         )
-
-    def stop(self) -> None:
-        """End the stream."""
-        raise NotImplementedError
-
-    def close(self) -> None:
-        """End the stream where that can still be done, and let go of the link."""
-        if not self._closed:
-            self._closed = True
-            stop_and_let_go(self.stop, self._transport.close)
 
     def quieten(self) -> None:
         """End the stream and wait until nothing more comes.
