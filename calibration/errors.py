@@ -1,9 +1,9 @@
 """Errors of the `calibration` room: what a calibration refuses."""
 
-from estimation.errors import EstimationError
+from estimation.errors import ExplainedError
 
 
-class CalibrationError(EstimationError):
+class CalibrationError(ExplainedError):
     """Base of every error this room raises on purpose."""
 
 
