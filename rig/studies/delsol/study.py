@@ -100,7 +100,7 @@ class Seed:
     named: tuple[Named, ...]
 
 
-def run_delsol(seeds: int, keeper: Keeper) -> DelSolStudy:
+def run(seeds: int, keeper: Keeper) -> DelSolStudy:
     """Do the study on arms of every family of hidden friction.
 
     Args:
