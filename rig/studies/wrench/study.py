@@ -119,7 +119,7 @@ class WrenchStudy:
         return np.array([arm.errors[table][method] for arm in own])
 
 
-def run_wrench_study(seeds: int, keeper: Keeper) -> WrenchStudy:
+def run(seeds: int, keeper: Keeper) -> WrenchStudy:
     """Do the study on arms of every family of hidden torque.
 
     Args:

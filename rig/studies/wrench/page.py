@@ -1,19 +1,20 @@
-"""The simulated tables 3.1 to 3.3 of Piqué 2018, for any medium, and as Markdown."""
+"""The page of the simulated tables 3.1 to 3.3 of Piqué 2018."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
+from markupsafe import Markup
 
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, OWN
 from rig.arm.simulated import CONTACT_SHARE, GRIP_N_M
-from rig.output.figures import paired_bars, write_svgs
-from rig.output.table import TextTable, to_page
+from rig.output.figures import paired_bars
+from rig.output.page import Page
+from rig.output.table import TextTable
 from rig.studies.coverage import coverage
 from rig.studies.families import ratios, verdict
-from rig.studies.pique.wrench import (
+from rig.studies.wrench.study import (
     BODY,
     CAUSAL,
     CONTACT,
@@ -63,7 +64,13 @@ ADJUSTED = TextTable(
 )
 
 
-def lead(study: WrenchStudy) -> str:
+def page(study: WrenchStudy) -> Page:
+    """Return the study's page."""
+    paragraphs = [_lead(study), *NOTES]
+    return Page(TITLE, paragraphs, _tables(study), study.provenance, lambda: _figures(study))
+
+
+def _lead(study: WrenchStudy) -> str:
     """Return the study's result in a few sentences."""
     near = [word for table in TABLES for word in _near(study, table)]
     return (
@@ -72,7 +79,7 @@ def lead(study: WrenchStudy) -> str:
     )
 
 
-def tables(study: WrenchStudy) -> list[TextTable]:
+def _tables(study: WrenchStudy) -> list[TextTable]:
     """Return the comparison by family, then one table for each of the thesis'."""
     columns = [f"{name.split(',')[0]} {label}" for name in TABLES for label in _columns(name)]
     count = f"{study.seeds} arms a family"
@@ -87,13 +94,8 @@ def tables(study: WrenchStudy) -> list[TextTable]:
     ]
 
 
-def markdown(study: WrenchStudy, figures: Sequence[str] = ()) -> str:
-    """Return the study as a Markdown page."""
-    return to_page([TITLE, lead(study), *NOTES], tables(study), study.provenance, figures)
-
-
-def write_figures(folder: Path, study: WrenchStudy) -> list[Path]:
-    """Write the median errors of each table by method, over all families."""
+def _figures(study: WrenchStudy) -> Mapping[str, Markup]:
+    """Draw the median errors of each table by method, over all families."""
     drawn = {}
     for number, name in enumerate(TABLES, start=1):
         thesis, ours = (
@@ -104,7 +106,7 @@ def write_figures(folder: Path, study: WrenchStudy) -> list[Path]:
         drawn[f"wrench-3-{number}"] = paired_bars(
             pairs, ("thesis' method", "ours"), "NRMSD, %", f"Table {name}, medians"
         )
-    return write_svgs(folder, drawn)
+    return drawn
 
 
 def _ratios(study: WrenchStudy, method: str = OURS) -> Mapping[str, FloatArray]:
@@ -154,7 +156,7 @@ def _effects(study: WrenchStudy) -> TextTable:
     """Return how often each kind of effect was found, whatever the joint, by family."""
     kinds: dict[str, Counter[str]] = {family: Counter() for family in FAMILIES}
     for arm in study.arms:
-        kinds[arm.family].update({name.rsplit(" J", 1)[0] for name in arm.effects})
+        kinds[arm.family].update(dict.fromkeys(name.rsplit(" J", 1)[0] for name in arm.effects))
     rows = [
         [family, ", ".join(f"{kind} {count}" for kind, count in found.most_common())]
         for family, found in kinds.items()
