@@ -11,16 +11,11 @@ import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, TypeVar
+from typing import Any
 
 from estimation.recording import Flag, Instrument, Mark, Stretch
 from rig.errors import DataError
 from rig.log.schema import CHECKSUM_KEY
-
-RUN_RECORD = "rig.run"
-END_RECORD = "rig.end"
-MARK_RECORD = "rig.mark"
-STRETCH_RECORD = "rig.stretch"
 
 
 @dataclass(frozen=True)
@@ -84,11 +79,18 @@ class RunEnd:
 
 
 Record = RunInfo | RunEnd | Mark | Stretch
-R = TypeVar("R", RunInfo, RunEnd, Mark, Stretch)
+KINDS: dict[str, type[Record]] = {
+    "rig.run": RunInfo,
+    "rig.end": RunEnd,
+    "rig.mark": Mark,
+    "rig.stretch": Stretch,
+}
+"""Name of a metadata record to what it holds."""
+NAMES = {kind: name for name, kind in KINDS.items()}
 
 
-def to_metadata(record: Record) -> dict[str, str]:
-    """Return a record as MCAP metadata: field name to JSON text.
+def to_metadata(record: Record) -> tuple[str, dict[str, str]]:
+    """Return a record as MCAP metadata: its name, and field name to JSON text.
 
     Raises:
         DataError: A value is not finite or cannot be written as JSON.
@@ -104,7 +106,7 @@ def to_metadata(record: Record) -> dict[str, str]:
                 "Metadata holds text, finite numbers, lists and tables of them.",
                 "Leave out what is not known instead of writing NaN.",
             ) from None
-    return metadata | {CHECKSUM_KEY: _checksum(metadata)}
+    return NAMES[type(record)], metadata | {CHECKSUM_KEY: _checksum(metadata)}
 
 
 def _checksum(metadata: Mapping[str, str]) -> str:
@@ -113,12 +115,13 @@ def _checksum(metadata: Mapping[str, str]) -> str:
     return f"{zlib.crc32(json.dumps(items).encode()):08x}"
 
 
-def from_metadata(kind: type[R], metadata: Mapping[str, str]) -> R:
-    """Return the record that `to_metadata` wrote; unknown fields are ignored.
+def from_metadata(name: str, metadata: Mapping[str, str]) -> Record:
+    """Return the record that `to_metadata` wrote, by its name; unknown fields are ignored.
 
     Raises:
         DataError: The record does not match its checksum, or a value is of the wrong kind.
     """
+    kind = KINDS[name]
     if metadata.get(CHECKSUM_KEY) != _checksum(metadata):
         raise DataError(f"The {kind.__name__} record of the log does not match its checksum.")
     try:

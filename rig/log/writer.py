@@ -27,15 +27,7 @@ from rig import __version__
 from rig.errors import RigError, UsageError
 from rig.log.container import LIBRARY, Attached, Container
 from rig.log.messages import Rows, message_records, packed_rows
-from rig.log.run import (
-    END_RECORD,
-    MARK_RECORD,
-    RUN_RECORD,
-    STRETCH_RECORD,
-    RunEnd,
-    RunInfo,
-    to_metadata,
-)
+from rig.log.run import RunEnd, RunInfo, to_metadata
 from rig.log.schema import Stream
 
 PART_SUFFIX = ".part"
@@ -116,7 +108,7 @@ class LogWriter:
         try:
             with self._giving_to_system():
                 self._container = Container(self._file, f"{LIBRARY} {__version__}")
-                self._container.add_metadata(RUN_RECORD, run_metadata)
+                self._container.add_metadata(*run_metadata)
                 self._channels = {s.topic: self._container.add_stream(s) for s in streams}
                 for attached in attachments:
                     self._container.add_attachment(attached, run.started_at_ns or 0)
@@ -203,13 +195,9 @@ class LogWriter:
                     self._container.add_chunk(self._channels[topic], part)
             self._file.flush()
 
-    def mark(self, mark: Mark) -> None:
-        """Write an operator's mark at once."""
-        self.add_metadata(MARK_RECORD, to_metadata(mark))
-
-    def stretch(self, stretch: Stretch) -> None:
-        """Write a flagged stretch at once."""
-        self.add_metadata(STRETCH_RECORD, to_metadata(stretch))
+    def add(self, record: Mark | Stretch) -> None:
+        """Write an operator's mark or a flagged stretch at once."""
+        self.add_metadata(*to_metadata(record))
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
         """Write a metadata record of any name at once.
@@ -236,7 +224,7 @@ class LogWriter:
         end_metadata = to_metadata(end or RunEnd())
         self.flush()
         with self._giving_to_system():
-            self._container.add_metadata(END_RECORD, end_metadata)
+            self._container.add_metadata(*end_metadata)
             self._container.finish()
             self._file.flush()
             os.fsync(self._file.fileno())

@@ -115,7 +115,7 @@ class LiveRecorder:
         """Mark the newest sample, if a log is open."""
         if self._log is not None:
             self._marks += 1
-            self._log.mark(Mark(self._newest_s, f"mark {self._marks}"))
+            self._log.add(Mark(self._newest_s, f"mark {self._marks}"))
 
     def stop(self) -> None:
         """Close the log, if one is open."""

@@ -214,7 +214,7 @@ def test_faster_than_real_time_the_data_time_sets_the_deadline(tmp_path):
 
 def test_a_mark_is_in_the_system_at_once(tmp_path):
     with LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM], clock=Clock()) as writer:
-        writer.mark(Mark(1.0, "slipped"))
+        writer.add(Mark(1.0, "slipped"))
         assert read_log(writer.part, tolerant=True).marks == (Mark(1.0, "slipped"),)
 
 
