@@ -76,8 +76,7 @@ def write_recording(path: Path, recording: Recording) -> Path:
     }
     writer = LogWriter(path, run_info(recording), [stream])
     try:
-        for record in (*recording.marks, *recording.stretches):
-            writer.add(record)
+        writer.add(*recording.marks, *recording.stretches)
         writer.write(SAMPLE, rows, log_time_ns)
         return writer.close(RunEnd(expected_samples={SAMPLE: len(recording)}))
     except BaseException:

@@ -97,8 +97,7 @@ def _write(log: LogFile, report: LogReport, target: Path) -> None:
     streams = [topic.stream for topic in log.topics.values()]
     writer = LogWriter(target, run, streams, attachments=log.attachments)
     try:
-        for record in (*log.marks, *log.stretches):
-            writer.add(record)
+        writer.add(*log.marks, *log.stretches)
         for record_name, data in log.metadata:
             writer.add_metadata(record_name, data)
         writer.add_metadata(

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -117,7 +118,7 @@ class LogWriter:
             self.discard()
             raise
 
-    def __enter__(self) -> "LogWriter":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -195,9 +196,10 @@ class LogWriter:
                     self._container.add_chunk(self._channels[topic], part)
             self._file.flush()
 
-    def add(self, record: Mark | Stretch) -> None:
-        """Write an operator's mark or a flagged stretch at once."""
-        self.add_metadata(*to_metadata(record))
+    def add(self, *records: Mark | Stretch) -> None:
+        """Write operator's marks and flagged stretches at once."""
+        for record in records:
+            self.add_metadata(*to_metadata(record))
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
         """Write a metadata record of any name at once.
