@@ -7,7 +7,7 @@ holds nothing that the logs do not: deleted or damaged, it is built again.
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -105,12 +105,12 @@ def campaigns(
     """
     known = {} if rebuild else _read(index)
     now: dict[str, Any] = {}
-    for folder, found in _folders(root):
-        before = known.get(str(folder))
-        if before is None or before["signature"] != found.signature:
+    for folder, logs, signature in _folders(root):
+        entry = known.get(str(folder))
+        if entry is None or entry["signature"] != signature:
             on_folder(folder)
-            before = _learnt(folder, found)
-        now[str(folder)] = before
+            entry = {"signature": signature, **_learnt(folder, logs)}
+        now[str(folder)] = entry
     if now != known:
         with suppress(OSError):
             index.parent.mkdir(parents=True, exist_ok=True)
@@ -136,14 +136,8 @@ def _campaign(folder: Path, entry: Mapping[str, Any]) -> IndexedCampaign:
     return IndexedCampaign(folder, ordered, entry["diagnosis"])
 
 
-@dataclass(frozen=True)
-class _Found:
-    logs: tuple[Path, ...]
-    signature: str
-
-
-def _folders(root: Path) -> Iterator[tuple[Path, _Found]]:
-    """Yield every folder with logs, from a folder downwards, and a digest of each one's state."""
+def _folders(root: Path) -> Iterator[tuple[Path, list[Path], str]]:
+    """Yield every folder with logs, from a folder downwards, its logs and a digest of its state."""
     waiting = [root]
     while waiting:
         folder = waiting.pop()
@@ -154,25 +148,22 @@ def _folders(root: Path) -> Iterator[tuple[Path, _Found]]:
                     waiting.append(folder / entry.name)
                 elif entry.name.endswith(ENDINGS):
                     stat = entry.stat()
-                    logs.append(entry.name)
+                    logs.append(folder / entry.name)
                     state.update(f"{entry.name} {stat.st_size} {stat.st_mtime_ns}\n".encode())
         if logs:
             with suppress(FileNotFoundError):
                 stat = (folder / DIAGNOSIS).stat()
                 state.update(f"{stat.st_size} {stat.st_mtime_ns}".encode())
-            yield folder, _Found(tuple(folder / name for name in logs), state.hexdigest())
+            yield folder, logs, state.hexdigest()
 
 
-def _learnt(folder: Path, found: _Found) -> dict[str, Any]:
+def _learnt(folder: Path, logs: Sequence[Path]) -> dict[str, Any]:
     """Return what the index holds of a folder: its runs and its diagnosis."""
     # loaded when a log is read: a search alone needs no arrays and starts faster without them
     from rig.campaigns.reading import runs_in
 
-    return {
-        "signature": found.signature,
-        "diagnosis": _diagnosis(folder / DIAGNOSIS),
-        "runs": [asdict(run) for run in runs_in(found.logs)],
-    }
+    runs = [asdict(run) for run in runs_in(logs)]
+    return {"diagnosis": _diagnosis(folder / DIAGNOSIS), "runs": runs}
 
 
 def _diagnosis(path: Path) -> Any:

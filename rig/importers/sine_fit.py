@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from estimation.recording import FloatArray
 
 FIT_PERIOD_S = 0.04
 """Samples are thinned to this spacing for the fit: hand and rig trajectories stay below 5 Hz."""
+ITERATIONS = 12
 CONVERGED_HZ = 1e-7
 
 
@@ -37,7 +37,7 @@ class Sine:
 
 
 def fit_sine(time_s: FloatArray, angle_rad: FloatArray) -> Sine | None:
-    """Fit one sine by least squares, within a line of the largest peak of the spectrum.
+    """Fit one sine by Gauss-Newton, started at the largest line of the spectrum.
 
     Args:
         time_s: Evenly sampled time, shape (n,).
@@ -57,26 +57,31 @@ def fit_sine(time_s: FloatArray, angle_rad: FloatArray) -> Sine | None:
         return None
     padded = 8 * t.size
     spectrum = np.abs(np.fft.rfft(y - y.mean(), padded))
-    peak_hz = float(np.argmax(spectrum[1:]) + 1) / (padded * period_s * step)
-    line_hz = 1.0 / float(t[-1] - t[0])
-
-    def gains_and_residual(frequency_hz: float) -> tuple[FloatArray, FloatArray]:
-        phase = 2 * np.pi * frequency_hz * t
+    frequency = float(np.argmax(spectrum[1:]) + 1) / (padded * period_s * step)
+    # a step beyond half a spectral line would move to another peak
+    limit = 0.5 / float(t[-1] - t[0])
+    a, b, c = 0.0, 0.0, float(y.mean())
+    residual = y
+    for _ in range(ITERATIONS):
+        phase = 2 * np.pi * frequency * t
         rows = np.stack([np.sin(phase), np.cos(phase), np.ones_like(t)])
-        gains = np.linalg.lstsq(rows @ rows.T, rows @ y)[0]
-        return gains, y - gains @ rows
-
-    best = minimize_scalar(
-        lambda frequency_hz: float(np.sum(gains_and_residual(frequency_hz)[1] ** 2)),
-        bounds=(max(peak_hz - line_hz, 0.5 * line_hz), peak_hz + line_hz),
-        method="bounded",
-        options={"xatol": CONVERGED_HZ},
-    )
-    if best.x < 0.9 * line_hz:
+        try:
+            a, b, c = np.linalg.solve(rows @ rows.T, rows @ y)
+            residual = y - (a * rows[0] + b * rows[1] + c)
+            slope = 2 * np.pi * t * (a * rows[1] - b * rows[0])
+            rows = np.concatenate([rows, slope[None, :]])
+            change = float(np.linalg.solve(rows @ rows.T, rows @ residual)[3])
+        except np.linalg.LinAlgError:
+            return None  # the amplitude vanishes, or the period is far beyond the run
+        if not np.isfinite(change):
+            return None
+        if abs(change) < CONVERGED_HZ:
+            break
+        frequency = abs(frequency + min(max(change, -limit), limit))
+    if frequency * (t[-1] - t[0]) < 0.9:
         return None
-    (a, b, c), residual = gains_and_residual(float(best.x))
     return Sine(
-        frequency_hz=float(best.x),
+        frequency_hz=frequency,
         centre_rad=float(c),
         amplitude_rad=float(np.hypot(a, b)),
         phase_rad=float(np.arctan2(b, a)),

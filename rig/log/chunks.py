@@ -28,6 +28,9 @@ BATCH_BYTES = 1 << 19
 MAX_CHUNK_BYTES = 1 << 30
 """A chunk that states more than this is taken for damaged, not unpacked."""
 
+MIXED = -1
+"""In place of a channel: a chunk in which several may be."""
+
 _MESSAGE = struct.Struct("<BQH")
 _CDR = CDR_HEADER.to_bytes(4, "little")
 
@@ -52,10 +55,10 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A chunk, the one channel in it (None if others may be), and where its bytes go."""
+    """A chunk, the one channel in it (`MIXED` if others may be), and where its bytes go."""
 
     chunk: ChunkRef
-    channel: int | None
+    channel: int
     start: int
 
 
@@ -96,23 +99,23 @@ def _parts(
     parts, sizes = [], dict.fromkeys(wanted, 0)
     for chunk in chunks:
         channel = _owner(chunk, streams)
-        if channel is None:
-            parts.append(_Part(chunk, None, 0))
+        if channel == MIXED:
+            parts.append(_Part(chunk, MIXED, 0))
         elif channel in wanted:
             parts.append(_Part(chunk, channel, sizes[channel]))
             sizes[channel] += chunk.unpacked_bytes
     return parts, sizes
 
 
-def _owner(chunk: ChunkRef, streams: dict[int, Stream]) -> int | None:
+def _owner(chunk: ChunkRef, streams: dict[int, Stream]) -> int:
     """Return the one channel in a chunk's index, if the sizes confirm it."""
     if chunk.torn or len(chunk.indexed) != 1:
-        return None
+        return MIXED
     ((channel, count),) = chunk.indexed.items()
     if channel not in streams:
-        return None
+        return MIXED
     size = streams[channel].record_dtype.itemsize
-    return channel if count * size == chunk.unpacked_bytes else None
+    return channel if count * size == chunk.unpacked_bytes else MIXED
 
 
 def _batches(parts: Sequence[_Part]) -> Iterator[list[_Part]]:
@@ -120,7 +123,7 @@ def _batches(parts: Sequence[_Part]) -> Iterator[list[_Part]]:
     batch: list[_Part] = []
     size = 0
     for part in parts:
-        if batch and (size > BATCH_BYTES or None in (part.channel, batch[-1].channel)):
+        if batch and (size > BATCH_BYTES or MIXED in (part.channel, batch[-1].channel)):
             yield batch
             batch, size = [], 0
         batch.append(part)
@@ -132,7 +135,7 @@ def _batches(parts: Sequence[_Part]) -> Iterator[list[_Part]]:
 def _read_batch(
     buffer: memoryview, batch: list[_Part], streams: dict[int, Stream], whole: dict[int, Bytes]
 ) -> Found:
-    if batch[0].channel is not None:
+    if batch[0].channel != MIXED:
         try:
             return Found(_read_arrays(buffer, batch, streams, whole))
         except (DataError, zstandard.ZstdError):
@@ -150,11 +153,16 @@ def _read_arrays(
         zstandard.ZstdError: A chunk cannot be unpacked.
     """
     decompressor = zstandard.ZstdDecompressor()
-    read = {}
-    for channel in {part.channel for part in batch if part.channel is not None}:
-        own = [part for part in batch if part.channel == channel]
-        data = b"".join([_unpack(buffer, part.chunk, decompressor) for part in own])
-        records = np.frombuffer(data, streams[channel].record_dtype)
+    spans: dict[int, slice] = {}
+    for part in batch:
+        data = _unpack(buffer, part.chunk, decompressor)
+        stop = part.start + len(data)
+        whole[part.channel][part.start : stop] = np.frombuffer(data, np.uint8)
+        first = spans.get(part.channel, slice(part.start, 0)).start
+        spans[part.channel] = slice(first, stop)
+    read = {channel: whole[channel][span] for channel, span in spans.items()}
+    for channel, content in read.items():
+        records = content.view(streams[channel].record_dtype)
         if not (
             (records["opcode"] == MESSAGE_OPCODE).all()
             and (records["length"] == streams[channel].record_length).all()
@@ -162,8 +170,6 @@ def _read_arrays(
             and (records["cdr"] == CDR_HEADER).all()
         ):
             raise DataError("The chunks hold other records too.")
-        read[channel] = whole[channel][own[0].start : own[0].start + len(data)]
-        read[channel][:] = np.frombuffer(data, np.uint8)
     return read
 
 

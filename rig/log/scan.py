@@ -126,20 +126,20 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
         NotALogError: It contains no MCAP record.
     """
     skeleton = Skeleton()
-    position = 8
+    position, size = 8, len(buffer)
     if bytes(buffer[:8]) != MAGIC:
-        skeleton.damage.append(Damage(0, min(8, len(buffer)), "the file does not begin as MCAP"))
+        skeleton.damage.append(Damage(0, min(8, size), "the file does not begin as MCAP"))
         position = 0
-    while position < len(buffer) and not skeleton.finished:
+    while position < size and not skeleton.finished:
         parsed = _parse(buffer, position)
         if parsed is None:
             found = _next_record(buffer, position + 1)
-            torn = None if found < len(buffer) else _torn_chunk(buffer, position)
+            torn = None if found < size else _torn_chunk(buffer, position)
             if torn is not None:
                 skeleton.chunks.append(torn)
                 what = "the file ends inside a chunk"
             else:
-                what = "unreadable record" if found < len(buffer) else "unreadable end of the file"
+                what = "unreadable record" if found < size else "unreadable end of the file"
             skeleton.damage.append(Damage(position, found - position, what))
             position = found
             continue
@@ -159,10 +159,10 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
 
 def _parse(buffer: memoryview, start: int) -> tuple[Any, int] | None:
     """Return the record at a place and where the next begins; None without a whole one."""
-    if start + _HEAD.size > len(buffer):
+    first = start + _HEAD.size
+    if first > len(buffer):
         return None
     opcode, length = _HEAD.unpack_from(buffer, start)
-    first = start + _HEAD.size
     stop = first + length
     if stop > len(buffer):
         return None

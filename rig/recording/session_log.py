@@ -14,6 +14,7 @@ from rig import __version__
 from rig.bench.companions import Beside, Companion
 from rig.bench.session import Session
 from rig.log.container import Attached
+from rig.log.recalibrate import ATTACHMENT, ZERO_SUFFIX
 from rig.log.run import RunInfo
 from rig.log.streams import COUNTS, FLIGHT, FLIGHT_STREAM, SAMPLE, sample_stream
 from rig.log.writer import LogWriter
@@ -62,7 +63,7 @@ class SessionLog(LogWriter):
             streams,
             attachments=[
                 Attached("config.json", "application/json", settings),
-                Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
+                Attached(ATTACHMENT, "application/json", calibrations.to_json().encode()),
             ],
         )
         self._session = session
@@ -111,4 +112,4 @@ class SessionLog(LogWriter):
 
 def mean_counts(zeros: Mapping[str, SensorZero]) -> dict[str, float]:
     """Return measured zeros as a log keeps them."""
-    return {f"{name}_counts": zero.mean_counts for name, zero in zeros.items()}
+    return {f"{name}{ZERO_SUFFIX}": zero.mean_counts for name, zero in zeros.items()}

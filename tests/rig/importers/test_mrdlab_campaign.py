@@ -136,11 +136,13 @@ def test_a_truncated_archive_is_refused_and_leaves_nothing(one, tmp_path, monkey
 def test_recognises_logs_and_nothing_else(one, several, tmp_path):
     empty = tmp_path / "empty"
     empty.mkdir()
-    (empty / "ReadMe.txt").write_text("% a comment\n1,2,3\n")
+    (empty / "ReadMe.txt").write_text("nothing here\n")
+    other = tmp_path / "other.txt"
+    other.write_text("% a comment\n1,2,3\n")
     broken = tmp_path / "broken.tar.xz"
     broken.write_bytes(b"no archive")
     logs = (one, one / "00.TXT", several)
-    others = (one / "ReadMe.txt", one / "notes.pdf", empty, empty / "ReadMe.txt", broken)
+    others = (one / "ReadMe.txt", one / "notes.pdf", empty, other, broken)
     assert all(map(IMPORTER.recognises, logs))
     assert not any(map(IMPORTER.recognises, others))
     with pytest.raises(DataError, match="holds no MRDLab log"):
