@@ -62,6 +62,9 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
     text = raw.read_text(path)
     identity = identify(path, text.header, text.columns)
     remarks = [*identity.remarks]
+    duration_s = float(text.columns[raw.TIME, -1] - text.columns[raw.TIME, 0])
+    if abs(duration_s - USUAL_DURATION_S) >= 0.5:
+        remarks.insert(0, f"The run lasts {duration_s:.2f} s; runs of this rig usually last 20 s.")
     text.columns[raw.MIRRORED] *= identity.sign
     time_s = read_only(text.columns[raw.TIME])  # a copy: the text's block can be freed
     columns = _channels(text.columns, remarks)
@@ -85,7 +88,7 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
         conditions=conditions,
         rig="MRDLab",
         instrument=identity.instrument,
-        notes="\n".join([*_duration_remark(time_s), *remarks, *([companions] * bool(companions))]),
+        notes="\n".join([*remarks, *([companions] * bool(companions))]),
         source=source,
     )
     if sine is not None and target is None:
@@ -192,10 +195,3 @@ def _quantum(command: FloatArray) -> float:
 def _multiples(values: FloatArray, quantum: float) -> bool:
     ticks = values / quantum
     return bool(np.all(np.abs(ticks - np.rint(ticks)) < 1e-6))
-
-
-def _duration_remark(time_s: FloatArray) -> list[str]:
-    duration_s = float(time_s[-1] - time_s[0])
-    if abs(duration_s - USUAL_DURATION_S) < 0.5:
-        return []
-    return [f"The run lasts {duration_s:.2f} s; runs of this rig usually last 20 s."]

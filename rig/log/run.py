@@ -7,10 +7,9 @@ recorder did not close the file.
 """
 
 import json
-import math
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from estimation.recording import Flag, Instrument, Mark, Stretch
@@ -98,8 +97,8 @@ def to_metadata(record: Record) -> tuple[str, dict[str, str]]:
     metadata = {}
     for item in fields(record):
         try:
-            value = _plain(getattr(record, item.name))
-            metadata[item.name] = json.dumps(value, allow_nan=False)
+            value = getattr(record, item.name)
+            metadata[item.name] = json.dumps(value, allow_nan=False, default=_plain)
         except (TypeError, ValueError) as error:
             raise DataError(
                 f"{item.name} of the run cannot be written: {error}.",
@@ -155,15 +154,11 @@ def _check_types(record: Record) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as plain JSON types."""
+    """Return as plain types what JSON does not know."""
     if isinstance(value, Instrument):
-        return {item.name: getattr(value, item.name) for item in fields(value)}
+        return asdict(value)
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return dict(value)
     if hasattr(value, "tolist"):  # NumPy scalars and arrays
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{value} is not finite")
-    return value
+        return value.tolist()
+    raise TypeError(f"a {type(value).__name__} is not JSON")
