@@ -122,7 +122,7 @@ def campaigns(
 
 
 def _read(index: Path) -> dict[str, Any]:
-    """Return what an index holds of each folder; nothing of one that is damaged or not there."""
+    """Return the entry of each folder in an index; none of one that is damaged or not there."""
     try:
         content = json.loads(index.read_bytes())
         return dict(content["folders"]) if content["layout"] == LAYOUT else {}
@@ -158,7 +158,7 @@ def _folders(root: Path) -> Iterator[tuple[Path, list[Path], str]]:
 
 
 def _learnt(folder: Path, logs: Sequence[Path]) -> dict[str, Any]:
-    """Return what the index holds of a folder: its runs and its diagnosis."""
+    """Return the runs and the diagnosis of a folder, as the index holds them."""
     # loaded when a log is read: a search alone needs no arrays and starts faster without them
     from rig.campaigns.reading import runs_in
 
