@@ -24,9 +24,9 @@ from rig.log.reader import read_log
 from rig.log.run import RunEnd, RunInfo
 from rig.log.streams import COUNTS, SAMPLE
 from rig.log.writer import PART_SUFFIX
-from rig.machines.machine import MachineMotion, MachinePlan
 from rig.machines.reading import Reading
-from rig.protocols.protocol import Protocol
+from rig.protocols.motion import Motion
+from rig.protocols.protocol import Plan, Protocol
 from rig.recording.session_log import SessionLog, mean_counts
 
 MANIFEST = "campaign.json"
@@ -83,7 +83,7 @@ class RunResult:
         return tuple(d.channel for d in self.drift if not d.passes)
 
 
-def check_disk_space(folder: Path, plans: Iterable[MachinePlan]) -> None:
+def check_disk_space(folder: Path, plans: Iterable[Plan]) -> None:
     """Refuse to begin what the disk cannot hold.
 
     Raises:
@@ -122,7 +122,7 @@ def read_manifest(folder: Path) -> tuple[Protocol, Config]:
 
 def open_campaign_folder(
     folder: Path, protocol: Protocol, config: Config, resume: bool
-) -> list[MachinePlan]:
+) -> list[Plan]:
     """Prepare a campaign's folder and return the runs that are still to be made.
 
     Raises:
@@ -163,7 +163,7 @@ def open_campaign_folder(
 
 def record_campaign(
     session: Session,
-    plans: Iterable[MachinePlan],
+    plans: Iterable[Plan],
     folder: Path,
     notes: str = "",
     on_progress: Progress | None = None,
@@ -187,7 +187,7 @@ def record_campaign(
 
 def _record_run(
     session: Session,
-    plan: MachinePlan,
+    plan: Plan,
     path: Path,
     epoch_ns: int,
     notes: str,
@@ -239,14 +239,14 @@ def _crossing_in(log: SessionLog, session: Session, run_start_us: int) -> Iterat
         raise
 
 
-def _of_run(reading: Reading, motion: MachineMotion) -> Reading:
+def _of_run(reading: Reading, motion: Motion) -> Reading:
     """Return the samples that belong to the run itself, not to its approach or release."""
     return reading.where((reading.setpoint >= motion.first) & (reading.setpoint < motion.last))
 
 
 def _new_log(
     session: Session,
-    plan: MachinePlan,
+    plan: Plan,
     path: Path,
     started_at_ns: int,
     before: Mapping[str, SensorZero],
@@ -285,7 +285,7 @@ def _end_of_run(
     )
 
 
-def _log_path(folder: Path, plan: MachinePlan) -> Path:
+def _log_path(folder: Path, plan: Plan) -> Path:
     return folder / f"{plan.name}.mcap"
 
 
