@@ -36,7 +36,7 @@ BYTES_PER_SAMPLE = 400
 """Upper bound of a sample's room on disk, both streams, before compression."""
 
 Progress = Callable[[str, int, int], None]
-"""Told the run's name, the samples recorded of it, and how many it will have."""
+"""Called with the run's name, the samples recorded of it, and how many it will have."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def record_campaign(
         plans: The runs.
         folder: Folder of the logs.
         notes: Operator's notes, stored in every log.
-        on_progress: Told of the samples as they come.
+        on_progress: Called as the samples come.
     """
     for _ in session.rest(REST_S):
         pass
@@ -268,9 +268,9 @@ def _new_log(
 def _clock_residuals(session: Session) -> dict[str, str]:
     """Return how well each device's clock is known, as a log keeps it, s."""
     lines = {companion.name: companion.line for companion in session.companions}
-    told = {name: f"{line.residual_s:.3g}" for name, line in lines.items() if line is not None}
-    told["logger"] = f"{session.clock.line.residual_s:.3g}"
-    return {f"clock_residual_s_{name}": text for name, text in told.items()}
+    known = {name: line for name, line in lines.items() if line is not None}
+    known["logger"] = session.clock.line
+    return {f"clock_residual_s_{name}": f"{one.residual_s:.3g}" for name, one in known.items()}
 
 
 def _end_of_run(
