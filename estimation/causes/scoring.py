@@ -168,7 +168,7 @@ def _is_impossible(candidate: Candidate, amplitudes: FloatArray) -> bool:
 
 
 def _price(candidate: Candidate, joint: Joint) -> Price:
-    """Return what was chosen: the logarithm of how many choices there were, and what is rare.
+    """Return the choices made: the logarithm of how many there were, and what is rare.
 
     The prior probability of a cause is shared by all forms at all places, that of a form by the
     points of its grid, that of an unknown form by the sets of variables, and that of acting in some

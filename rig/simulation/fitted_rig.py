@@ -67,8 +67,10 @@ def fitted_rig(models: Iterable[Model], runs: Sequence[Recording]) -> FittedRig:
 
     Raises:
         EstimationError: A run lacks one of `PLAYED`, or a model has no values.
-        DataError: A model makes no plant, or the trajectory was not recorded.
+        DataError: There are no runs, a model makes no plant, or the trajectory was not recorded.
     """
+    if not runs:
+        raise DataError("There are no runs to fit a rig on.")
     plant = with_load_unit(plant_of(models), runs)
     plant = replace(plant, jaw_zero_rad=_jaw_zero(plant, runs))
     plan, tick = recorded_plan(runs[0])
