@@ -42,7 +42,7 @@ BANNED: dict[str, tuple[str, str]] = {
 """Pattern of a word -> the reason against it, and what to write."""
 
 RIGHT = {
-    "estimation/effects/friction_capstan_wrist.py": ("straight and bent",),
+    "estimation/effects/friction_capstan.py": ("straight and bent",),
     "estimation/effects/ripple_output.py": ("bent shaft",),
     "estimation/effects/sensor_crosstalk.py": ("bent mount",),
 }
