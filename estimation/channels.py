@@ -69,6 +69,14 @@ def unit_of(name: str) -> str:
     return UNIT_BY_SUFFIX[ending_of(name)]
 
 
+def unit_or_none(name: str) -> str | None:
+    """Return the SI unit symbol a name ends in; None where it ends in none."""
+    try:
+        return unit_of(name)
+    except UnknownUnitError:
+        return None
+
+
 def ending_of(name: str) -> str:
     """Return the suffix of a name that states its unit, such as `n_m`.
 
