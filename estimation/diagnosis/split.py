@@ -215,7 +215,7 @@ def period_samples(
         if ("angle" in name or "position" in name) and np.ptp(values) > 0
     ]
     shortest, longest = round(shortest_s * path.sample_rate_hz), len(path) // repeats
-    likeness = np.mean([_likeness(x)[: longest + 1] for x in angles] or [[0.0]], axis=0)
+    likeness = np.mean([_likeness(x)[: longest + 1] for x in angles] or [np.zeros(1)], axis=0)
     # what is near lag zero is alike because nothing has moved yet
     apart = int(np.argmax(likeness < 0.5)) if (likeness < 0.5).any() else len(likeness)
     likeness[: max(apart, shortest)] = -1.0

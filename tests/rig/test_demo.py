@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from estimation import model_file
-from estimation.diagnosis.split import evidence
 from rig.cli.main import main
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.schema import DiagnosisSchema
@@ -76,7 +75,7 @@ def test_the_declared_models_error_is_of_training_runs_alone(told):
 
 
 def test_the_demo_logs_its_use_of_held_out_data(demo, told):
-    recordings = evidence(open_campaign(demo / "logs"))
+    recordings = list(open_campaign(demo / "logs").evidence)
     assert Ledger(Path(told["ledger"])).known(recordings) == {r.name for r in recordings}
 
 
