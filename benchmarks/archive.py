@@ -160,7 +160,7 @@ def measure(sizes: list[int], runs: int) -> tuple[list[list[str]], list[list[str
     rows = []
     for count in sizes:
         with tempfile.TemporaryDirectory(prefix="rig-archive-") as place:
-            root, index = Path(place) / "logs", Path(place) / "index.sqlite"
+            root, index = Path(place) / "logs", Path(place) / "index.json"
             size = write_archive(root, count, runs)
             begun = time.monotonic()
             whole = campaigns(root, index)

@@ -196,7 +196,7 @@ PAGES = (
         "wrench",
         "rig study wrench --seeds 2 --state {state} --out docs/results/wrench.md"
         " --figures docs/figures",
-        f"rig/studies/pique {_ARM}",
+        f"rig/studies/wrench {_ARM}",
         30,
     ),
     Page(

@@ -50,11 +50,14 @@ class Probability:
         family: The family.
         share: Its probability.
         best: Its best candidate.
+        gain: Of that candidate, before the price of what was chosen: over the training runs, or
+            over all runs once the test runs are opened.
     """
 
     family: str
     share: float
     best: Scored
+    gain: float
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,9 @@ def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Pro
     for scored in ranked:
         best.setdefault(scored.candidate.cause.family, scored)
     shares = posterior(list(best.values()), numbers)
-    found = [Probability(f, float(p), best[f]) for f, p in zip(best, shares, strict=True)]
+    found = [
+        Probability(f, float(p), best[f], best[f].gain) for f, p in zip(best, shares, strict=True)
+    ]
     return sorted((p for p in found if p.share > 0.0), key=lambda p: -p.share)
 
 

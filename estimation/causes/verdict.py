@@ -245,7 +245,7 @@ def _tested(
     """
     known = [p for p in one.likely if p.share >= LEAST_SHARE]
     count, train = len(held_out.layout.runs), len(held_out.layout.runs) - len(held_out.at)
-    gains, logs = np.array([(p.best.gain, 0.0) for p in known]).T
+    gains, logs = np.array([(p.gain, 0.0) for p in known]).T
     for k, p in enumerate(known):
         of_runs = held_out.gains(others, p.best.candidate)
         logs[k] = of_runs.log_ratio(0.5 * numbers.samples_a_run)
@@ -256,7 +256,10 @@ def _tested(
     prices = np.array([p.best.gain - p.best.score for p in known])
     weights = probabilities(gains - prices, gains, numbers.sharpness)
     found = sorted(
-        (replace(p, share=float(w)) for p, w in zip(known, weights, strict=True)),
+        (
+            replace(p, share=float(w), gain=float(g))
+            for p, w, g in zip(known, weights, gains, strict=True)
+        ),
         key=lambda p: -p.share,
     )
     return replace(one, scored=found[0].best, likely=found), total

@@ -234,7 +234,7 @@ def diagnose(
     json: JsonFlag = False,
 ) -> None:
     """Run the diagnosis on the raw logs of a calibration."""
-    from rig.calibrate.diagnose import declared_by_record
+    from rig.calibrate.declared import declared_by_record
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import of_calibration

@@ -25,7 +25,7 @@ from rig.configuration.config import load_config
 from rig.configuration.machine_settings import ReferenceLimits
 from rig.errors import RigError
 from rig.protocols.protocol import Protocol, protocol_toml
-from rig.simulation.twin import Twin, build_twin
+from rig.simulation.fitted_rig import FittedRig, fitted_rig
 
 PLAYED = ("motor", "gearbox", "cable", "stretch")
 """Equations of the simulated rig's own parts; also the names of their shipped models."""
@@ -107,7 +107,7 @@ def write_protocol(diagnosis: Diagnosis, path: Path) -> str:
     return f"Next: rig record --protocol {path}"
 
 
-def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> Twin | None:
+def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> FittedRig | None:
     """Return the simulated rig with the fitted equations.
 
     An equation that is not diagnosed is taken from the shipped models and fitted on the same runs:
@@ -132,7 +132,7 @@ def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> Twin |
                 parts.append(own.get(name) or fit(shipped, campaign, bootstrap=0))
             except EstimationError:
                 continue
-        return build_twin(parts, campaign)
+        return fitted_rig(parts, list(campaign.evidence))
     except (RigError, EstimationError):
         return None
 
@@ -186,7 +186,7 @@ def within(recordings: Sequence[Recording], limits: ReferenceLimits) -> bool:
 
 
 def _worth(
-    rig: Twin,
+    rig: FittedRig,
     asked: Question,
     last_s: float,
     protocol: Protocol,

@@ -10,12 +10,10 @@ from estimation.campaign import Campaign
 from estimation.derived import measured_channels
 from estimation.model import Model
 from estimation.plant_models import declared as declared_of
-from rig.calibrate.declared import Declared
-from rig.calibrate.diagnose import declared_by_folder, is_raw
+from rig.calibrate.declared import Declared, declared_by_folder, is_raw
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
-from rig.machines.moving import with_motion
-from rig.machines.recordings import open_recordings
+from rig.machines.recordings import open_recordings, with_motion
 from rig.machines.shipped import read_machine
 
 

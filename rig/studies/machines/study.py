@@ -21,7 +21,7 @@ from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import run_diagnosis
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
-from rig.machines.moving import with_motion
+from rig.machines.recordings import with_motion
 from rig.machines.shipped import place_of, read_machine
 from rig.output.provenance import Provenance
 from rig.reports.diagnosis_words import sentences

@@ -3,12 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.rigs import draw
+from estimation import model_file
 from estimation.causes.candidates import Claim, groups_of
 from estimation.causes.equations import lay_out
 from estimation.causes.findings import family_probabilities
@@ -355,3 +358,11 @@ def test_each_family_of_folds_leaves_every_run_out_once() -> None:
 def test_probabilities_of_families_and_of_no_cause_sum_to_one(found: Found) -> None:
     for ranked in found.conditional:
         assert 0.9 < sum(p.share for p in family_probabilities(ranked, DEFAULT)) <= 1.0
+
+
+@pytest.mark.long
+def test_a_noisy_torque_that_follows_a_spring_hides_no_late_reading() -> None:
+    """The angle alone explains the stretch there, so the noise of the torque can be avoided."""
+    runs = list(draw(1_050_000, "confounded", gear_ratio=35.0).twin.evidence)
+    models = [model_file.read(Path(name)) for name in ("motor", "gearbox", "cable", "stretch")]
+    assert diagnose(runs, models, split(runs)).findings == ()
