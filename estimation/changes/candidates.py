@@ -65,16 +65,17 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
     for equation in layout.equations.values():
         column = 0
         for term in equation.model.terms:
-            if term.effect.id == OFFSET:
-                yield Claim(_moved(places, equation.name, term, 0, None), later, given=True)
-                continue
+            of_all_runs = term.effect.id == OFFSET
             for k in range(len(term.effect.amplitudes)):
-                found = _moved(places, equation.name, term, k, column + k)
-                yield Claim(found, later, given=True)
-            column += len(term.effect.amplitudes) + len(term.effect.shape)
+                own = None if of_all_runs else column + k
+                yield Claim(_moved(places, equation.name, term, k, own), later, given=True)
+            if not of_all_runs:
+                column += len(term.effect.amplitudes) + len(term.effect.shape)
     for place in places:
         if place.kind in ("torque sensor", "angle sensor"):
-            yield Claim(_gain(place), later, given=True)
+            gain, reading = SensorGain(), (("reading", place.roles["reading"][0]),)
+            moved = Moved(place, gain, reading, (), (0,), key=f"gain of {place.name}")
+            yield Claim(moved, later, given=True)
         for source in sources_at(layout, place):
             if _takes_part(source):
                 yield Claim(source, later, given=True)
@@ -84,12 +85,10 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
 def _moved(
     places: Sequence[Place], equation: str, term: Term, amplitude: int, column: int | None
 ) -> Moved:
-    own = next(p for p in places if p.name == equation)
+    own, effect = next(p for p in places if p.name == equation), term.effect
     enters = tuple(replace(e, gain=float(term.sign)) for e in own.enters if e.equation == equation)
-    place = replace(own, name=f"terms of {equation}", enters=enters)
-    effect = term.effect
     return Moved(
-        place,
+        replace(own, name=f"terms of {equation}", enters=enters),
         effect,
         tuple((role, term.channels[role]) for role in effect.roles),
         tuple(term.numbers(effect.shape)),
@@ -99,20 +98,11 @@ def _moved(
     )
 
 
-def _gain(place: Place) -> Moved:
-    reading = (("reading", place.roles["reading"][0]),)
-    return Moved(place, SensorGain(), reading, (), (0,), key=f"gain of {place.name}")
-
-
 def _takes_part(source: Source) -> bool:
     """Whether an effect can have come: not one of the campaigns' clock, which their order is too.
 
     Without a declared friction nothing states the speed over which another one changes its sign.
     """
-    clocks = {"elapsed", "campaign_clock"} & set(source.effect.roles)
-    widths = [
-        value
-        for parameter, value in zip(source.effect.shape, source.shape, strict=True)
-        if parameter.name == "width"
-    ]
-    return not clocks and 0.0 not in widths
+    shape = zip(source.effect.shape, source.shape, strict=True)
+    no_width = any(parameter.name == "width" and value == 0.0 for parameter, value in shape)
+    return not no_width and not {"elapsed", "campaign_clock"} & {*source.effect.roles}

@@ -77,8 +77,8 @@ def compare(
         FitError: A declared equation cannot be identified.
     """
     first, second, third = (_named(*x) for x in ((a, A), (b, B), (on, ON)))
-    _check_number("first", first)
-    _check_number("second", second)
+    for campaign, runs in (("first", first), ("second", second)):
+        _check_number(campaign, runs)
     both = [*first, *second]
     train, everything = [r.name for r in both], [*both, *third]
     arm = declared_arm(models, both)
@@ -196,7 +196,7 @@ def _form_of_others(plain: Joint, joint: Joint, folds: Folds) -> float:
     remove, does not count as another change.
     """
     spreads = [plain.extrapolated(family) for family in folds]
-    removed = plain.score(spreads, plain.base_errors(folds), joint.base_errors(folds))[0]
+    removed = plain.score(spreads, plain.base_errors(folds), joint.base_errors(folds))
     left = joint.numbers.bend_share**2 * float(np.expm1(max(0.0, float(removed))))
     return float(-np.log1p(-left)) if left < 1.0 else float("inf")
 
@@ -230,10 +230,11 @@ def _predicted(
             if laid is not None:
                 grown = grown.with_cause(laid.laid, laid.precision)
         errors.append(_rms(grown, grown.fitted_on(of[A] + of[B]), of[ON]))
-    return {
-        name: Predicted(*(found[name] for found in errors), unit=equation.model.unit)
-        for name, equation in layout.equations.items()
-    }
+    out = {}
+    for name, equation in layout.equations.items():
+        with_a, with_b, as_a, as_b = (found[name] for found in errors)
+        out[name] = Predicted(with_a, with_b, as_a, as_b, equation.model.unit)
+    return out
 
 
 def _rms(joint: Joint, base: FloatArray, counts: FloatArray) -> dict[str, float]:

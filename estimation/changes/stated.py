@@ -83,7 +83,9 @@ def stated(
         unit={
             p.name: term.unit(p, joint.layout.equations[source.place.home].target) for p in chosen
         },
-        before=dict.fromkeys(labels, _before(source, joint, base, values[0] * np.mean(acts))),
+        before=dict.fromkeys(
+            labels, _before(source, joint, base, values[0] * float(np.mean(acts)))
+        ),
     )
 
 
@@ -101,7 +103,7 @@ def _before(source: Source, joint: Joint, base: FloatArray, shared: float) -> fl
     if isinstance(source.effect, SensorGain):
         return 1.0
     own = joint.parameter(base, source.place.home, source.column)
-    return own - (float(shared) if source.effect.id == OFFSET else 0.0)
+    return own - (shared if source.effect.id == OFFSET else 0.0)
 
 
 def _spread(

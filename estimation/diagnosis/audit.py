@@ -6,49 +6,38 @@ All else decides nothing; its sentences are the limits of a search on these runs
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation.recording import Recording, shared_columns
+from estimation.recording import FloatArray, Recording, shared_columns
 
 
-@dataclass(frozen=True)
-class _Gap:
-    """A step of a clock that is longer than a period: time of its begin, length, and if it jumps.
+def _gaps(recording: Recording) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return begin and length of the gaps of a run's clock, s, and which of them are jumps.
 
-    It jumps where it is long enough to hide a reversal and no sample at its ends is flagged.
+    A jump is long enough to hide a reversal, and no sample at its ends is flagged.
     """
-
-    at_s: float
-    length_s: float
-    jumps: bool
-
-
-def _gaps(recording: Recording, long_s: float = 0.05) -> list[_Gap]:
-    """Return the gaps of a run's clock, in order."""
     steps = np.diff(recording.time_s)
     usual = float(np.median(steps)) if steps.size else 0.0
-    flagged = recording.flags != 0
-    jumps = ~(flagged[:-1] | flagged[1:]) & (steps > usual + long_s)
-    return [
-        _Gap(float(recording.time_s[k]), float(steps[k]), bool(jumps[k]))
-        for k in np.flatnonzero(steps > 1.5 * usual)
-    ]
+    at = np.flatnonzero(steps > 1.5 * usual)
+    flagged = (recording.flags[at] != 0) | (recording.flags[at + 1] != 0)
+    return recording.time_s[at], steps[at], ~flagged & (steps[at] > usual + 0.05)
 
 
 def steady(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
     """Return the runs whose clock does not jump, and a sentence on each other run."""
     kept, lost = [], []
     for recording in recordings:
-        jumps = [gap for gap in _gaps(recording) if gap.jumps]
-        if not jumps:
+        begins, lengths, jumps = _gaps(recording)
+        if not jumps.any():
             kept.append(recording)
             continue
-        more = "" if len(jumps) == 1 else f", and at {len(jumps) - 1} more places"
+        first, more = int(np.argmax(jumps)), int(jumps.sum()) - 1
         lost.append(
-            f"Run {recording.name} is left out: its clock jumps by {jumps[0].length_s:.3g} s at"
-            f" {jumps[0].at_s:.3f} s{more}, and the motion meanwhile is not known."
+            f"Run {recording.name} is left out: its clock jumps by {lengths[first]:.3g} s at"
+            f" {begins[first]:.3f} s{f', and at {more} more places' if more else ''}, and the"
+            " motion meanwhile is not known."
         )
     return kept, lost
 
@@ -57,11 +46,12 @@ def audit(recordings: Sequence[Recording]) -> list[str]:
     """Return the limits that the clocks and the conditions of used runs set, one sentence each."""
     said = []
     for recording in recordings:
-        if found := _gaps(recording):
-            longest = max(found, key=lambda gap: gap.length_s)
+        begins, lengths, _ = _gaps(recording)
+        if begins.size:
+            longest = int(np.argmax(lengths))
             said.append(
-                f"The clock of run {recording.name} skips {len(found)} times, the longest by"
-                f" {longest.length_s:.3g} s at {longest.at_s - recording.time_s[0]:.3g} s:"
+                f"The clock of run {recording.name} skips {begins.size} times, the longest by"
+                f" {lengths[longest]:.3g} s at {begins[longest] - recording.time_s[0]:.3g} s:"
                 " an effect of time or history is not decided across it."
             )
     return said + [line for name in shared_columns(recordings) if (line := _held(name, recordings))]

@@ -144,10 +144,10 @@ class Diagnosis:
     def to_json(self) -> dict[str, Any]:
         """Return the object of the published schema; what is not defined is None."""
         errors = self.errors.items()
-        whole = {
+        whole: dict[str, Any] = {
             "schema": SCHEMA,
             "verdict": self.verdict,
-            "findings": [_finding(f) for f in self.findings],
+            "findings": [asdict(f) for f in self.findings],
             "rmse_before": {name: e.before for name, e in errors},
             "rmse_after": {name: e.after for name, e in errors},
             "rmse_with_means_before": {name: e.with_means_before for name, e in errors},
@@ -165,26 +165,16 @@ class Diagnosis:
             "undecided": dict(self.undecided),
             "notes": self.notes,
         }
-        plain = _plain(whole)
-        assert isinstance(plain, dict)  # noqa: S101 - narrows the type
-        return plain
-
-
-def _finding(finding: Finding) -> dict[str, Any]:
-    fields = asdict(finding)
-    for known in fields["parameters"].values():
-        # an interval with an end that is not known is none
-        if known["ci95"] is not None and not all(map(math.isfinite, known["ci95"])):
-            known["ci95"] = None
-    return fields
+        return {key: _plain(value) for key, value in whole.items()}
 
 
 def _plain(value: Any) -> Any:
-    """Return plain JSON types; a number that is not finite becomes None."""
+    """Return plain JSON types; a number that is not finite is None, and so is a pair with one."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        plain = [_plain(item) for item in value]
+        return None if isinstance(value, tuple) and None in plain else plain
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -8,6 +8,7 @@ import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from pathlib import Path
 
 from rig.diagnosis.ledger import state_folder
@@ -37,9 +38,8 @@ def timed_stages(asked: Subject, quick: bool = False) -> Iterator[Callable[[str]
             show(stage)
 
         yield begin
-    ends = [*(at for _, at in began[1:]), time.monotonic()]
     seconds: dict[str, float] = {}
-    for (stage, at), end in zip(began, ends, strict=True):
+    for (stage, at), (_, end) in pairwise([*began, ("", time.monotonic())]):
         seconds[stage] = seconds.get(stage, 0.0) + end - at
     add(place, kind, size, seconds)
 
