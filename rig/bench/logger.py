@@ -72,7 +72,7 @@ def open_logger(
 
 @contextmanager
 def held_logger(config: Config) -> Iterator[TeensyLogger]:
-    """Hold the rig and open its logger, for what is no session; it is disarmed on the way out.
+    """Hold the rig and open its logger without a session; it is disarmed on the way out.
 
     Raises:
         DriverError: It cannot be reached.
