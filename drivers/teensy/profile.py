@@ -57,6 +57,7 @@ class Profile:
         motors: Motors with a position loop.
         input_names: Fields of a sample that the guards check, in the order of their channels.
         further_names: Fields a trip can name behind those.
+        sampled_hz: Samples a second where they are not those of the core's ticks.
     """
 
     name: str
@@ -69,11 +70,12 @@ class Profile:
     motors: int
     input_names: tuple[str, ...]
     further_names: tuple[str, ...] = ()
+    sampled_hz: float | None = None
 
     @property
     def rate_hz(self) -> float:
-        """Samples and control ticks a second."""
-        return 1e6 / self.tick_us
+        """Samples a second, by default one each control tick."""
+        return self.sampled_hz or 1e6 / self.tick_us
 
     @property
     def setpoint_names(self) -> tuple[str, ...]:
