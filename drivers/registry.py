@@ -9,18 +9,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import Field
 
-from drivers.device import Device
-from drivers.errors import DriverError
+from drivers.device import Clocked, Device
+from drivers.errors import DriverError, LinkError
 from drivers.transport.faulty import Faults
 
 RateOption = Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False)]
 """Type of an option: samples a second."""
 BaudOption = Annotated[int, Field(ge=1200, le=4_000_000)]
 """Type of an option: bit rate of a serial line."""
+
+Way = TypeVar("Way", bound=Clocked)
+Made = TypeVar("Made", bound=Device)
 
 DRIVERS = "rig.drivers"
 FAKES = "rig.driver_fakes"
@@ -66,6 +69,26 @@ class Driver:
         """The options of `open` and their defaults."""
         parameters = list(inspect.signature(self.open).parameters.values())[1:]
         return {parameter.name: parameter.default for parameter in parameters}
+
+
+def made(way: Way, make: Callable[[Way], Made], title: str) -> Made:
+    """Return a device on an open way, which is closed where the device cannot be made.
+
+    Args:
+        way: A transport or a CAN bus.
+        make: Makes the device; it raises `ValueError` for options that are no device's.
+        title: The device in messages.
+
+    Raises:
+        LinkError: The options are no such device's.
+    """
+    try:
+        return make(way)
+    except BaseException as error:
+        way.close()
+        if isinstance(error, ValueError):
+            raise LinkError(f"No {title} can be used so: {error}.") from error
+        raise
 
 
 OpenFake = Callable[[Faults], Device]

@@ -9,9 +9,9 @@ from pydantic import Field
 from drivers.amt21 import protocol
 from drivers.amt21.turning import TOP_SPEED_RAD_S, RateGate, turns_at
 from drivers.device import Channel, DeviceIdentity
-from drivers.errors import FrameError, LinkError, LinkTimeoutError
+from drivers.errors import FrameError, LinkTimeoutError
 from drivers.polling import PolledDevice
-from drivers.registry import BaudOption, Driver, RateOption
+from drivers.registry import BaudOption, Driver, RateOption, made
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
@@ -183,11 +183,11 @@ def open_amt21(
     Raises:
         LinkError: The adapter cannot be opened, or the options are no encoder's.
     """
-    try:
-        line = open_line(url, baud_rate)
-        return Amt21(line, address, multi_turn, rate_hz, top_speed_rad_s=top_speed_rad_s)
-    except ValueError as error:
-        raise LinkError(f"No AMT21 can be asked so: {error}.") from error
+    return made(
+        open_line(url, baud_rate),
+        lambda line: Amt21(line, address, multi_turn, rate_hz, top_speed_rad_s=top_speed_rad_s),
+        "AMT21",
+    )
 
 
 DRIVER = Driver("amt21", "Same Sky AMT21 absolute encoder, RS-485", open_amt21)

@@ -10,9 +10,9 @@ from pydantic import Field
 from drivers.ati_can import protocol
 from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT, slopes
 from drivers.device import Channel, DeviceIdentity, SampleFlag, wrench_channels
-from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
+from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.polling import PolledDevice
-from drivers.registry import CanUse, Driver, RateOption
+from drivers.registry import CanUse, Driver, RateOption, made
 from drivers.transport.can_bus import CanBus
 from drivers.transport.python_can import open_can
 
@@ -275,12 +275,11 @@ def open_ati_can(
     Raises:
         LinkError: The bus cannot be opened, or the options are no sensor's.
     """
-    bus = open_can(url)
-    try:
-        return AtiCan(bus, base, calibration, rate_hz)
-    except ValueError as error:
-        bus.close()
-        raise LinkError(f"No NETCANOEM can be asked so: {error}.") from error
+    return made(
+        open_can(url),
+        lambda bus: AtiCan(bus, base, calibration, rate_hz),
+        "NETCANOEM",
+    )
 
 
 def _identifiers(options: Mapping[str, Any]) -> frozenset[int]:

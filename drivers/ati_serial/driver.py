@@ -13,7 +13,7 @@ from drivers.ati_serial import protocol
 from drivers.device import DeviceIdentity, SampleFlag
 from drivers.errors import DriverError
 from drivers.modbus import Stream, StreamedSensor
-from drivers.registry import BaudOption, Driver, RateOption
+from drivers.registry import BaudOption, Driver, RateOption, made
 from drivers.streaming import QUIET_S
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
@@ -176,7 +176,11 @@ def open_ati_serial(
         LinkError: The adapter cannot be opened or has no such speed.
     """
     assumed = Assumptions(matrix_by_rows, force_unit, torque_unit, lock_answers)
-    return AtiSerial(open_line(url, baud_rate, "E"), calibration, rate_hz, assumed)
+    return made(
+        open_line(url, baud_rate, "E"),
+        lambda line: AtiSerial(line, calibration, rate_hz, assumed),
+        "digital F/T",
+    )
 
 
 DRIVER = Driver("ati-serial", "ATI digital F/T over RS-485, Modbus and stream", open_ati_serial)

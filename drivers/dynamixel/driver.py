@@ -13,9 +13,9 @@ from pydantic import Field
 from drivers.device import Axis, Channel, DeviceIdentity, SampleFlag
 from drivers.dynamixel import protocol
 from drivers.dynamixel.line import InstructionRefusedError, Line
-from drivers.errors import DriverError, LinkError
+from drivers.errors import DriverError
 from drivers.polling import PolledDrive
-from drivers.registry import BaudOption, Driver, RateOption
+from drivers.registry import BaudOption, Driver, RateOption, made
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
@@ -225,12 +225,11 @@ def open_dynamixel(
     Raises:
         LinkError: The adapter cannot be opened, or the options are no drive's.
     """
-    line = open_line(url, baud_rate)
-    try:
-        return Dynamixel(line, device_id, rate_hz, watchdog_ms, current_unit_a)
-    except ValueError as error:
-        line.close()
-        raise LinkError(f"No Dynamixel can be driven so: {error}.") from error
+    return made(
+        open_line(url, baud_rate),
+        lambda line: Dynamixel(line, device_id, rate_hz, watchdog_ms, current_unit_a),
+        "Dynamixel",
+    )
 
 
 DRIVER = Driver("dynamixel", "ROBOTIS Dynamixel X servo, Protocol 2.0", open_dynamixel)

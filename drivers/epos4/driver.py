@@ -7,8 +7,7 @@ from pydantic import Field
 
 from drivers.epos4.drive import Epos4
 from drivers.epos4.node import HOST_NODE
-from drivers.errors import LinkError
-from drivers.registry import CanUse, Driver
+from drivers.registry import CanUse, Driver, made
 from drivers.transport.python_can import open_can
 
 
@@ -26,15 +25,11 @@ def open_epos4(
     Raises:
         LinkError: The bus cannot be opened, an option is unknown, or `canopen` is missing.
     """
-    bus = open_can(url)
-    try:
-        return Epos4(bus, node_id, rate_hz, host_timeout_ms)
-    except ValueError as error:
-        bus.close()
-        raise LinkError(f"No EPOS4 can be driven so: {error}.") from error
-    except LinkError:
-        bus.close()
-        raise
+    return made(
+        open_can(url),
+        lambda bus: Epos4(bus, node_id, rate_hz, host_timeout_ms),
+        "EPOS4",
+    )
 
 
 def _identifiers(options: Mapping[str, Any]) -> frozenset[int]:

@@ -11,12 +11,12 @@ from typing import Annotated
 from pydantic import Field
 
 from drivers.device import Axis, Channel, DeviceIdentity, SampleFlag
-from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
+from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.moteus import protocol
 from drivers.moteus.link import FdcanusbLink
 from drivers.moteus.protocol import State
 from drivers.polling import PolledDrive
-from drivers.registry import Driver, RateOption
+from drivers.registry import Driver, RateOption, made
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 
@@ -218,12 +218,11 @@ def open_moteus(
     Raises:
         LinkError: The port cannot be opened, or the options are no controller's.
     """
-    link = open_transport(url)
-    try:
-        return Moteus(link, device_id, rate_hz, torque_limit_n_m, watchdog_s)
-    except ValueError as error:
-        link.close()
-        raise LinkError(f"No moteus can be driven so: {error}.") from error
+    return made(
+        open_transport(url),
+        lambda link: Moteus(link, device_id, rate_hz, torque_limit_n_m, watchdog_s),
+        "moteus",
+    )
 
 
 DRIVER = Driver("moteus", "mjbots moteus brushless controller, by fdcanusb", open_moteus)

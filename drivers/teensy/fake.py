@@ -140,8 +140,8 @@ class PythonBoard(Outbox):
             self._acknowledge(kind, sequence, result)
 
     def _trip_report(self, sequence: int) -> bytes:
-        silent_us = min(self._silent_us, protocol.TOP)
-        numbers = (silent_us, self._watchdog_us, self._trip_us, silent_us)
+        value = min(self._silent_us, protocol.TOP)
+        numbers = (value, self._watchdog_us, self._trip_us, self._silent_us)
         code = self._trip
         return protocol.encode(
             Kind.TRIP_REPORT, sequence, code, 255, *(numbers if code else (0, 0, 0, 0))

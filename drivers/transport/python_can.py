@@ -77,6 +77,7 @@ class PythonCanBus(HostLink):
         super().__init__(url)
         self._bus = bus
         self._own: deque[tuple[int, bytes]] | None = deque(maxlen=_ECHOES_KEPT) if echoes else None
+        self._closed = False
         self.counters = CanCounters()
         """Counters of the bus."""
 
@@ -125,8 +126,11 @@ class PythonCanBus(HostLink):
 
     def close(self) -> None:
         """Let go of the interface."""
+        if self._closed:
+            return
+        self._closed = True
         self._closes()
-        self._bus.shutdown()
+        self._bus.shutdown()  # not every interface bears a second one
 
     def _is_echo(self, message: can.Message) -> bool:
         key = (message.arbitration_id, bytes(message.data))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from drivers.epos4.drive import Epos4
 from drivers.epos4.faults import explain
+from drivers.registry import made
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Trip
 from drivers.transport.can_bus import CanBus
@@ -45,12 +46,8 @@ def clear_latch(config: Config) -> Latch:
 
 
 def _clear_drive(config: Config) -> Latch:
-    bus = _bus(config)
-    try:
-        drive = Epos4(bus, **{"node_id": 1, **config.logger.options})
-    except BaseException:
-        bus.close()
-        raise
+    options = {"node_id": 1, **config.logger.options}
+    drive = made(_bus(config), lambda bus: Epos4(bus, **options), "EPOS4")
     try:
         code = drive.clear_fault()
     finally:

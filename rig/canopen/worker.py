@@ -18,6 +18,7 @@ from types import FrameType
 
 from drivers.epos4.drive import Epos4
 from drivers.errors import DriverError
+from drivers.registry import made
 from drivers.transport.python_can import open_can
 from rig.configuration.config import Config
 from rig.logic.latch import TripLatch
@@ -70,11 +71,7 @@ def _opened(config: Config) -> Iterator[LogicLink]:
     else:
         bus = open_can(config.logger.url)
         late_s = LATE_S
-    try:
-        device = Epos4(bus, **options, late_s=late_s)
-    except BaseException:
-        bus.close()
-        raise
+    device = made(bus, lambda way: Epos4(way, **options, late_s=late_s), "EPOS4")
     try:
         latch = None if config.is_simulated else TripLatch(config.logger.url)
         yield LogicLink(device, bus.url, late_s=late_s, is_cold=config.is_simulated, latch=latch)
