@@ -5,10 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.left_out import say_left_out
-from rig.cli.new_file import require_new
-from rig.cli.options import FormatOption, JsonFile, SeedOption
-from rig.output.console import JsonFlag, emit_json, progress, results, to_json
+from rig.cli.options import FormatOption, JsonFile, SeedOption, require_new, say_left_out
+from rig.output.console import JsonFlag, present, progress, to_json
 
 
 def adapt(
@@ -36,8 +34,7 @@ def adapt(
     from rig.importers.registry import open_campaign
     from rig.models.adapt import open_source, run_adaptation, runs_by_rule
     from rig.models.origins import with_origin
-    from rig.output.table import to_rich
-    from rig.reports import adapt as shown
+    from rig.reports.adapt import table
 
     require_new(out)
     estimator = open_source(load(source))
@@ -57,16 +54,12 @@ def adapt(
             seed=seed,
             on_run=lambda run: bar.advance(task),
         )
-    screen = results(json)
-    screen.print(to_rich(shown.table(result)))
-    for line in sentence(steps):
-        screen.print(line)
+    said = [*sentence(steps)]
     if out is not None:
         figures = {"unused_runs_rmse": result.adapted.rmse, "unused_runs_p95": result.adapted.p95}
         with_origin(new, campaign.select(result.used), figures, source).save(out)
-        screen.print(f"Estimator: {out}", markup=False)
+        said.append(f"Estimator: {out}")
     if json_out is not None:
         write_text_atomic(json_out, to_json(result))
-        screen.print(f"Result: {json_out}", markup=False)
-    if json:
-        emit_json(result)
+        said.append(f"Result: {json_out}")
+    present(json, result, table(result), *said)

@@ -1,4 +1,4 @@
-"""`rig calibrate`: guided calibrations on the bench or on the simulated rig."""
+"""`rig calibrate`: guided calibrations and the store of their records."""
 
 import inspect
 from collections.abc import Callable
@@ -9,26 +9,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.calibrate_check import check
-from rig.cli.help import GroupedHelp
-from rig.cli.options import SimulationSeed
-from rig.cli.rig_options import ConfigOption, SimFlag
+from rig.cli.calibrate_store import add, diagnose, diff, list_, show, use
+from rig.cli.help import group
+from rig.cli.options import ConfigOption, SimFlag, SimulationSeed
 from rig.output.console import JsonFlag
 
 if TYPE_CHECKING:
     from calibration.procedure import Procedure
 
-calibrate_app = typer.Typer(
-    name="calibrate",
-    help="Calibrate a sensor or a part of the rig, step by step.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
+calibrate_app = group(
+    "calibrate", "Calibrate a sensor or a part of the rig; store, check and choose calibrations."
 )
 
 
 @calibrate_app.callback()
 def calibrate() -> None:
-    """Calibrate a sensor or a part of the rig, step by step.
+    """Calibrate a sensor or a part of the rig; store, check and choose calibrations.
 
     The reading is shown after each step; b measures the step before again. Nothing becomes a
     calibration before the last step has been measured and its data were found good. Ctrl-C or q
@@ -76,9 +72,6 @@ class Keeping:
     json: JsonFlag = False
 
 
-calibrate_app.command("check")(check)
-
-
 def session(make: "Callable[..., Procedure]") -> None:
     """Register a command that makes a procedure of its own options and carries it out."""
     own = inspect.signature(make)
@@ -95,7 +88,7 @@ def session(make: "Callable[..., Procedure]") -> None:
     command.__signature__ = inspect.Signature(keyword)  # type: ignore[attr-defined]
     command.__doc__ = make.__doc__
     command.__name__ = make.__name__
-    calibrate_app.command(make.__name__)(command)
+    calibrate_app.command(make.__name__, rich_help_panel="Step by step")(command)
 
 
 @session
@@ -244,6 +237,10 @@ def fsr(
         rail_v=rail_v,
         curve_only=curve_only,
     )
+
+
+for function in (check, add, list_, show, diff, use, diagnose):
+    calibrate_app.command(function.__name__.rstrip("_"), rich_help_panel="Records")(function)
 
 
 def _made(make: "Callable[..., Procedure]", options: dict[str, Any]) -> "Procedure":

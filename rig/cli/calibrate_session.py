@@ -4,7 +4,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.cli.rig_options import chosen_rig
+from rig.cli.options import chosen_rig
 from rig.output.console import emit_json, remarks, results
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
             )
     else:
         for line in announced(procedure):
-            remarks().print(line, markup=False)
+            remarks().print(line)
         lines = settings.calibration_set()
         _refuse_unkept(store, folder)
         measurements = _measure(procedure, settings, how)
@@ -83,7 +83,6 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
         results(how.json).print(
             f"Sessions of {settings.name} take no record from this store. To change that, write"
             f' calibration_store = "{_name_of(store)}" in its configuration.',
-            markup=False,
         )
 
 
@@ -154,16 +153,16 @@ def _measure(procedure: "Procedure", settings: "Config", how: "Keeping") -> list
         operator = Unasked() if how.yes else Asking(None)
 
     def tell(step: "Step", number: int, total: int) -> None:
-        screen.print(f"{number + 1}/{total} {step.name}", markup=False)
+        screen.print(f"{number + 1}/{total} {step.name}")
 
     def show(step: "Step", so_far: list[Any]) -> None:
-        screen.print(f"  {reading(procedure, so_far, lines)}", markup=False)
+        screen.print(f"  {reading(procedure, so_far, lines)}")
 
     try:
         return carry_out(procedure, operator, bench, tell, show, measured)
     except (KeyboardInterrupt, AbortedError):
         kept = _kept_for_later(procedure, measured, lines, how)
-        screen.print(f"\nStopped; the rig is safe. {kept}", markup=False)
+        screen.print(f"\nStopped; the rig is safe. {kept}")
         raise
 
 
@@ -227,7 +226,7 @@ class Asking:
 
         if step.instruction:
             screen = remarks()
-            screen.print(step.instruction, markup=False)
+            screen.print(step.instruction)
             answer = self._asked()
             if answer == "q":
                 raise AbortedError("The calibration was stopped.")
@@ -305,23 +304,21 @@ def _show(kept: "Kept", how: "Keeping", store: "CalibrationStore", page: Path) -
 
     screen = results(how.json)
     for digest, record in kept.records.items():
-        screen.print(f"{digest}  {record.channel} from {record.input}", markup=False)
+        screen.print(f"{digest}  {record.channel} from {record.input}")
         for line in parameter_lines(record):
-            screen.print(f"  {line}", markup=False)
+            screen.print(f"  {line}")
     for name, found in kept.conclusion.found.items():
-        screen.print(f"  {found_line(name, found)}", markup=False)
+        screen.print(f"  {found_line(name, found)}")
     screen.print("Good: the data passed every check of this kind of calibration.")
     drifted = alarms(kept.records.values(), store.records())
     for line in drifted:
-        screen.print(f"ALARM: {line}", markup=False)
-    screen.print(f"Raw logs: {kept.folder}", markup=False)
-    screen.print(f"Page: {page}", markup=False)
+        screen.print(f"ALARM: {line}")
+    screen.print(f"Raw logs: {kept.folder}")
+    screen.print(f"Page: {page}")
     if not how.use:
         for digest in kept.records:
             by = shlex.quote(how.operator)
-            screen.print(
-                f"Use it: rig cal use {digest} --by {by} --store {store.folder}", markup=False
-            )
+            screen.print(f"Use it: rig cal use {digest} --by {by} --store {store.folder}")
     if how.json:
         records = {
             digest: {"channel": r.channel, "input": r.input, "fit": r.fit, "validity": r.validity}

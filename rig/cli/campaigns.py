@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.diagnose_all import show_diagnoses
-from rig.cli.options import SchedulerOption, WorkersOption
+from rig.cli.options import SchedulerOption, WorkersOption, complete_campaign, complete_model
 from rig.cli.refit import show_refit
-from rig.cli.shipped import complete_campaign, complete_model
 from rig.output.console import JsonFlag, emit_json, remarks, results, show_table
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """`rig clear`: clear a latched fault or trip, with the rig out of force."""
 
-from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, present
 
 
 def clear(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
@@ -18,9 +18,7 @@ def clear(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fa
     text = "nothing is latched."
     if latch.code:
         text = f"cleared: {latch.what} (code {latch.code:#06x}) {latch.then}".rstrip()
-    screen = results(json)
-    screen.print(f"{settings.name}: out of force; {text}", markup=False)
-    if json:
-        latched = {"what": latch.what, "code": latch.code} if latch.code else None
-        emit_json({"state": "disarmed", "latched": latched, "cleared": True})
+    latched = {"what": latch.what, "code": latch.code} if latch.code else None
+    data = {"state": "disarmed", "latched": latched, "cleared": True}
+    present(json, data, f"{settings.name}: out of force; {text}")
     return 0

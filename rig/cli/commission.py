@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, results
 
 YesFlag = Annotated[
@@ -32,7 +32,7 @@ def commission(
     for check in checks(settings):
         made.append(check)
         said = "passed" if check.passed else "FAILED"
-        screen.print(f"{said:8}{check.name}: {check.detail}".rstrip(": "), markup=False)
+        screen.print(f"{said:8}{check.name}: {check.detail}".rstrip(": "))
     passed = all(check.passed for check in made)
     if json:
         emit_json({"passed": passed, "checks": made})

@@ -26,7 +26,7 @@ def demo(
     now = datetime.now()
     chosen = seed if seed is not None else int(now.timestamp()) % 1000
     folder = out or Path("logs") / f"demo-{now:%Y-%m-%d-%H%M%S}"
-    remarks().print(f"rig demo, seed {chosen}: everything goes to {folder}", markup=False)
+    remarks().print(f"rig demo, seed {chosen}: everything goes to {folder}")
     total = sum(plan.target_angle_rad.size for plan in load_protocol(PROTOCOL).plans())
     with progress() as bar:
         task = bar.add_task("samples", total=total)
@@ -36,12 +36,10 @@ def demo(
             done[name] = samples
             bar.update(task, completed=sum(done.values()), description=name)
 
-        result = run_demo(
-            folder, chosen, lambda text: bar.console.print(f"- {text}", markup=False), count
-        )
+        result = run_demo(folder, chosen, lambda text: bar.console.print(f"- {text}"), count)
     shown = results(json)
     for line in _told(result):
-        shown.print(line, markup=False)
+        shown.print(line)
     if json:
         emit_json(result.to_json())
 

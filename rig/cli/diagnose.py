@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.left_out import SkipBad, say_left_out
 from rig.cli.options import (
     EquationOption,
     FormatOption,
@@ -14,21 +13,18 @@ from rig.cli.options import (
     MachineOption,
     ModelOption,
     QuickFlag,
+    RecordingsArgument,
     SchedulerOption,
     SeedOption,
+    SkipBad,
     WorkersOption,
+    say_left_out,
 )
-from rig.cli.shipped import complete_recordings
 from rig.output.console import JsonFlag, emit_json, plain, results, stages
 
 
 def diagnose(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
-        ),
-    ],
+    path: RecordingsArgument,
     model: ModelOption = None,
     machine: MachineOption = None,
     balance: EquationOption = None,
@@ -123,7 +119,7 @@ def diagnose(
     remember(done, looks)
     screen = results(json_)
     for line in (*sentences(done.diagnosis), *done.diagnosis.notes, *written):
-        screen.print(line, markup=False)
+        screen.print(line)
     if json_:
         emit_json(done.diagnosis.to_json())
 
@@ -143,7 +139,7 @@ def _kept_with(path: Path) -> Path | None:
         check_output(kept, KIND)
         check_output(kept.with_suffix(".html"), HTML)
     except OutputError as error:
-        remarks().print(f"The page is not kept with the recordings: {error}", markup=False)
+        remarks().print(f"The page is not kept with the recordings: {error}")
         return None
     return kept
 
@@ -164,6 +160,6 @@ def _plan(
         found = plan_of(path, model, balance, machine, count)
     screen = results(json_)
     for line in sentences(found):
-        screen.print(line, markup=False)
+        screen.print(line)
     if json_:
         emit_json(found.to_json())

@@ -51,9 +51,9 @@ def show_diagnoses(
     for folder, one in done.items():
         name = folder.relative_to(root)
         if one.failed:
-            screen.print(f"{name}: {one.failed}", markup=False)
+            screen.print(f"{name}: {one.failed}")
         for line in one.sentences:
-            screen.print(f"{name}: {line}", markup=False)
+            screen.print(f"{name}: {line}")
     failed = sum(bool(one.failed) for one in done.values())
     screen.print(
         f"{len(new) - failed} campaigns diagnosed, {len(done) - len(new)} had a diagnosis newer"

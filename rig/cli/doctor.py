@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, emit_json, present, results
 
 
 def doctor(
@@ -32,11 +32,9 @@ def doctor(
     settings = chosen_rig(config, sim)
     for finding in examine(settings):
         found.append(finding)
-        screen.print(
-            f"{finding.level:8}{finding.subject}, {finding.check}: {finding.what}", markup=False
-        )
+        screen.print(f"{finding.level:8}{finding.subject}, {finding.check}: {finding.what}")
         if finding.fix:
-            screen.print(f"{'':8}fix: {finding.fix}", markup=False)
+            screen.print(f"{'':8}fix: {finding.fix}")
     grave = worst(found)
     if bundle is not None:
         from rig.doctor.bundle import write_bundle
@@ -61,25 +59,18 @@ def devices(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = 
         configured = {LOGGER: settings.logger, **settings.devices}
     ports, buses = serial_ports(), can_interfaces()
     texts = {name: driver.description for name, driver in drivers().items()}
-    if json:
-        named = {n: {"driver": s.driver, "url": s.url} for n, s in configured.items()}
-        emit_json(
-            {"serial_ports": ports, "can_interfaces": buses, "drivers": texts, "configured": named}
-        )
-        return
-    screen = results(json)
-    for port in ports:
-        where = f"usb:{port.usb}" if port.usb else "not on USB"
-        screen.print(f"port        {port.path}  {where}  {port.name}", markup=False)
-    for name in buses:
-        screen.print(f"CAN         {name}  can:socketcan:{name}", markup=False)
-    if not ports and not buses:
-        screen.print("No serial port and no CAN interface is present.")
-    for name, section in configured.items():
-        screen.print(f"configured  {name}: {section.driver} at {section.url}", markup=False)
+    named = {n: {"driver": s.driver, "url": s.url} for n, s in configured.items()}
+    said = [
+        f"port        {port.path}  {f'usb:{port.usb}' if port.usb else 'not on USB'}  {port.name}"
+        for port in ports
+    ]
+    said += [f"CAN         {name}  can:socketcan:{name}" for name in buses]
+    said = said or ["No serial port and no CAN interface is present."]
+    said += [f"configured  {name}: {s.driver} at {s.url}" for name, s in configured.items()]
     width = max(map(len, texts))
-    for name, text in texts.items():
-        screen.print(f"driver      {name:{width}}  {text}", markup=False)
+    said += [f"driver      {name:{width}}  {text}" for name, text in texts.items()]
+    data = {"serial_ports": ports, "can_interfaces": buses, "drivers": texts, "configured": named}
+    present(json, data, *said)
 
 
 def udev(json: JsonFlag = False) -> None:
@@ -115,13 +106,11 @@ def selftest(
     for check in checks(settings):
         done.append(check)
         word = "pass" if check.passed else "FAIL"
-        screen.print(f"{word}  {check.name}: {check.detail}", markup=False)
+        screen.print(f"{word}  {check.name}: {check.detail}")
     failed = [check.name for check in done if not check.passed]
-    screen.print(f"{len(done) - len(failed)} of {len(done)} checks passed on {settings.name}.")
+    said = [f"{len(done) - len(failed)} of {len(done)} checks passed on {settings.name}."]
     by_hand = bench_tests() if bench else []
     for number, test in enumerate(by_hand, 1):
-        screen.print(f"by hand {number}  {test.name}: {test.do}", markup=False)
-        screen.print(f"    must show: {test.shows}", markup=False)
-    if json:
-        emit_json({"passed": not failed, "checks": done, "by_hand": by_hand})
+        said += [f"by hand {number}  {test.name}: {test.do}", f"    must show: {test.shows}"]
+    present(json, {"passed": not failed, "checks": done, "by_hand": by_hand}, *said)
     return 1 if failed else 0

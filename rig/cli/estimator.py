@@ -5,16 +5,11 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.help import GroupedHelp
+from rig.cli.help import group
 from rig.cli.options import FormatOption, TablesFile
 from rig.output.console import JsonFlag, emit_json, progress, show_result
 
-estimator_app = typer.Typer(
-    help="Compare estimators.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+estimator_app = group("estimator", "Compare estimators.")
 
 
 @estimator_app.callback()

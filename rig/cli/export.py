@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.output.console import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, present
 
 
 def export(
@@ -48,6 +48,4 @@ def export(
             "Fit one: rig fit PATH --out FILE.toml.",
         )
     write_text_atomic(out, header(estimator, out.stem.replace("-", "_").lower(), rate))
-    results(json).print(f"Header: {out}", markup=False)
-    if json:
-        emit_json({"header": out})
+    present(json, {"header": out}, f"Header: {out}")

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.shipped import complete_machine, machine_names
+from rig.cli.options import complete_machine, machine_names
 from rig.output.console import JsonFlag, emit_json, remarks, results
 
 if TYPE_CHECKING:

@@ -83,7 +83,7 @@ def export(
 
 def _campaign(path: Path, model: Path | None) -> "Campaign":
     """Return the runs at a path that count, with the estimate of a model."""
-    from rig.cli.left_out import say_left_out
+    from rig.cli.options import say_left_out
     from rig.cli.view import with_model
     from rig.importers.registry import open_campaign
 
@@ -151,5 +151,5 @@ def _other_calibrations(
         rows = log.topics[COUNTS].rows
         verdicts = [v for r in found for v in judge_range(r, rows[r.input])]
         for verdict in refuse_errors(verdicts):
-            remarks().print(f"{verdict.channel}: {verdict.message}", markup=False)
+            remarks().print(f"{verdict.channel}: {verdict.message}")
     return made

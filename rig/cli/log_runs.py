@@ -20,7 +20,7 @@ def is_of_another_format(path: Path) -> bool:
 
 def show_runs(path: Path, json: bool) -> None:
     """Show each run's conditions, length, rate, flags and exclusion, and the channels."""
-    from rig.cli.left_out import say_left_out
+    from rig.cli.options import say_left_out
     from rig.importers.registry import open_campaign
     from rig.output.table import counted, listed
 

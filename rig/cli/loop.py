@@ -10,10 +10,10 @@ from rig.cli.options import (
     EquationOption,
     QuickFlag,
     SchedulerOption,
+    SimFlag,
     SimulationSeed,
     WorkersOption,
 )
-from rig.cli.rig_options import SimFlag
 from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def loop(
         simulation={"seed": number, "hidden": hidden, "plant": "declared"}
     )
     folder = out or Path("logs") / f"loop-{now:%Y-%m-%d-%H%M%S}"
-    remarks().print(f"rig loop, seed {number}: everything goes to {folder}", markup=False)
+    remarks().print(f"rig loop, seed {number}: everything goes to {folder}")
     made: list[Round] = []
     with engine(workers, scheduler) as executor, progress() as bar:
         task = bar.add_task("samples", total=None)
@@ -81,7 +81,7 @@ def loop(
             seed=number,
             executor=executor,
             quick=quick,
-            on_stage=lambda text: bar.console.print(f"- {text}", markup=False),
+            on_stage=lambda text: bar.console.print(f"- {text}"),
             on_progress=count,
         ):
             made.append(one)
@@ -89,7 +89,7 @@ def loop(
             _report(one, folder, number, screen)
             bar.start()
     drawn = ", ".join(f"{name} ({strength:g})" for name, strength in hidden.items())
-    screen.print(f"Hidden effects: {drawn or 'none'}.", markup=False)
+    screen.print(f"Hidden effects: {drawn or 'none'}.")
     if json:
         last = {"stopped": made[-1].stopped, "rounds": [one.to_json() for one in made]}
         emit_json({"folder": folder, "hidden": hidden, **last})
@@ -108,4 +108,4 @@ def _report(one: "Round", folder: Path, seed: int, screen: "Console") -> None:
     where = write_report(folder / f"round-{one.number}" / "diagnosis.html", text)
     last = one.stopped or next_sentence(found)
     for line in (*sentences(found), f"Report: {where}", last):
-        screen.print(line, markup=False)
+        screen.print(line)

@@ -1,22 +1,20 @@
 """`rig machine`: what a machine is, in one file, and what can be identified of it."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.new_file import require_new
-from rig.cli.options import FormatOption
-from rig.cli.shipped import complete_machine, machine_names
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.help import group
+from rig.cli.options import FormatOption, complete_machine, machine_names, require_new
+from rig.output.console import JsonFlag, present
 
 if TYPE_CHECKING:
     from estimation.plant import Plant
     from estimation.plant_check import CheckedEquation, CheckedPlant
 
-machine_app = typer.Typer(
-    help="Describe a machine of one's own in a file, and check what can be identified of it.",
-    no_args_is_help=True,
+machine_app = group(
+    "machine", "Describe a machine of one's own in a file, and check what can be identified of it."
 )
 
 FileArgument = Annotated[
@@ -39,12 +37,9 @@ def show(file: FileArgument, json_: JsonFlag = False) -> None:
 
     plant = read_machine(file)
     models = declared(plant)
-    screen = results(json_)
-    screen.print(to_toml(plant))
-    for model in models:
-        screen.print(f"{model.balance}: {model.description}")
-    if json_:
-        emit_json({"machine": plant, "signals": signals(plant), "equations": models})
+    data = {"machine": plant, "signals": signals(plant), "equations": models}
+    lines = (f"{model.balance}: {model.description}" for model in models)
+    present(json_, data, to_toml(plant), *lines)
 
 
 @machine_app.command()
@@ -67,11 +62,8 @@ def check(
     plant = read_machine(file)
     campaign = None if data is None else open_recordings(data, file, format_)
     found = check_plant(plant, campaign, file)
-    screen = results(json_)
-    for line in check_lines(plant, found):
-        screen.print(line)
-    if json_:
-        emit_json({"machine": plant.name, "check": found, "sound": found.is_sound})
+    data = {"machine": plant.name, "check": found, "sound": found.is_sound}
+    present(json_, data, *check_lines(plant, found))
     return ExitCode.OK if found.is_sound else ExitCode.FAILED
 
 
@@ -149,8 +141,4 @@ def new(
         answers = asked()
     plant = plant_of(name or out.stem, answers)
     write(plant, out, data_text(from_, plant) if from_ else "")
-    screen = results(json_)
-    screen.print(f"Machine: {out}. Next: rig machine check {out} DATA")
-    told: dict[str, Any] = {"machine": out}
-    if json_:
-        emit_json(told)
+    present(json_, {"machine": out}, f"Machine: {out}. Next: rig machine check {out} DATA")

@@ -6,9 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import SimulationSeed
-from rig.cli.rig_options import ConfigOption, SimFlag, announced, chosen_rig
-from rig.cli.shipped import complete_protocol, protocol_names
+from rig.cli.options import (
+    ConfigOption,
+    SimFlag,
+    SimulationSeed,
+    announced,
+    chosen_rig,
+    complete_protocol,
+    protocol_names,
+)
 from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 if TYPE_CHECKING:
@@ -75,7 +81,7 @@ def record(
         folder = out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
     refuse_problems(settings)
     for verdict in refuse_errors(settings.calibration_verdicts()):
-        screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})", markup=False)
+        screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})")
     watch = watch_runs(model) if model else None
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {counted(len(todo), 'run')} on {settings.name} into {folder}")
@@ -120,10 +126,10 @@ def _recorded(
                 if bar.disable:  # no terminal: a line a run in place of the bar
                     screen.print(f"{len(recorded)}/{len(todo)} {result.name}")
                 if watch is not None and (news := watch.after(result.path)):
-                    bar.console.print(news, style="yellow", markup=False)
+                    bar.console.print(news, style="yellow")
                 if result.drifted or not result.complete:
                     text = f"{result.name}: {result.remark}"
-                    bar.console.print(text, style="yellow", markup=False)
+                    bar.console.print(text, style="yellow")
     except KeyboardInterrupt:
         screen.print(f"Stopped; the rig is safe. Go on with: rig record --resume {folder}")
         raise

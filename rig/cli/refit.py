@@ -50,7 +50,7 @@ def show_refit(
     screen = results(json)
     for folder, one in fitted.items():
         if one.failed:
-            screen.print(f"{folder.relative_to(root)}: {one.failed}", markup=False)
+            screen.print(f"{folder.relative_to(root)}: {one.failed}")
     if good:
         show_table(screen, _table(good, moved))
     screen.print(f"{len(good)} of {len(fitted)} campaigns fitted.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import FormatOption, MachineOption, PlainFlag
+from rig.cli.options import FormatOption, MachineOption, PlainFlag, ReplayModel
 from rig.output.console import JsonFlag, remarks, results
 
 if TYPE_CHECKING:
@@ -24,10 +24,7 @@ def replay(
     run: Annotated[
         str | None, typer.Option(help="Name of the run; by default the first valid one.")
     ] = None,
-    model: Annotated[
-        Path | None,
-        typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
-    ] = None,
+    model: ReplayModel = None,
     speed: Annotated[
         float, typer.Option(help="Speed relative to real time; 0 is as fast as possible.")
     ] = 1.0,
@@ -60,13 +57,13 @@ def replay(
     if core:
         return _core(log, config, json_)
     from rig.errors import UsageError
+    from rig.live.block import through
     from rig.live.estimator import HalfWidths, shown_channels
-    from rig.live.joint_forces import with_joint_forces
     from rig.live.keys import display_keys
     from rig.live.options import ShowOptions
     from rig.live.replay import OF_REPLAY, Pace, replay_blocks
-    from rig.live.run import show
-    from rig.live.watching import with_status
+    from rig.live.show import show
+    from rig.live.status import model_steps
     from rig.machines.recordings import open_recordings
 
     if not 0 <= speed < math.inf:
@@ -87,7 +84,7 @@ def replay(
     with display_keys() as keys:
         pace = Pace(speed or None, keys) if keys else None
         blocks = replay_blocks(recording, estimators, speed or None, pace=pace)
-        blocks = with_status(with_joint_forces(blocks), estimators)
+        blocks = through(blocks, model_steps(estimators))
         summary = show(blocks, options.with_keys(keys, OF_REPLAY), results(json_))
     return summary.exit_code
 
@@ -115,12 +112,11 @@ def _core(log: Path, config: Path | None, json: bool) -> int:
     screen.print(
         f"{found.same} of {found.samples} samples are the same, bit for bit,"
         f" from {found.commands} bytes of commands.",
-        markup=False,
     )
     if found.trips:
-        screen.print(f"The board tripped: {', '.join(found.trips)}.", markup=False)
+        screen.print(f"The board tripped: {', '.join(found.trips)}.")
     if found.first_difference:
-        screen.print(f"First difference: {found.first_difference}.", markup=False)
+        screen.print(f"First difference: {found.first_difference}.")
     if json:
         emit_json({"passed": found.passed, **asdict(found)})
     return 0 if found.passed else 1
@@ -145,12 +141,9 @@ def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
         place = campaign.names.index(recording.name) + 1
         people.print(
             f"Run {recording.name}, {place} of {len(campaign)}; --run NAME shows another.",
-            markup=False,
         )
     if recording.excluded:
-        people.print(
-            f"Run {recording.name} is left out of evidence: {recording.excluded}", markup=False
-        )
+        people.print(f"Run {recording.name} is left out of evidence: {recording.excluded}")
 
 
 def _estimators(
@@ -168,13 +161,12 @@ def _estimators(
     if path is None:
         return []
     if model is None and not quiet:
-        remarks().print(f"Estimate of the model in use, {path.name}.", soft_wrap=True)
+        remarks().print(f"Estimate of the model in use, {path.name}.")
     estimators = estimators_of(path, recording.sample_rate_hz, recording.conditions)
     for name, level in estimators[0].other_levels.items() if not quiet else ():
         remarks().print(
             f"No interval: {path.name} was fitted at one level of {name}, and this run is at"
             f" {level:g}. `rig fit` on runs at several levels gives one.",
-            markup=False,
         )
     if not any_instrument:
         require_own(estimators[0].instrument, recording)

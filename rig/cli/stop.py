@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from rig.bench.holding import Ending
-from rig.cli.rig_options import ConfigOption, SimFlag, announced
-from rig.output.console import JsonFlag, emit_json, plain, remarks, results
+from rig.cli.options import ConfigOption, SimFlag, announced
+from rig.output.console import JsonFlag, present, remarks, results
 
 
 def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
@@ -32,9 +32,7 @@ def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fal
         )
     stopped = [_stopped(path, json) for path in meant]
     unknown = [rig for rig in stopped if rig["state"] == "unknown"]
-    if json:
-        state = "unknown" if unknown else "disarmed"
-        emit_json({"state": state, "rigs": stopped})
+    present(json, {"state": "unknown" if unknown else "disarmed", "rigs": stopped})
     return int(ExitCode.SAFETY) if unknown else 0
 
 
@@ -58,18 +56,12 @@ def _stopped(path: Path, json: bool) -> dict[str, Any]:
         screen = remarks()
         screen.print(f"{name}: UNKNOWN. Treat the motors as live. Cut the motor supply by hand.")
         why = f"{_ended(ending)} {error.what} {error.why}".strip()
-        for word, text in (("why", why), ("fix", error.fix)):
-            screen.print(f"  {word}: {text}", markup=False)
-        return {
-            "name": name,
-            "config": path,
-            "state": "unknown",
-            "why": str(error),
-            "holder": plain(ending),
-        }
+        screen.print(f"  why: {why}\n  fix: {error.fix}")
+        unknown = {"name": name, "config": path, "state": "unknown", "why": str(error)}
+        return unknown | {"holder": ending}
     said = f"{name}: disarmed, confirmed by the rig. {_ended(ending)}"
-    results(json).print(said.strip(), markup=False)
-    return {"name": name, "config": path, "state": "disarmed", "holder": plain(ending)}
+    results(json).print(said.strip())
+    return {"name": name, "config": path, "state": "disarmed", "holder": ending}
 
 
 def _released(url: str) -> Ending | None:

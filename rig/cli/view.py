@@ -6,10 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.left_out import SkipBad, say_left_out
-from rig.cli.options import FormatOption, MachineOption
-from rig.cli.shipped import complete_recordings
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.cli.options import (
+    FormatOption,
+    MachineOption,
+    ReplayModel,
+    SkipBad,
+    complete_recordings,
+    say_left_out,
+)
+from rig.output.console import JsonFlag, present, remarks
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -26,10 +31,7 @@ def view(
     run: Annotated[
         list[str] | None, typer.Option(help="Only this run, in more points; may be repeated.")
     ] = None,
-    model: Annotated[
-        Path | None,
-        typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
-    ] = None,
+    model: ReplayModel = None,
     machine: MachineOption = None,
     format_: FormatOption = None,
     skip_bad: SkipBad = False,
@@ -62,12 +64,10 @@ def view(
     target = out or Path(f"{name}.view.html")
     write_report(target, page(campaign, f"Recordings: {name}", Provenance.now(0)))
     opened = open_ and not json and webbrowser.open(target.resolve().as_uri())
-    if json:
-        emit_json({"page": target, "runs": campaign.names})
-        return
-    results(json).print(f"{counted(len(campaign), 'run')}: {target}", soft_wrap=True)
+    said = [f"{counted(len(campaign), 'run')}: {target}"]
     if not opened:
-        results(json).print(f"Open it: {target.resolve().as_uri()}", soft_wrap=True)
+        said.append(f"Open it: {target.resolve().as_uri()}")
+    present(json, {"page": target, "runs": campaign.names}, *said)
 
 
 def chosen_runs(campaign: "Campaign", names: list[str]) -> "Campaign":

@@ -12,9 +12,9 @@ from estimation.channels import ESTIMATED, unit_of
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
-from rig.live.calibration_status import CalibrationStatus
 from rig.live.keys import LEAVE, MARK, RECORD, STOP, TARE, Keys, no_keys
 from rig.live.replay import EstimateStream, within_range
+from rig.live.status import CalibrationStatus
 from rig.machines.machine import MachinePlan
 from rig.machines.reading import Reading
 from rig.recording.recorder import LiveRecorder

@@ -69,6 +69,16 @@ class Reading:
     estimate_trace: FloatArray
     sensor_trace: FloatArray
 
+    @property
+    def source(self) -> str:
+        """Where the main value is from: the estimate, or the sensor where nothing estimates it."""
+        return "estimate" if self.has_estimator else "sensor"
+
+    @property
+    def main(self) -> Value:
+        """The main value."""
+        return self.estimate if self.has_estimator else self.sensor
+
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:

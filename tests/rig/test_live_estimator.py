@@ -11,7 +11,6 @@ from estimation.fitting import fit
 from estimation.model import predict
 from estimation.recording import MissingChannelError, Recording
 from rig.live.estimator import HalfWidths, ModelEstimator
-from rig.live.model_status import with_model_status
 from rig.live.replay import replay_blocks
 from tests.estimation.synthetic import campaign
 
@@ -93,10 +92,3 @@ def test_a_state_estimator_runs_live_as_offline(tmp_path):
     np.testing.assert_allclose(half_widths, offline.half_width[newest.astype(int)], rtol=1e-6)
     assert 0 < np.isnan(half_widths).mean() < 1
     assert len(set(half_widths[np.isfinite(half_widths)])) > 1
-
-
-def states(path, run):
-    """Return what the display says of an estimator in a run."""
-    estimator = ModelEstimator(path, run.sample_rate_hz)
-    blocks = with_model_status(replay_blocks(run, [estimator], speed=None), [estimator])
-    return {block.devices[-1].state for block in blocks}

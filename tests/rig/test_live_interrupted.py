@@ -12,7 +12,7 @@ from rich.console import Console
 from rig.bench.interrupts import leaving_safely
 from rig.live.block import SampleBlock
 from rig.live.options import ShowOptions
-from rig.live.run import show
+from rig.live.show import show
 
 
 def _block(time_s: float) -> SampleBlock:

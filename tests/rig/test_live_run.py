@@ -12,7 +12,7 @@ from rig.errors import SafetyTripError
 from rig.live.block import DeviceStatus, SampleBlock
 from rig.live.keys import DisplayKeys
 from rig.live.options import ShowOptions
-from rig.live.run import show
+from rig.live.show import show
 
 pytestmark = pytest.mark.integration
 

@@ -16,9 +16,9 @@ import pytest
 
 from rig.cli.main import main
 from rig.errors import UsageError
-from rig.live.block import DeviceStatus, SampleBlock
+from rig.live.block import DeviceStatus, SampleBlock, through
 from rig.live.options import ShowOptions
-from rig.live.web import HOST, open_page, shown_on
+from rig.live.web import HOST, WebView, open_page
 from tests.rig.browser import chromium
 
 pytestmark = pytest.mark.integration
@@ -138,7 +138,8 @@ def test_only_the_whole_address_opens_the_page_and_the_stream():
 
 def test_a_browser_that_reads_nothing_is_dropped_and_delays_nobody():
     server = open_page(HOST, 0)
-    stream = shown_on(server, (block(k) for k in range(200_000)), ShowOptions("test"))
+    sinks = [WebView(server, ShowOptions("test")).show]
+    stream = through((block(k) for k in range(200_000)), sinks=sinks)
     next(stream)
     with viewer_of(server.url) as stalled, viewer_of(server.url) as reading:
         assert b"101" in stalled.recv(100)
@@ -150,7 +151,7 @@ def test_a_browser_that_reads_nothing_is_dropped_and_delays_nobody():
                 if server.viewers == 1:
                     break
             assert server.viewers == 1, "the stalled one was not dropped"
-            stream.close()
+    server.close()
 
 
 def message_of(lines) -> bytes:
