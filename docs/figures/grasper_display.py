@@ -16,10 +16,10 @@ from estimation.files import write_text_atomic
 from rig.bench.logger import open_logger
 from rig.configuration.config import SHIPPED, load_config
 from rig.live.block import through
-from rig.live.estimator import HalfWidths, estimators_of
+from rig.live.estimator import estimators_of, half_widths
 from rig.live.joint_forces import JOINTS
-from rig.live.keys import OF_SESSION, in_a_line
-from rig.live.options import ShowOptions
+from rig.live.keys import OF_SESSION
+from rig.live.options import ShowOptions, in_a_line
 from rig.live.session_blocks import session_blocks
 from rig.live.state import LiveState
 from rig.live.status import model_steps
@@ -56,7 +56,7 @@ def draw() -> str:
         title=f"rig live: {config.name}",
         lever_m=0.01,
         footer=in_a_line(OF_SESSION),
-        half_widths=HalfWidths(estimators),
+        half_widths=lambda: half_widths(estimators),
     )
     console.print(View(state.snapshot(), options))
     svg = console.export_svg(title="rig live -c grasper", unique_id="grasper")

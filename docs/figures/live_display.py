@@ -18,8 +18,8 @@ from rich.console import Console
 
 from estimation.recording import Recording
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
-from rig.live.keys import OF_SESSION, in_a_line
-from rig.live.options import ShowOptions
+from rig.live.keys import OF_SESSION
+from rig.live.options import ShowOptions, in_a_line
 from rig.live.replay import replay_blocks
 from rig.live.state import LiveState
 from rig.live.view import View
@@ -95,7 +95,7 @@ def draw() -> str:
     options = ShowOptions(
         title="rig live, synthetic recording",
         footer=in_a_line(OF_SESSION),
-        half_widths={estimator.target_channel: 0.014},
+        half_widths=lambda: {estimator.target_channel: 0.014},
     )
     console.print(View(state.snapshot(), options))
     svg = console.export_svg(title="rig live", unique_id="live")

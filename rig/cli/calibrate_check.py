@@ -75,7 +75,8 @@ def check(
     lines = [line for one in found for line in lines_of(one)]
     lines += [line for one in scales for line in scale_lines(one)]
     wrong = [one.encoder for one in found if one.scale_is_wrong or one.offset_is_wrong]
-    wrong += [one.channel for one in (*scales, *zeros) if one.is_wrong]
+    wrong += [one.channel for one in scales if one.is_wrong]
+    wrong += [one.channel for one in zeros if one.is_wrong]
     data = {"agreements": found, "scales": scales, "zeros": zeros, "wrong": wrong}
     present(json, data, *lines, *unchecked, *map(zero_line, zeros))
     return 1 if wrong else 0

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.cli.options import chosen_rig
-from rig.output.console import emit_json, remarks, results
+from rig.output.console import present, remarks, results
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
@@ -82,7 +82,7 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
     if settings.store is None or settings.store.folder != store.folder:
         results(how.json).print(
             f"Sessions of {settings.name} take no record from this store. To change that, write"
-            f' calibration_store = "{_name_of(store)}" in its configuration.',
+            f' calibration_store = "{_name_of(store)}" in its configuration.'
         )
 
 
@@ -290,39 +290,35 @@ def _now() -> str:
 
 
 def _write_page(kept: "Kept", store: "CalibrationStore") -> Path:
+    from estimation.files import write_text_atomic
     from rig.output.provenance import Provenance
-    from rig.output.render import write_report
     from rig.reports.calibration import page
 
+    place = kept.folder / "calibration.html"
     text = page(kept.records, kept.conclusion, store.records(), Provenance.now(0))
-    return write_report(kept.folder / "calibration.html", text)
+    write_text_atomic(place, text)
+    return place
 
 
 def _show(kept: "Kept", how: "Keeping", store: "CalibrationStore", page: Path) -> None:
     from rig.calibrate.shown import found_line, parameter_lines
     from rig.reports.calibration import alarms
 
-    screen = results(how.json)
+    said = []
     for digest, record in kept.records.items():
-        screen.print(f"{digest}  {record.channel} from {record.input}")
-        for line in parameter_lines(record):
-            screen.print(f"  {line}")
-    for name, found in kept.conclusion.found.items():
-        screen.print(f"  {found_line(name, found)}")
-    screen.print("Good: the data passed every check of this kind of calibration.")
+        said.append(f"{digest}  {record.channel} from {record.input}")
+        said += [f"  {line}" for line in parameter_lines(record)]
+    said += [f"  {found_line(name, found)}" for name, found in kept.conclusion.found.items()]
+    said.append("Good: the data passed every check of this kind of calibration.")
     drifted = alarms(kept.records.values(), store.records())
-    for line in drifted:
-        screen.print(f"ALARM: {line}")
-    screen.print(f"Raw logs: {kept.folder}")
-    screen.print(f"Page: {page}")
+    said += [f"ALARM: {line}" for line in drifted]
+    said += [f"Raw logs: {kept.folder}", f"Page: {page}"]
     if not how.use:
-        for digest in kept.records:
-            by = shlex.quote(how.operator)
-            screen.print(f"Use it: rig cal use {digest} --by {by} --store {store.folder}")
-    if how.json:
-        records = {
-            digest: {"channel": r.channel, "input": r.input, "fit": r.fit, "validity": r.validity}
-            for digest, r in kept.records.items()
-        }
-        whole = {"folder": kept.folder, "records": records, "found": kept.conclusion.found}
-        emit_json({**whole, "page": page, "drifted": drifted})
+        by = f"--by {shlex.quote(how.operator)} --store {store.folder}"
+        said += [f"Use it: rig calibrate use {digest} {by}" for digest in kept.records]
+    records = {
+        digest: {"channel": r.channel, "input": r.input, "fit": r.fit, "validity": r.validity}
+        for digest, r in kept.records.items()
+    }
+    whole = {"folder": kept.folder, "records": records, "found": kept.conclusion.found}
+    present(how.json, {**whole, "page": page, "drifted": drifted}, *said)

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.diagnose_all import show_diagnoses
+from rig.cli.campaigns_each import show_diagnoses, show_refit
 from rig.cli.options import SchedulerOption, WorkersOption, complete_campaign, complete_model
-from rig.cli.refit import show_refit
-from rig.output.console import JsonFlag, emit_json, remarks, results, show_table
+from rig.output.console import JsonFlag, present, remarks, results
 
 if TYPE_CHECKING:
     from rig.campaigns.index import IndexedCampaign, IndexedRun
@@ -74,18 +73,18 @@ def campaigns(
         show_diagnoses(recorded, root, workers, scheduler, json)
         return
     if diagnose:
-        _diagnose(_only(found).folder)
+        from rig.cli.diagnose import diagnose as diagnose_one
+
+        diagnose_one(_only(found).folder)
         return
     if open_:
         _open(_only(found))
         return
-    if json:
-        emit_json({"campaigns": found})
-        return
     if compare and found:
-        show_table(results(json), _side_by_side(found, root))
-        return
-    _list(found, root, runs, most, len(whole))
+        shown: list[str | TextTable] = [_side_by_side(found, root)]
+    else:
+        shown = _listed(found, root, runs, most, len(whole))
+    present(json, {"campaigns": found}, *shown)
 
 
 def _indexed(root: Path, rebuild: bool) -> "Sequence[IndexedCampaign]":
@@ -106,16 +105,18 @@ def _indexed(root: Path, rebuild: bool) -> "Sequence[IndexedCampaign]":
     )
 
 
-def _list(found: Sequence["IndexedCampaign"], root: Path, runs: bool, most: int, of: int) -> None:
-    """Print the campaigns found, of so many in all."""
-    screen = results(False)
+def _listed(
+    found: Sequence["IndexedCampaign"], root: Path, runs: bool, most: int, of: int
+) -> "list[str | TextTable]":
+    """Return the table of the campaigns found, of so many in all."""
     count = sum(len(campaign.runs) for campaign in found)
+    shown: list[str | TextTable] = []
     if found:
         table = _by_run(found, root, most) if runs else _by_campaign(found[:most], root)
-        show_table(screen, table)
+        shown.append(table)
         if len(table.rows) < (count if runs else len(found)):
-            screen.print(f"Older ones are not shown; --most shows more than {most} rows.")
-    screen.print(f"{len(found)} of {of} campaigns, {count} runs.")
+            shown.append(f"Older ones are not shown; --most shows more than {most} rows.")
+    return [*shown, f"{len(found)} of {of} campaigns, {count} runs."]
 
 
 def _named(
@@ -142,12 +143,6 @@ def _only(found: Sequence["IndexedCampaign"]) -> "IndexedCampaign":
         f"They are: {names}{', ...' if len(found) > 5 else ''}." if found else "",
         "Add a word that only one of them has, such as a part of its folder's name.",
     )
-
-
-def _diagnose(folder: Path) -> None:
-    from rig.cli.diagnose import diagnose
-
-    diagnose(folder)
 
 
 def _open(campaign: "IndexedCampaign") -> None:

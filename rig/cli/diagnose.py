@@ -20,7 +20,7 @@ from rig.cli.options import (
     WorkersOption,
     say_left_out,
 )
-from rig.output.console import JsonFlag, emit_json, plain, results, stages
+from rig.output.console import JsonFlag, present, stages
 
 
 def diagnose(
@@ -60,22 +60,17 @@ def diagnose(
         _plan(path, model, balance, machine, json_)
         return
 
-    import json
-
     from estimation import model_file
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
-    from estimation.files import check_output, write_text_atomic
+    from estimation.files import check_output
     from rig.diagnosis.durations import default_durations, measured, work_of
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
     from rig.diagnosis.run import remember, run_diagnosis
     from rig.diagnosis.subject import subject
-    from rig.diagnosis.traces import traces
     from rig.diagnosis.written import with_cost_of_causal_filters, written_models
-    from rig.output.provenance import Provenance
-    from rig.output.render import write_report
-    from rig.reports.diagnosis import page
+    from rig.reports.diagnosis import write
     from rig.reports.diagnosis_words import sentences
 
     kept = _kept_with(path)
@@ -107,21 +102,12 @@ def diagnose(
         done = with_cost_of_causal_filters(done)
         model_file.write_all(written_models(done), model_out)
         written += [f"Model: {model_out}", f"To estimate with it: rig model use {model_out}"]
-    if page_file is not None:
-        write_report(page_file, page(done.diagnosis, traces(done.answer), Provenance.now(seed)))
-        written.append(f"Report: {page_file}")
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))
-    if json_out is not None:
-        text = json.dumps(plain(done.diagnosis.to_json()), indent=2, allow_nan=False)
-        write_text_atomic(json_out, text + "\n")
-        written.append(f"Diagnosis: {json_out}")
+    written += write(done, seed, page_file, json_out)
     remember(done, looks)
-    screen = results(json_)
-    for line in (*sentences(done.diagnosis), *done.diagnosis.notes, *written):
-        screen.print(line)
-    if json_:
-        emit_json(done.diagnosis.to_json())
+    said = (*sentences(done.diagnosis), *done.diagnosis.notes, *written)
+    present(json_, done.diagnosis.to_json(), *said)
 
 
 def _kept_with(path: Path) -> Path | None:
@@ -158,8 +144,4 @@ def _plan(
             bar.update(task, completed=done, total=total)
 
         found = plan_of(path, model, balance, machine, count)
-    screen = results(json_)
-    for line in sentences(found):
-        screen.print(line)
-    if json_:
-        emit_json(found.to_json())
+    present(json_, found.to_json(), *sentences(found))

@@ -1,4 +1,4 @@
-"""`rig doctor | devices | udev | selftest`: what is there, and is it in order."""
+"""`rig doctor | devices | udev | selftest | commission`: what is there, and is it in order."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -7,6 +7,10 @@ import typer
 
 from rig.cli.options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, present, results
+
+YesFlag = Annotated[
+    bool, typer.Option("--yes", help="The jaw is empty and the emergency stop at hand; do not ask.")
+]
 
 
 def doctor(
@@ -114,3 +118,30 @@ def selftest(
         said += [f"by hand {number}  {test.name}: {test.do}", f"    must show: {test.shows}"]
     present(json, {"passed": not failed, "checks": done, "by_hand": by_hand}, *said)
     return 1 if failed else 0
+
+
+def commission(
+    config: ConfigOption = None, sim: SimFlag = False, yes: YesFlag = False, json: JsonFlag = False
+) -> int:
+    """Turn a newly wired rig for the first time: small pulses of current, no position loop.
+
+    Each pulse is limited in size, time and travel. The measured current and every encoder must
+    answer in the right direction, closing and opening. Exit code 1 when a check fails.
+    """
+    from rig.doctor.commission import commission as checks
+
+    settings = chosen_rig(config, sim)
+    if not (yes or settings.is_simulated):
+        typer.confirm(
+            "The jaw is empty, the emergency stop works and is at hand?", abort=True, err=True
+        )
+    screen = results(json)
+    made = []
+    for check in checks(settings):
+        made.append(check)
+        said = "passed" if check.passed else "FAILED"
+        screen.print(f"{said:8}{check.name}: {check.detail}".rstrip(": "))
+    passed = all(check.passed for check in made)
+    if json:
+        emit_json({"passed": passed, "checks": made})
+    return 0 if passed else 1

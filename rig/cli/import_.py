@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.options import complete_machine, machine_names
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.output.console import JsonFlag, present, remarks
 
 if TYPE_CHECKING:
     from estimation.recording import Recording
     from rig.importers.table.mapping import Mapping
     from rig.importers.table.preview import Preview
+    from rig.output.table import TextTable
 
 MOST_RUNS = 12
 """Runs listed on the screen; more are counted."""
@@ -96,14 +97,14 @@ def import_(
     written = [] if preview or out is None else write_logs(recordings, out)
     if plots is not None:
         _draw(recordings, plots)
-    if json:
-        emit_json({"preview": found, "written": written, "plots": plots})
-    _show(found, recordings, mapping, json)
-    screen = results(json)
-    if plots is not None:
-        screen.print(f"Plots: {plots}")
-    if written:
-        screen.print(f"wrote {len(written)} recordings to {out}")
+    lines = [f"Note: {line}." for line in found.remarks]
+    lines += [] if found.questions else ["Nothing looks wrong."]
+    lines += [] if plots is None else [f"Plots: {plots}"]
+    lines += [f"wrote {len(written)} recordings to {out}"] if written else []
+    for line in found.questions:
+        remarks().print(f"Check: {line}")
+    data = {"preview": found, "written": written, "plots": plots}
+    present(json, data, *_tables(found, mapping), *lines)
 
 
 def _flags(
@@ -162,17 +163,16 @@ def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
 
 def _draw(recordings: "list[Recording]", plots: Path) -> None:
     from estimation.campaign import Campaign
+    from estimation.files import write_text_atomic
     from rig.output.provenance import Provenance
-    from rig.output.render import write_report
     from rig.reports.recordings import page
 
-    write_report(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
+    write_text_atomic(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
 
 
-def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", json: bool) -> None:
-    from rig.output.table import TextTable, listed, to_rich
+def _tables(found: "Preview", mapping: "Mapping") -> "list[TextTable]":
+    from rig.output.table import TextTable, listed
 
-    screen = results(json)
     runs = [
         (
             run.name,
@@ -185,23 +185,17 @@ def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", j
         for run in found.runs[:MOST_RUNS]
     ]
     note = f"{len(found.runs)} runs in all" if len(found.runs) > MOST_RUNS else ""
-    heads: tuple[str, ...] = ("run", "samples", "s", "Hz", "flagged", "conditions")
-    screen.print(to_rich(TextTable("Runs", heads, runs, note)))
     channels = [
         (c.name, _source(mapping, c.name), *(f"{v:.5g}" for v in (c.least, c.greatest, c.mean)))
         for c in found.channels
     ]
-    heads = ("channel", "from", "least", "greatest", "mean")
-    screen.print(to_rich(TextTable("Channels, SI units", heads, channels)))
     cells = [[name, *(f"{v:.6g}" for v in row)] for name, row in found.first.items()]
-    heads = ("channel", *(str(k + 1) for k in range(len(found.first["time_s"]))))
-    screen.print(to_rich(TextTable(f"First samples of {recordings[0].name}", heads, cells)))
-    for line in found.remarks:
-        screen.print(f"Note: {line}.")
-    for line in found.questions:
-        remarks().print(f"Check: {line}")
-    if not found.questions:
-        screen.print("Nothing looks wrong.")
+    numbers = map(str, range(1, len(found.first["time_s"]) + 1))
+    return [
+        TextTable("Runs", ("run", "samples", "s", "Hz", "flagged", "conditions"), runs, note),
+        TextTable("Channels, SI units", ("channel", "from", "least", "greatest", "mean"), channels),
+        TextTable(f"First samples of {found.runs[0].name}", ("channel", *numbers), cells),
+    ]
 
 
 def _source(mapping: "Mapping", name: str) -> str:

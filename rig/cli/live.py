@@ -65,7 +65,7 @@ def live(
     from rig.configuration.check import refuse_problems
     from rig.errors import UsageError
     from rig.live.block import Sink, through
-    from rig.live.estimator import HalfWidths, estimators_of, shown_channels
+    from rig.live.estimator import estimators_of, half_widths, shown_channels
     from rig.live.keys import OF_SESSION, display_keys, no_keys
     from rig.live.options import ShowOptions
     from rig.live.session_blocks import session_blocks
@@ -91,7 +91,7 @@ def live(
         lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
         plain=plain,
         json=json_,
-        half_widths=HalfWidths(estimators),
+        half_widths=lambda: half_widths(estimators),
     )
     sinks: list[Sink] = []
     with display_keys() as keys, ExitStack() as stack:

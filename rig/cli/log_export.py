@@ -1,15 +1,20 @@
 """`rig log export`: a log, or a campaign as one table, in other formats."""
 
+from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.cli.options import say_left_out
+from rig.output.console import JsonFlag, present, remarks
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
     from estimation.campaign import Campaign
+
+
+Format = TypeVar("Format", bound=Enum)
 
 
 def export(
@@ -64,26 +69,16 @@ def export(
             return
         _export_campaign(path, campaign, format_name, out, force, json)
         return
-    known = [item.value for item in ExportFormat]
-    if format_name not in known:
-        raise UsageError(
-            f"The format {format_name!r} is not known.", fix=f"Choose one of {', '.join(known)}."
-        )
+    known = _known(format_name, "A log", ExportFormat)
     applied = _other_calibrations(path, calibration, record or [], store)
-    written = export_log(
-        path, ExportFormat(format_name), out, topic, force=force, calibrations=applied
-    )
-    if json:
-        names = None if applied is None else {applied.name: applied.content_hash}
-        emit_json({"written": written, "calibrations": names})
-    else:
-        for target in written:
-            results(json).print(f"wrote {target}")
+    written = export_log(path, known, out, topic, force=force, calibrations=applied)
+    names = None if applied is None else {applied.name: applied.content_hash}
+    data = {"written": written, "calibrations": names}
+    present(json, data, *(f"wrote {target}" for target in written))
 
 
 def _campaign(path: Path, model: Path | None) -> "Campaign":
     """Return the runs at a path that count, with the estimate of a model."""
-    from rig.cli.options import say_left_out
     from rig.cli.view import with_model
     from rig.importers.registry import open_campaign
 
@@ -95,30 +90,38 @@ def _campaign(path: Path, model: Path | None) -> "Campaign":
 def _said(written: list[Path], campaign: "Campaign", json: bool) -> None:
     from rig.output.table import counted
 
-    if json:
-        emit_json({"written": written, "runs": campaign.names})
-    else:
-        where = written[0] if len(written) == 1 else written[0].parent
-        results(json).print(f"wrote {where}: {counted(len(campaign), 'run')}")
+    where = written[0] if len(written) == 1 else written[0].parent
+    data = {"written": written, "runs": campaign.names}
+    present(json, data, f"wrote {where}: {counted(len(campaign), 'run')}")
 
 
 def _export_campaign(
     path: Path, campaign: "Campaign", format_name: str, out: Path | None, force: bool, json: bool
 ) -> None:
     """Write all runs as one table."""
-    from rig.errors import UsageError
     from rig.importers.tidy import TidyFormat, write_tidy
 
-    known = [item.value for item in TidyFormat]
-    if format_name not in known:
-        raise UsageError(
-            f"A campaign is not exported as {format_name!r}.",
-            fix=f"Choose one of {', '.join(known)}.",
-        )
-    if out is not None and out.is_dir():
-        out = out / f"{path.resolve().name}.{format_name}"
-    target = out or path.resolve().with_name(f"{path.resolve().name}.{format_name}")
-    _said([write_tidy(campaign, target, TidyFormat(format_name), force)], campaign, json)
+    known = _known(format_name, "A campaign", TidyFormat)
+    name = f"{path.resolve().name}.{format_name}"
+    target = out or path.resolve().with_name(name)
+    if target.is_dir():
+        target /= name
+    _said([write_tidy(campaign, target, known, force)], campaign, json)
+
+
+def _known(name: str, what: str, formats: type[Format]) -> Format:
+    """Return the format of a name.
+
+    Raises:
+        UsageError: There is none.
+    """
+    from rig.errors import UsageError
+
+    names = [one.value for one in formats]
+    if name not in names:
+        fix = f"Choose one of {', '.join(names)}."
+        raise UsageError(f"{what} is not exported as {name!r}.", fix=fix)
+    return formats(name)
 
 
 def _other_calibrations(

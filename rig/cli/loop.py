@@ -14,7 +14,7 @@ from rig.cli.options import (
     SimulationSeed,
     WorkersOption,
 )
-from rig.output.console import JsonFlag, emit_json, progress, remarks, results
+from rig.output.console import JsonFlag, present, progress, remarks, results
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -89,23 +89,17 @@ def loop(
             _report(one, folder, number, screen)
             bar.start()
     drawn = ", ".join(f"{name} ({strength:g})" for name, strength in hidden.items())
-    screen.print(f"Hidden effects: {drawn or 'none'}.")
-    if json:
-        last = {"stopped": made[-1].stopped, "rounds": [one.to_json() for one in made]}
-        emit_json({"folder": folder, "hidden": hidden, **last})
+    last = {"stopped": made[-1].stopped, "rounds": [one.to_json() for one in made]}
+    data = {"folder": folder, "hidden": hidden, **last}
+    present(json, data, f"Hidden effects: {drawn or 'none'}.")
 
 
 def _report(one: "Round", folder: Path, seed: int, screen: "Console") -> None:
     """Print the sentences of a round, and write its page."""
-    from rig.diagnosis.traces import traces
-    from rig.output.provenance import Provenance
-    from rig.output.render import write_report
-    from rig.reports.diagnosis import page
+    from rig.reports.diagnosis import write
     from rig.reports.diagnosis_words import next_sentence, sentences
 
     found = one.done.diagnosis
-    text = page(found, traces(one.done.answer), Provenance.now(seed))
-    where = write_report(folder / f"round-{one.number}" / "diagnosis.html", text)
-    last = one.stopped or next_sentence(found)
-    for line in (*sentences(found), f"Report: {where}", last):
+    written = write(one.done, seed, folder / f"round-{one.number}" / "diagnosis.html")
+    for line in (*sentences(found), *written, one.stopped or next_sentence(found)):
         screen.print(line)

@@ -62,8 +62,8 @@ def check(
     plant = read_machine(file)
     campaign = None if data is None else open_recordings(data, file, format_)
     found = check_plant(plant, campaign, file)
-    data = {"machine": plant.name, "check": found, "sound": found.is_sound}
-    present(json_, data, *check_lines(plant, found))
+    result = {"machine": plant.name, "check": found, "sound": found.is_sound}
+    present(json_, result, *check_lines(plant, found))
     return ExitCode.OK if found.is_sound else ExitCode.FAILED
 
 
@@ -133,12 +133,11 @@ def new(
     Without a terminal nothing is asked: what is not stated is not in the file.
     """
     from estimation.plant_file import write
-    from rig.cli.machine_new import Answers, asked, data_text, plant_of
+    from rig.cli.machine_new import asked, data_text, plant_of
 
     require_new(out)
-    answers = Answers(axis or [], transmission or [], actuator or [], sensor or [])
-    if answers.is_empty:
-        answers = asked()
-    plant = plant_of(name or out.stem, answers)
+    words = {"axis": axis, "transmission": transmission, "actuator": actuator, "sensor": sensor}
+    stated = {kind: given or [] for kind, given in words.items()}
+    plant = plant_of(name or out.stem, stated if any(stated.values()) else asked())
     write(plant, out, data_text(from_, plant) if from_ else "")
     present(json_, {"machine": out}, f"Machine: {out}. Next: rig machine check {out} DATA")

@@ -10,19 +10,15 @@ import typer
 from typer.exceptions import TyperException
 
 from rig import __version__
-from rig.cli.adapt import adapt
 from rig.cli.calibrate import calibrate_app
 from rig.cli.campaigns import campaigns
-from rig.cli.clear import clear
-from rig.cli.commission import commission
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
 from rig.cli.diff import diff
-from rig.cli.doctor import devices, doctor, selftest, udev
+from rig.cli.doctor import commission, devices, doctor, selftest, udev
 from rig.cli.effects import effects
-from rig.cli.estimator import estimator_app
-from rig.cli.export import export
+from rig.cli.estimator import adapt, estimator_app, export
 from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
 from rig.cli.grasper import grasper_app
@@ -37,7 +33,7 @@ from rig.cli.model import model_app
 from rig.cli.record import record
 from rig.cli.reference import reference
 from rig.cli.replay import replay
-from rig.cli.stop import stop
+from rig.cli.stop import clear, stop
 from rig.cli.study import study_app
 from rig.cli.view import view
 

@@ -1,7 +1,6 @@
 """`rig` alone: the state of rig, calibrations and recordings here, and what to type next."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,30 +11,18 @@ if TYPE_CHECKING:
 
 RECORDINGS = Path("logs")
 
-
-@dataclass(frozen=True)
-class Step:
-    """One line of advice.
-
-    Attributes:
-        state: What is here, or missing.
-        command: What to type next; empty if nothing is needed.
-    """
-
-    state: str
-    command: str = ""
+Step = tuple[str, str]
+"""What is here, or missing, and what to type next; empty if nothing is needed."""
 
 
 def show_next_steps() -> None:
-    """Print the steps, and where all commands are listed."""
+    """Print the state of what is here, what to type next, and where all commands are listed."""
     from rig.configuration.chosen import default_config
 
     sim = " --sim" if default_config() is None else ""
-    steps = [*of_the_rig(), *of_recordings(RECORDINGS, f"rig record{sim} --protocol diagnosis")]
-    for step in steps:
-        typer.echo(step.state)
-        if step.command:
-            typer.echo(f"  {step.command}")
+    record = f"rig record{sim} --protocol diagnosis"
+    for state, command in (*of_the_rig(), *of_recordings(RECORDINGS, record)):
+        typer.echo(f"{state}\n  {command}" if command else state)
     typer.echo("\nAll commands: rig -h. By task: docs/how-to.md.")
 
 
@@ -45,8 +32,8 @@ def of_the_rig() -> Iterator[Step]:
 
     config = default_config()
     if config is None:
-        yield Step("No rig is configured. Without hardware:", "rig demo")
-        yield Step("With a board plugged in:", "rig config init")
+        yield "No rig is configured. Without hardware:", "rig demo"
+        yield "With a board plugged in:", "rig config init"
         return
     from rig.configuration.config import load_config
     from rig.errors import KNOWN_ERRORS
@@ -54,12 +41,12 @@ def of_the_rig() -> Iterator[Step]:
     try:
         settings = load_config(config)
     except KNOWN_ERRORS:
-        yield Step(f"The configuration {config} cannot be used.", f"rig config check {config}")
+        yield f"The configuration {config} cannot be used.", f"rig config check {config}"
         return
     if settings.is_simulated:
-        yield Step(f"Rig: {settings.name} ({config}), simulated.")
+        yield f"Rig: {settings.name} ({config}), simulated.", ""
         return
-    yield Step(f"Rig: {settings.name} ({config}).", "rig doctor")
+    yield f"Rig: {settings.name} ({config}).", "rig doctor"
     yield from _of_calibrations()
 
 
@@ -70,12 +57,12 @@ def _of_calibrations() -> Iterator[Step]:
     try:
         active = CalibrationStore(default_folder()).active()
     except (CalibrationError, OSError):
-        yield Step("The calibration store cannot be read.", "rig cal check")
+        yield "The calibration store cannot be read.", "rig calibrate check"
         return
     if active:
-        yield Step(f"Calibrations in use: {len(active)}.", "rig cal check")
+        yield f"Calibrations in use: {len(active)}.", "rig calibrate check"
     else:
-        yield Step("No calibration of this rig is stored.", "rig calibrate torque")
+        yield "No calibration of this rig is stored.", "rig calibrate torque"
 
 
 def of_recordings(root: Path, record: str) -> Iterator[Step]:
@@ -90,14 +77,14 @@ def of_recordings(root: Path, record: str) -> Iterator[Step]:
     try:
         found = campaigns(root, default_index(root)) if root.is_dir() else []
     except OSError as error:
-        yield Step(f"The recordings in {root} cannot be listed: {error}.")
+        yield f"The recordings in {root} cannot be listed: {error}.", ""
         return
     if not found:
-        yield Step(f"There is no recording in {root}.", record)
+        yield f"There is no recording in {root}.", record
         return
-    yield Step(f"{len(found)} recorded campaigns in {root}.", "rig campaigns")
+    yield f"{len(found)} recorded campaigns in {root}.", "rig campaigns"
     recorded = [one for one in found if not one.is_calibration]
-    yield _of_campaign(recorded[0]) if recorded else Step("They are all calibrations.", record)
+    yield _of_campaign(recorded[0]) if recorded else ("They are all calibrations.", record)
 
 
 def _of_campaign(newest: "IndexedCampaign") -> Step:
@@ -107,8 +94,8 @@ def _of_campaign(newest: "IndexedCampaign") -> Step:
     broken = [run for run in newest.runs if run.state != "complete" or run.lost]
     if broken:
         state = f"The newest, {folder}: {len(broken)} of {len(newest.runs)} runs not complete."
-        return Step(state, f"rig log check {folder}")
+        return state, f"rig log check {folder}"
     if newest.diagnosis is None:
-        return Step(f"The newest, {folder}, is not diagnosed.", f"rig diagnose {folder}")
+        return f"The newest, {folder}, is not diagnosed.", f"rig diagnose {folder}"
     said = ", ".join([verdict(newest).replace("_", " "), *families(newest)])
-    return Step(f"The newest, {folder}: {said}.", f"rig campaigns --open --root {folder}")
+    return f"The newest, {folder}: {said}.", f"rig campaigns --open --root {folder}"

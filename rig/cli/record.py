@@ -15,7 +15,7 @@ from rig.cli.options import (
     complete_protocol,
     protocol_names,
 )
-from rig.output.console import JsonFlag, emit_json, progress, remarks, results
+from rig.output.console import JsonFlag, present, progress, remarks
 
 if TYPE_CHECKING:
     from rig.configuration.config import Config
@@ -88,12 +88,10 @@ def record(
     recorded = _recorded(settings, todo, folder, notes, watch)
     bad = [result.name for result in recorded if result.drifted or not result.complete]
     wrong = f"drifted or not complete: {', '.join(bad)}" if bad else "all complete"
-    results(json).print(
-        f"{counted(len(recorded), 'run')} recorded, {wrong}. Next: rig log check {folder}"
-    )
-    if json:
-        found = {"folder": folder, "runs": recorded, "look_at": bad}
-        emit_json(found if watch is None else {**found, "models": watch.to_json()})
+    found = {"folder": folder, "runs": recorded, "look_at": bad}
+    models = {} if watch is None else {"models": watch.to_json()}
+    said = f"{counted(len(recorded), 'run')} recorded, {wrong}. Next: rig log check {folder}"
+    present(json, found | models, said)
     return 1 if bad else 0
 
 

@@ -1,10 +1,10 @@
-"""`rig stop`: disarm the motors, and report it only after the board has confirmed it."""
+"""`rig stop | clear`: disarm the motors, confirmed by the board; clear a latched fault or trip."""
 
 from pathlib import Path
 from typing import Any
 
 from rig.bench.holding import Ending
-from rig.cli.options import ConfigOption, SimFlag, announced
+from rig.cli.options import ConfigOption, SimFlag, announced, chosen_rig
 from rig.output.console import JsonFlag, present, remarks, results
 
 
@@ -88,3 +88,23 @@ def _ended(ending: Ending | None) -> str:
         return ""
     how = "did not end when asked and was killed" if ending.was_killed else "was asked to end"
     return f"The session that had the rig (PID {ending.pid}) {how}."
+
+
+def clear(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
+    """Clear the rig's latched fault or trip; the motors stay out of force.
+
+    Find the cause first. An EPOS4 drive is taken out of force, its communication is reset and set
+    up again, and its fault is cleared. A logger board is disarmed, and the trip it reports is
+    cleared by its code.
+    """
+    from rig.bench.clearing import clear_latch
+
+    settings = chosen_rig(config, sim)
+    latch = clear_latch(settings)
+    text = "nothing is latched."
+    if latch.code:
+        text = f"cleared: {latch.what} (code {latch.code:#06x}) {latch.then}".rstrip()
+    latched = {"what": latch.what, "code": latch.code} if latch.code else None
+    data = {"state": "disarmed", "latched": latched, "cleared": True}
+    present(json, data, f"{settings.name}: out of force; {text}")
+    return 0

@@ -50,9 +50,9 @@ def view(
     """
     import webbrowser
 
+    from estimation.files import write_text_atomic
     from rig.machines.recordings import open_recordings
     from rig.output.provenance import Provenance
-    from rig.output.render import write_report
     from rig.output.table import counted
     from rig.reports.recordings import page
 
@@ -62,7 +62,7 @@ def view(
     campaign = with_model(chosen_runs(shown, run or []), model)
     name = path.resolve().name
     target = out or Path(f"{name}.view.html")
-    write_report(target, page(campaign, f"Recordings: {name}", Provenance.now(0)))
+    write_text_atomic(target, page(campaign, f"Recordings: {name}", Provenance.now(0)))
     opened = open_ and not json and webbrowser.open(target.resolve().as_uri())
     said = [f"{counted(len(campaign), 'run')}: {target}"]
     if not opened:

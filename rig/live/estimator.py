@@ -1,6 +1,6 @@
 """A fitted estimator as the stream of estimates the display shows."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -169,24 +169,10 @@ def models_in_use(path: Path) -> list[Model]:
     return of_axes or models[:1]
 
 
-class HalfWidths(Mapping[str, float]):
-    """Half of the 95 % interval of each channel that is estimated, as of the newest sample."""
-
-    def __init__(self, estimators: Sequence[ModelEstimator]) -> None:
-        self._estimators = estimators
-
-    def _known(self) -> dict[str, float]:
-        found = {e.target_channel: e.half_width for e in self._estimators}
-        return interval_of_joints({k: width for k, width in found.items() if width is not None})
-
-    def __getitem__(self, channel: str) -> float:
-        return self._known()[channel]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._known())
-
-    def __len__(self) -> int:
-        return len(self._known())
+def half_widths(estimators: Sequence[ModelEstimator]) -> dict[str, float]:
+    """Return half of the 95 % interval of each channel, SI, as of the newest sample."""
+    found = {estimator.target_channel: estimator.half_width for estimator in estimators}
+    return interval_of_joints({k: width for k, width in found.items() if width is not None})
 
 
 def shown_channels(estimators: Sequence[ModelEstimator], usual: tuple[str, ...]) -> tuple[str, ...]:

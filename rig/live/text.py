@@ -85,7 +85,7 @@ def main_words(reading: Reading, options: ShowOptions) -> str:
 
 def interval(reading: Reading, options: ShowOptions, sign: str = "±") -> str:
     """Return the 95 % interval of an estimate in words; empty where it is not known."""
-    half_width = options.half_widths.get(reading.channel)
+    half_width = options.half_widths().get(reading.channel)
     if not reading.has_estimator or reading.main.number is None or half_width is None:
         return ""
     return f"{sign}{with_unit(Value(half_width), reading.unit)}"
@@ -207,7 +207,7 @@ def json_frame(snapshot: Snapshot, options: ShowOptions) -> dict[str, Any]:
         "sample_rate_hz": snapshot.sample_rate_hz,
         "flagged": snapshot.flagged,
         "lever_m": options.lever_m,
-        "estimate_half_width95": options.half_widths.get(snapshot.readings[0].channel),
+        "estimate_half_width95": options.half_widths().get(snapshot.readings[0].channel),
         "channels": {r.channel: _json_reading(r, options) for r in snapshot.readings},
         "devices": snapshot.devices,
         "limits": snapshot.limits,
@@ -226,4 +226,4 @@ def _json_reading(reading: Reading, options: ShowOptions) -> dict[str, Any]:
     if reading.channel == TIP_CHANNEL:
         force_n = tip_force_n(reading, options.lever_m)
         found |= {"tip_force_n": force_n, "tip_force_from": reading.source}
-    return found | {"half_width95": options.half_widths.get(reading.channel)}
+    return found | {"half_width95": options.half_widths().get(reading.channel)}

@@ -63,10 +63,10 @@ def show_table(screen: "Console", table: "TextTable") -> None:
     if not screen.is_terminal or screen.measure(whole, options=unlimited).maximum <= screen.width:
         screen.print(whole)
         return
-    rows = [
-        f"{name}: {', '.join(f'{c} {v}' for c, v in zip(table.columns[1:], cells, strict=True) if v)}"
-        for name, *cells in table.rows
-    ]
+    rows = []
+    for name, *cells in table.rows:
+        said = (f"{c} {cell}" for c, cell in zip(table.columns[1:], cells, strict=True) if cell)
+        rows.append(f"{name}: {', '.join(said)}")
     for line in filter(None, (table.title, *rows, table.note)):
         screen.print(line, style="default", soft_wrap=False)
 

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from estimation.files import write_text_atomic
 from estimation.recording import FloatArray
-from rig.output.binning import binned
+from rig.output.charts import binned
 
 COLOURS = ("#3b7dd8", "#d9822b", "#2e9e6b", "#b04fc4")
 """Told apart in light and in dark, and by eyes that mix up red and green."""

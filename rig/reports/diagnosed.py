@@ -18,12 +18,9 @@ from rig.diagnosis.each import Start, for_each
 from rig.diagnosis.ledger import Ledger, Look, look_at
 from rig.diagnosis.run import run_diagnosis
 from rig.diagnosis.subject import subject
-from rig.diagnosis.traces import traces
 from rig.errors import RigError
 from rig.output.console import plain
-from rig.output.provenance import Provenance
-from rig.output.render import write_report
-from rig.reports.diagnosis import page
+from rig.reports.diagnosis import page_of
 from rig.reports.diagnosis_words import sentences
 
 
@@ -75,7 +72,7 @@ def diagnose_all(
         found[folder] = done
         if done.look is not None:
             place = folder / DIAGNOSIS
-            write_report(place.with_suffix(".html"), done.page)
+            write_text_atomic(place.with_suffix(".html"), done.page)
             write_text_atomic(place, json.dumps(done.result, indent=2, allow_nan=False) + "\n")
             looks.enter(done.look)
         on_done(folder, done)
@@ -92,11 +89,10 @@ def diagnose_folder(ledger: Path, folder: Path) -> FolderDiagnosis:
         done = run_diagnosis(asked.campaign, asked.models, Ledger(ledger), quick=True)
     except (EstimationError, RigError) as error:
         return FolderDiagnosis(failed=str(error))
-    found = done.diagnosis
     return FolderDiagnosis(
-        tuple(sentences(found)),
-        plain(found.to_json()),
-        page(found, traces(done.answer), Provenance.now(found.sealed.seed)),
+        tuple(sentences(done.diagnosis)),
+        plain(done.diagnosis.to_json()),
+        page_of(done, done.sealed.seed),
         look_at(done.looked_at, done.sealed),
     )
 

@@ -11,7 +11,7 @@ from calibration.linear import shipped_calibration_set
 from calibration.record import Validity, record_of_line
 from calibration.store import CalibrationStore
 from rig.live.block import DeviceStatus, through
-from rig.live.keys import pressed_keys
+from rig.live.keys import display_keys
 from rig.live.session_blocks import session_blocks
 from rig.log.reader import read_log
 from tests.rig.simulated import short_protocol, simulated, transport
@@ -113,7 +113,7 @@ def test_keys_are_read_from_a_terminal_and_it_is_given_back(monkeypatch):
     with os.fdopen(theirs, "r+b", buffering=0) as terminal:
         monkeypatch.setattr(sys, "stdin", Terminal(terminal))
         before = termios.tcgetattr(theirs)
-        with pressed_keys() as keys:
+        with display_keys() as keys:
             assert keys() == ""
             os.write(ours, b"rM")
             assert keys() == "rm"
@@ -121,7 +121,7 @@ def test_keys_are_read_from_a_terminal_and_it_is_given_back(monkeypatch):
     os.close(ours)
     with Path(os.devnull).open() as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
-        with pressed_keys() as keys:
+        with display_keys() as keys:
             assert keys is None
 
 

@@ -122,12 +122,6 @@ def test_ctrl_c_quits_with_a_summary_and_closes_the_stream(terminal):
     assert "Stopped after 2.0 s" in console.file.getvalue()
 
 
-def test_ctrl_c_in_json_still_ends_with_a_summary(capsys):
-    show(blocks(4, KeyboardInterrupt()), ShowOptions("run", json=True), people())
-    last = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert last["summary"]["ended"] == "interrupted"
-
-
 def test_a_fault_of_the_stream_is_passed_on_with_the_terminal_given_back():
     console = people(terminal=True)
     with pytest.raises(SafetyTripError, match="over current"):
@@ -186,15 +180,3 @@ def test_keys_of_the_display_do_not_reach_the_rig():
     keys = DisplayKeys(iter(["tc?m"]).__next__)
     assert keys() == "tm"
     assert (keys.chosen, keys.helps) == (1, True)
-
-
-def test_a_tall_terminal_is_used():
-    console = Console(
-        file=io.StringIO(),
-        width=160,
-        height=50,
-        force_terminal=True,
-        _environ={"TERM": "xterm-256color"},
-    )
-    show(blocks(40), ShowOptions("run"), console, steady_clock())
-    assert console.file.getvalue().split("\x1b[?2026h")[-1].count("\n") > 40

@@ -1,15 +1,61 @@
-"""`rig campaigns --refit MODEL`: one model on each campaign found, and when parameters changed."""
+"""`rig campaigns --diagnose` and `--refit MODEL`: the same work on each campaign found."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.output.console import emit_json, progress, results, show_table
+from rig.output.console import present, progress
 
 if TYPE_CHECKING:
     from rig.campaigns.index import IndexedCampaign
     from rig.diagnosis.refit import Refit
     from rig.output.table import TextTable
+    from rig.reports.diagnosed import FolderDiagnosis
+
+
+def show_diagnoses(
+    found: Sequence["IndexedCampaign"],
+    root: Path,
+    workers: int,
+    scheduler: str | None,
+    json: bool,
+) -> None:
+    """Diagnose campaigns, without next experiments, and print what each lacks, oldest first.
+
+    Raises:
+        LedgerError: The access log cannot be read or written.
+        UsageError: No scheduler answers.
+    """
+    from rig.diagnosis.engine import engine
+    from rig.diagnosis.ledger import default_ledger
+    from rig.reports.diagnosed import diagnose_all
+
+    folders = [one.folder for one in reversed(found)]  # the newest come first
+    new: list[Path] = []
+    with progress() as bar:
+        task = bar.add_task("campaigns", total=len(folders))
+
+        def count(folder: Path, _: "FolderDiagnosis") -> None:
+            new.append(folder)
+            bar.advance(task)
+
+        done = diagnose_all(folders, default_ledger(), partial(engine, workers, scheduler), count)
+    rows = [
+        {"folder": folder, "failed": one.failed, "diagnosis": one.result or None}
+        for folder, one in done.items()
+    ]
+    said = [
+        f"{folder.relative_to(root)}: {line}"
+        for folder, one in done.items()
+        for line in (*filter(None, [one.failed]), *one.sentences)
+    ]
+    failed = sum(bool(one.failed) for one in done.values())
+    total = (
+        f"{len(new) - failed} campaigns diagnosed, {len(done) - len(new)} had a diagnosis newer"
+        f" than their logs, {failed} could not be diagnosed. All: rig campaigns --root {root}"
+    )
+    present(json, {"campaigns": rows}, *said, total)
 
 
 def show_refit(
@@ -26,8 +72,6 @@ def show_refit(
         UsageError: The model names an estimator, or no scheduler answers.
         ModelFileError: There is no such model.
     """
-    from functools import partial
-
     from estimation.model_file import read, to_toml
     from rig.diagnosis.engine import engine
     from rig.diagnosis.refit import refit_all
@@ -41,19 +85,15 @@ def show_refit(
         )
     good = {folder: fit for folder, fit in fitted.items() if not fit.failed}
     moved = _changes(good, dates, root)
-    if json:
-        rows = [
-            {"folder": folder, "date": dates[folder], "fit": one} for folder, one in fitted.items()
-        ]
-        emit_json({"campaigns": rows, "changes": moved})
-        return
-    screen = results(json)
-    for folder, one in fitted.items():
-        if one.failed:
-            screen.print(f"{folder.relative_to(root)}: {one.failed}")
-    if good:
-        show_table(screen, _table(good, moved))
-    screen.print(f"{len(good)} of {len(fitted)} campaigns fitted.")
+    rows = [{"folder": folder, "date": dates[folder], "fit": one} for folder, one in fitted.items()]
+    failed = {folder: one.failed for folder, one in fitted.items() if one.failed}
+    present(
+        json,
+        {"campaigns": rows, "changes": moved},
+        *(f"{folder.relative_to(root)}: {why}" for folder, why in failed.items()),
+        *([_table(good, moved)] if good else []),
+        f"{len(good)} of {len(fitted)} campaigns fitted.",
+    )
 
 
 def _changes(
