@@ -6,28 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimation.recording import Flag
-from rig.live.block import BlockError, DeviceStatus, SampleBlock
+from rig.live.block import BlockError, DeviceStatus
 from rig.live.sparkline import round_scale
 from rig.live.state import LiveState
 from rig.live.text import summary_lines
-
-GRIP = "distal_torque_n_m"
-OK = (DeviceStatus("teensy", "ok"),)
-
-
-def block(first, n, sensor=0.1, estimate=None, flags=0, lost=0, rate=1000.0, **changes):
-    """Return n samples from sample number `first` on."""
-    time_s = (first + np.arange(n)) / rate
-    estimates = {} if estimate is None else {GRIP: np.full(n, estimate)}
-    parts = {
-        "time_s": time_s,
-        "columns": {GRIP: np.full(n, sensor)},
-        "flags": np.broadcast_to(np.asarray(flags, np.uint8), n),
-        "estimates": estimates,
-        "lost": lost,
-        "devices": OK,
-    }
-    return SampleBlock(**parts | changes)
+from tests.rig.blocks import GRIP, block
 
 
 def state_of(*blocks):
@@ -75,7 +58,8 @@ def test_a_gap_lowers_the_measured_rate():
 @pytest.mark.parametrize("flag", [f for f in Flag if f])
 def test_flagged_samples_give_the_reason_and_no_number(flag):
     snapshot = state_of(
-        block(0, 500, estimate=0.1), block(500, 200, estimate=0.1, flags=flag)
+        block(0, 500, estimate=0.1),
+        block(500, 200, estimate=0.1, flags=np.full(200, flag, np.uint8)),
     ).snapshot()
     reading = snapshot.readings[0]
     assert reading.sensor.number is None
@@ -106,7 +90,7 @@ def test_a_restarted_device_clock_begins_the_trace_anew_and_keeps_the_totals():
 
 def test_blocks_whose_parts_do_not_fit_are_refused():
     with pytest.raises(BlockError, match="shape"):
-        block(0, 10, flags=0, columns={GRIP: np.zeros(9)})
+        block(0, 10, columns={GRIP: np.zeros(9)})
     with pytest.raises(BlockError, match="increase"):
         block(0, 2, time_s=np.array([0.1, 0.1]))
 

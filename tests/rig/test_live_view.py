@@ -1,6 +1,5 @@
 """What a person reads on the display, as text, wide and narrow."""
 
-import dataclasses
 import io
 
 import numpy as np
@@ -8,36 +7,32 @@ import pytest
 from rich.console import Console
 
 from estimation.recording import Flag
-from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
+from rig.live.block import DeviceStatus, LimitStatus
 from rig.live.options import ShowOptions
 from rig.live.state import LiveState
 from rig.live.text import plain_line
 from rig.live.view import View
+from tests.rig.blocks import GRIP, block
 
-GRIP = "distal_torque_n_m"
 OPTIONS = ShowOptions("rig live")
 DEVICES = (DeviceStatus("teensy", "armed", "SIM-0001"), DeviceStatus("load", "stale", "no reply"))
 LIMITS = (LimitStatus("motor current", 0.31, 0.6, "A"), LimitStatus("torque", -0.29, 0.3, "N m"))
 
 
 def stream(seconds=12.0, channel=GRIP, **changes):
-    time_s = np.arange(int(seconds * 1000)) / 1000
-    torque = np.full(time_s.size, 0.12)
-    block = SampleBlock(
-        time_s,
-        {channel: torque},
-        np.zeros(time_s.size, np.uint8),
-        {channel: torque + 0.0034},
-        lost=0,
-        devices=DEVICES,
-        limits=LIMITS,
-    )
-    return dataclasses.replace(block, **changes)
+    n = int(seconds * 1000)
+    parts = {
+        "columns": {channel: np.full(n, 0.12)},
+        "estimates": {channel: np.full(n, 0.1234)},
+        "devices": DEVICES,
+        "limits": LIMITS,
+    }
+    return block(0, n, **parts | changes)
 
 
-def snapshot_of(block, channels=(GRIP,)):
+def snapshot_of(samples, channels=(GRIP,)):
     state = LiveState(channels)
-    state.feed(block)
+    state.feed(samples)
     return state.snapshot()
 
 
