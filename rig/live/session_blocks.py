@@ -12,8 +12,8 @@ from estimation.channels import ESTIMATED, unit_of
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
+from rig.live.estimator import ModelEstimator, within_range
 from rig.live.keys import LEAVE, MARK, RECORD, STOP, TARE, Keys, no_keys
-from rig.live.replay import EstimateStream, within_range
 from rig.live.status import CalibrationStatus
 from rig.machines.machine import MachinePlan
 from rig.machines.reading import Reading
@@ -26,7 +26,7 @@ def session_blocks(
     config: Config,
     open_transport: Callable[[], Transport],
     plans: Sequence[MachinePlan],
-    estimators: Sequence[EstimateStream],
+    estimators: Sequence[ModelEstimator],
     keys: Keys = no_keys,
     folder: Path = Path("logs"),
 ) -> Iterator[SampleBlock]:
@@ -130,7 +130,7 @@ def _readings(session: Session, plans: Sequence[MachinePlan], hand: _Hand) -> It
         yield from session.watch()
 
 
-def _block(session: Session, reading: Reading, estimators: Sequence[EstimateStream]) -> SampleBlock:
+def _block(session: Session, reading: Reading, estimators: Sequence[ModelEstimator]) -> SampleBlock:
     estimates = {}
     for estimator in estimators:
         estimates[estimator.target_channel] = estimator.push(reading.columns, reading.time_s)

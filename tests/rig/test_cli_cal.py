@@ -2,9 +2,12 @@
 
 import json
 import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from calibration.record import Validity
 from calibration.store import CalibrationStore
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED, load_config
@@ -37,6 +40,18 @@ def certificate(tmp_path, slope="4.0e-5"):
     path = tmp_path / f"certificate{slope}.toml"
     path.write_text(CERTIFICATE.replace("4.0e-5", slope))
     return str(path)
+
+
+def recorded(rig, tmp_path):
+    """Record one short run; return its log."""
+    short = tmp_path / "short.toml"
+    short.write_text(
+        'name = "short"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2]\n'
+        "duration_s = 1.0\n"
+    )
+    rig("record", "-p", str(short), "--out", str(tmp_path / "runs"))
+    (log,) = (tmp_path / "runs").glob("*.mcap")
+    return log
 
 
 def configuration(tmp_path, serial):
@@ -124,25 +139,12 @@ def test_records_of_the_simulated_rig_are_listed_by_their_gains_and_found(
 
 
 def test_a_log_beyond_the_calibrated_range_is_reported(rig, tmp_path):
-    from dataclasses import replace
-
-    from calibration.record import Validity
-    from calibration.store import CalibrationStore
-    from rig.bench.session import Session
-    from rig.recording.campaign import open_campaign_folder, record_campaign
-    from tests.rig.simulated import short_protocol, simulated, transport
-
-    config = simulated()
-    plans = open_campaign_folder(tmp_path / "runs", short_protocol(1), config, resume=False)
-    with Session(config, transport(config)) as session:
-        (run,) = record_campaign(session, plans, tmp_path / "runs")
+    log = recorded(rig, tmp_path)
     _, added = rig("calibrate", "add", certificate(tmp_path), "--operator", "Ada")
     store = CalibrationStore(tmp_path / "store")
     narrow = replace(store.get(*added["added"].values()), validity=Validity(-1.0, 1.0))
     store.use(store.add(narrow), narrow.made_at, "Ada")
-    code, said = rig(
-        "calibrate", "check", "--log", str(run.path), "--store", str(tmp_path / "store")
-    )
+    code, said = rig("calibrate", "check", "--log", str(log), "--store", str(tmp_path / "store"))
     assert code == 0
     assert [v["rule"] for v in said["verdicts"]] == ["out_of_range"]
     assert rig("calibrate", "check", "--store", str(tmp_path / "store"))[1]["verdicts"] == []
@@ -150,15 +152,7 @@ def test_a_log_beyond_the_calibrated_range_is_reported(rig, tmp_path):
 
 def test_a_log_is_exported_with_another_record(rig, tmp_path):
     """Twice the slope is twice the torque; the zero that was measured before the run stays."""
-    import numpy as np
-
-    short = tmp_path / "short.toml"
-    short.write_text(
-        'name = "short"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2]\n'
-        "duration_s = 1.0\n"
-    )
-    rig("record", "-p", str(short), "--out", str(tmp_path / "runs"))
-    (log,) = (tmp_path / "runs").glob("*.mcap")
+    log = recorded(rig, tmp_path)
     _, added = rig("calibrate", "add", certificate(tmp_path, "7.9622e-05"), "--operator", "Ada")
     digest = added["added"]["proximal_torque_n_m"]
     torques = []

@@ -70,18 +70,14 @@ def test_a_client_gets_samples_with_estimates_and_nothing_listens_afterwards():
     raise AssertionError("it still listens")
 
 
-def test_only_the_loopback_address_is_listened_on(monkeypatch):
+def test_only_the_loopback_address_is_listened_on_and_a_taken_port_is_reported(monkeypatch):
     import foxglove
 
     asked = {}
     start = foxglove.start_server
     monkeypatch.setattr(foxglove, "start_server", lambda **k: asked.update(k) or start(**k))
-    served.FoxgloveServer(0).close()
-    assert asked["host"] == "127.0.0.1"
-
-
-def test_a_taken_port_is_reported():
     server = served.FoxgloveServer(0)
+    assert asked["host"] == "127.0.0.1"
     with pytest.raises(UsageError, match="cannot be listened on"):
         served.FoxgloveServer(server.port)
     server.close()

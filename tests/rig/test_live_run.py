@@ -153,14 +153,12 @@ def drawn_after(presses, footer="c channel", help_="c: shows the next channel"):
     return console.file.getvalue().split("\x1b[?2026h")[-1]
 
 
-def test_a_key_chooses_the_channel_in_large_digits_and_comes_back_to_the_first():
-    assert "Measured current of the drive motor, sensor" in drawn_after(["c"])
-    assert "0.250 A" in drawn_after(["c"])
-    assert "Grip torque, estimate" in drawn_after(["c"])  # in a line of its own
+def test_keys_choose_the_channel_in_large_digits_and_show_the_help():
+    chosen = drawn_after(["c"])
+    assert "Measured current of the drive motor, sensor" in chosen
+    assert "0.250 A" in chosen
+    assert "Grip torque, estimate" in chosen  # in a line of its own
     assert "Measured current" not in drawn_after(["cc"])
-
-
-def test_a_key_shows_the_help_and_hides_it():
     assert "shows the next channel" in drawn_after(["?"])
     assert "shows the next channel" not in drawn_after(["?", "?"])
 
