@@ -51,18 +51,25 @@ def session_blocks(
         named = dict.fromkeys(f"{ESTIMATED}{one.target_channel}" for one in estimators)
         with closing(_Hand(session, keys, LiveRecorder(session, folder, further=[*named]))) as hand:
             for reading in _readings(session, plans, hand):
-                block = _block(session, reading, estimators)
-                estimated = {
-                    f"{ESTIMATED}{e.target_channel}": within_range(
-                        e, block.estimates[e.target_channel]
-                    )
-                    for e in estimators
-                }
-                hand.obey(replace(reading, columns={**reading.columns, **estimated}))
+                estimates, recorded = {}, {**reading.columns}
+                for one in estimators:
+                    estimate = one.push(reading.columns, reading.time_s)
+                    estimates[one.target_channel] = estimate
+                    recorded[f"{ESTIMATED}{one.target_channel}"] = within_range(one, estimate)
+                logger = _logger_status(session, reading)
+                limits = _limits(session, reading)
+                hand.obey(replace(reading, columns=recorded))
                 if hand.leaves:
                     return
-                said = (*block.devices, calibrations.of(reading), *hand.status())
-                yield replace(block, devices=said)
+                yield SampleBlock(
+                    reading.time_s,
+                    reading.columns,
+                    reading.flags,
+                    estimates,
+                    reading.lost,
+                    (logger, calibrations.of(reading), *hand.status()),
+                    limits,
+                )
 
 
 class _Hand:
@@ -128,21 +135,6 @@ def _readings(session: Session, plans: Sequence[MachinePlan], hand: _Hand) -> It
                 yield from session.watch()
     if not plans:
         yield from session.watch()
-
-
-def _block(session: Session, reading: Reading, estimators: Sequence[ModelEstimator]) -> SampleBlock:
-    estimates = {}
-    for estimator in estimators:
-        estimates[estimator.target_channel] = estimator.push(reading.columns, reading.time_s)
-    return SampleBlock(
-        reading.time_s,
-        reading.columns,
-        reading.flags,
-        estimates,
-        reading.lost,
-        (_logger_status(session, reading),),
-        _limits(session, reading),
-    )
 
 
 def _logger_status(session: Session, reading: Reading) -> DeviceStatus:
