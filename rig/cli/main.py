@@ -40,19 +40,6 @@ from rig.cli.view import view
 # before numpy is loaded: the matrices are small, and threads of a BLAS wait for one another
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-app = typer.Typer(
-    name="rig",
-    help="Record, estimate and explain the torque at the jaw of a surgical-grasper rig.",
-    cls=GroupedHelp,
-    invoke_without_command=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # plain help keeps the start instant
-    epilog="Exit codes: 0 done, 1 bad result, 2 usage, 3 device, 4 safety trip, 5 damaged data, "
-    "70 bug, 130 interrupted.",
-)
-
-
 COMMANDS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
     "Begin": (
         *(demo, config_app, machine_app),
@@ -63,14 +50,39 @@ COMMANDS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
     "Models": (fit, diagnose, model_app, diff, loop, effects, adapt, estimator_app, export),
     "Papers": (study_app,),
 }
-"""Headings of the list of commands, and the commands under each."""
+"""Headings of the list of commands, and the commands under each, in order."""
+
+
+def _name(member: Callable[..., Any] | typer.Typer) -> str:
+    return str(member.info.name) if isinstance(member, typer.Typer) else member.__name__.rstrip("_")
+
+
+class OrderedHelp(GroupedHelp):
+    """The commands in the order of the list above."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands."""
+        return [_name(member) for members in COMMANDS.values() for member in members]
+
+
+app = typer.Typer(
+    name="rig",
+    help="Record, estimate and explain the torque at the jaw of a surgical-grasper rig.",
+    cls=OrderedHelp,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # plain help keeps the start instant
+    epilog="Exit codes: 0 done, 1 bad result, 2 usage, 3 device, 4 safety trip, 5 damaged data, "
+    "70 bug, 130 interrupted.",
+)
 
 for heading, members in COMMANDS.items():
     for member in members:
         if isinstance(member, typer.Typer):
             app.add_typer(member, rich_help_panel=heading)
         else:
-            app.command(member.__name__.rstrip("_"), rich_help_panel=heading)(member)
+            app.command(_name(member), rich_help_panel=heading)(member)
 
 
 def _version(wanted: bool) -> None:

@@ -73,7 +73,7 @@ def _paths(start: str, pattern: str) -> list[str]:
 
 
 def _completed(names: Callable[[], list[str]], pattern: str = "") -> Callable[[str], list[str]]:
-    """Return what completes a name, or with a pattern a path of that pattern."""
+    """Return a completion of names, and with a pattern of paths."""
 
     def complete(incomplete: str) -> list[str]:
         files = _paths(incomplete, pattern) if pattern else []

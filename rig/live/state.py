@@ -197,7 +197,7 @@ class LiveState:
             self._inside_samples += int(np.isfinite(squared[inside]).sum())
 
     def _signals(self, block: SampleBlock) -> FloatArray:
-        """Return what is held of a block, shape (signals, n), NaN where missing."""
+        """Return the signals of a block, shape (signals, n), NaN where missing."""
         nan = np.full(len(block), np.nan)
         valid = block.flags == 0
         received = (block.flags & Flag.MISSING) == 0

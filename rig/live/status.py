@@ -176,9 +176,9 @@ class FitStatus:
 
 
 def model_steps(estimators: Sequence[ModelEstimator]) -> list[Step]:
-    """Return what is added to the blocks that estimators estimate on.
+    """Return the steps of blocks that estimators estimate on.
 
-    These are the forces of a grasper's joints, the state of the models, and of a single declared
+    They add the forces of a grasper's joints, the state of the models, and of a single declared
     model whether it still fits.
     """
     models = [estimator.model for estimator in estimators if estimator.model is not None]
