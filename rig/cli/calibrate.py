@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ from rig.cli.calibrate_check import check
 from rig.cli.calibrate_store import add, diagnose, diff, list_, show, use
 from rig.cli.help import group
 from rig.cli.options import ConfigOption, SimFlag, SimulationSeed
+from rig.errors import UsageError
 from rig.output.console import JsonFlag
 
 if TYPE_CHECKING:
@@ -194,8 +196,6 @@ def ft(
     repeats: Annotated[int, typer.Option(min=1, help="Number of rounds through the poses.")] = 1,
 ) -> "Procedure":
     """Force sensor: bias, weight and centre of mass of its tool, and the lever arm to the jaw."""
-    from math import radians
-
     from calibration.sessions.ft import FtSession
 
     jaw, turn = _three(jaw_mm, "--jaw-mm"), _three(jaw_turn_deg, "--jaw-turn-deg")
@@ -246,7 +246,6 @@ for function in (check, add, list_, show, diff, use, diagnose):
 def _made(make: "Callable[..., Procedure]", options: dict[str, Any]) -> "Procedure":
     """Make a procedure of its options; what they cannot be is a slip of whoever typed them."""
     from calibration.quality import BadDataError
-    from rig.errors import UsageError
 
     try:
         return make(**options)
@@ -255,8 +254,6 @@ def _made(make: "Callable[..., Procedure]", options: dict[str, Any]) -> "Procedu
 
 
 def _numbers(words: str, option: str) -> list[float]:
-    from rig.errors import UsageError
-
     try:
         return [float(word) for word in words.split(",")]
     except ValueError:
@@ -266,8 +263,6 @@ def _numbers(words: str, option: str) -> list[float]:
 
 
 def _three(words: str, option: str) -> list[float]:
-    from rig.errors import UsageError
-
     values = _numbers(words, option)
     if len(values) != 3:
         raise UsageError(f"{option} takes three numbers with commas between.", f"Given: {words}.")

@@ -1,5 +1,6 @@
 """`rig calibrate check`: may the active calibrations be used, and do recordings agree with them?"""
 
+from datetime import UTC, datetime
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +16,7 @@ from rig.cli.options import (
     say_left_out,
 )
 from rig.output.console import JsonFlag, present
+from rig.output.table import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -86,8 +88,6 @@ def _check_records(
     config: Path | None, sim: bool, log: Path | None, store: Path | None, json: bool
 ) -> int:
     """Check the active records of a rig."""
-    from datetime import UTC, datetime
-
     from calibration.rules import judge, judge_raw
     from rig.configuration.chosen import choose_rig
 
@@ -185,7 +185,6 @@ def scale_lines(one: "Scale") -> list[str]:
 def zero_line(one: "ZeroMotion") -> str:
     """Return the motion of a zero in words."""
     from rig.calibrate.shown import with_unit
-    from rig.output.table import counted
 
     word = "ALARM" if one.is_wrong else "noted" if one.limit is None else "good"
     limit = "no limit" if one.limit is None else f"limit {with_unit(one.limit, one.unit)}"

@@ -1,11 +1,14 @@
 """`rig calibrate add | list | show | diff | use | diagnose`: the store of calibrations."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from estimation.files import write_text_atomic
 from rig.cli.options import LedgerOption, SeedOption
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, stages
 
 if TYPE_CHECKING:
@@ -46,7 +49,6 @@ def add(
     from calibration.linear import load_calibration_set
     from calibration.record import RawFile, Validity, record_of_line
     from rig import __version__
-    from rig.errors import UsageError
 
     lines = load_calibration_set(file).channels
     wanted = channel or sorted(lines)
@@ -102,9 +104,6 @@ def show(
     json: JsonFlag = False,
 ) -> None:
     """Show one record completely."""
-    from estimation.files import write_text_atomic
-    from rig.errors import UsageError
-
     found = _holding(record, store).get(record)
     said = [f"{name}: {value}" for name, value in _in_words(found).items()]
     if figure is not None:
@@ -201,14 +200,10 @@ def _holding(start: str, folder: Path | None) -> "CalibrationStore":
 
 
 def _now() -> str:
-    from datetime import UTC, datetime
-
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def _serials(words: list[str]) -> dict[str, str]:
-    from rig.errors import UsageError
-
     pairs = dict(word.split("=", 1) for word in words if "=" in word)
     if len(pairs) != len(words) or not all(k and v for k, v in pairs.items()):
         raise UsageError("A serial number is given as DEVICE=SERIAL.", f"Given: {words}.")

@@ -1,18 +1,19 @@
 """`rig campaigns`: find recordings again, open their diagnosis, compare them, diagnose again."""
 
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.campaigns_each import show_diagnoses, show_refit
 from rig.cli.options import SchedulerOption, WorkersOption, complete_campaign, complete_model
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, remarks, results
+from rig.output.table import TextTable
 
 if TYPE_CHECKING:
     from rig.campaigns.index import IndexedCampaign, IndexedRun
-    from rig.output.table import TextTable
 
 LONGEST = 40
 """Letters of a note or a list of conditions that a row shows."""
@@ -64,13 +65,14 @@ def campaigns(
     whole = _indexed(root, rebuild)
     named = _named(whole, terms or [], root) if diagnose or open_ or compare else []
     found = named or search.search(whole, terms or [])
-    if refit is not None:
-        show_refit(
-            [campaign for campaign in found if campaign.runs], root, refit, workers, scheduler, json
-        )
-        return
-    if diagnose and len(recorded := [campaign for campaign in found if campaign.runs]) > 1:
-        show_diagnoses(recorded, root, workers, scheduler, json)
+    recorded = [campaign for campaign in found if campaign.runs]
+    if refit is not None or (diagnose and len(recorded) > 1):
+        from rig.cli.campaigns_each import show_diagnoses, show_refit
+
+        if refit is not None:
+            show_refit(recorded, root, refit, workers, scheduler, json)
+        else:
+            show_diagnoses(recorded, root, workers, scheduler, json)
         return
     if diagnose:
         from rig.cli.diagnose import diagnose as diagnose_one
@@ -91,7 +93,6 @@ def _indexed(root: Path, rebuild: bool) -> "Sequence[IndexedCampaign]":
     """Return all campaigns of a folder, from the index; what is new there is read."""
     from rig.campaigns.index import campaigns as all_campaigns
     from rig.campaigns.index import default_index
-    from rig.errors import UsageError
 
     if not root.is_dir():
         raise UsageError(
@@ -133,8 +134,6 @@ def _only(found: Sequence["IndexedCampaign"]) -> "IndexedCampaign":
     Raises:
         UsageError: There is none, or there are several.
     """
-    from rig.errors import UsageError
-
     if len(found) == 1:
         return found[0]
     names = ", ".join(str(campaign.folder) for campaign in found[:5])
@@ -149,7 +148,6 @@ def _open(campaign: "IndexedCampaign") -> None:
     import webbrowser
 
     from rig.campaigns.index import DIAGNOSIS
-    from rig.errors import UsageError
 
     page = (campaign.folder / DIAGNOSIS).with_suffix(".html")
     if not page.is_file():
@@ -162,8 +160,6 @@ def _open(campaign: "IndexedCampaign") -> None:
 
 
 def _by_campaign(found: Sequence["IndexedCampaign"], root: Path) -> "TextTable":
-    from rig.output.table import TextTable
-
     rows = []
     for campaign in found:
         facts = _facts(campaign)
@@ -216,10 +212,6 @@ def _conditions(runs: Sequence["IndexedRun"]) -> str:
 
 
 def _by_run(found: Sequence["IndexedCampaign"], root: Path, most: int) -> "TextTable":
-    from itertools import islice
-
-    from rig.output.table import TextTable
-
     pairs = ((campaign, run) for campaign in found for run in campaign.runs)
     rows = [
         [
@@ -239,8 +231,6 @@ def _by_run(found: Sequence["IndexedCampaign"], root: Path, most: int) -> "TextT
 
 def _side_by_side(found: Sequence["IndexedCampaign"], root: Path) -> "TextTable":
     """Return campaigns as columns, with the errors of their diagnoses."""
-    from rig.output.table import TextTable
-
     facts = [_facts(campaign) for campaign in found]
     rows = [[name, *(one[name] for one in facts)] for name in (facts[0] if facts else ())]
     diagnoses = [campaign.diagnosis or {} for campaign in found]

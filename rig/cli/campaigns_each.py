@@ -3,19 +3,21 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from estimation.model_file import read, to_toml
+from rig.campaigns.drift import changes
+from rig.campaigns.index import IndexedCampaign
+from rig.diagnosis.engine import engine
+from rig.diagnosis.ledger import default_ledger
+from rig.diagnosis.refit import Refit, refit_all
 from rig.output.console import present, progress
-
-if TYPE_CHECKING:
-    from rig.campaigns.index import IndexedCampaign
-    from rig.diagnosis.refit import Refit
-    from rig.output.table import TextTable
-    from rig.reports.diagnosed import FolderDiagnosis
+from rig.output.table import TextTable
+from rig.reports.diagnosed import FolderDiagnosis, diagnose_all
 
 
 def show_diagnoses(
-    found: Sequence["IndexedCampaign"],
+    found: Sequence[IndexedCampaign],
     root: Path,
     workers: int,
     scheduler: str | None,
@@ -27,16 +29,12 @@ def show_diagnoses(
         LedgerError: The access log cannot be read or written.
         UsageError: No scheduler answers.
     """
-    from rig.diagnosis.engine import engine
-    from rig.diagnosis.ledger import default_ledger
-    from rig.reports.diagnosed import diagnose_all
-
     folders = [one.folder for one in reversed(found)]  # the newest come first
     new: list[Path] = []
     with progress() as bar:
         task = bar.add_task("campaigns", total=len(folders))
 
-        def count(folder: Path, _: "FolderDiagnosis") -> None:
+        def count(folder: Path, _: FolderDiagnosis) -> None:
             new.append(folder)
             bar.advance(task)
 
@@ -59,7 +57,7 @@ def show_diagnoses(
 
 
 def show_refit(
-    found: Sequence["IndexedCampaign"],
+    found: Sequence[IndexedCampaign],
     root: Path,
     model: str,
     workers: int,
@@ -72,10 +70,6 @@ def show_refit(
         UsageError: The model names an estimator, or no scheduler answers.
         ModelFileError: There is no such model.
     """
-    from estimation.model_file import read, to_toml
-    from rig.diagnosis.engine import engine
-    from rig.diagnosis.refit import refit_all
-
     declared = to_toml(read(Path(model)))
     dates = {one.folder: one.runs[0].date for one in reversed(found)}  # the newest come first
     with progress() as bar:
@@ -97,11 +91,9 @@ def show_refit(
 
 
 def _changes(
-    good: Mapping[Path, "Refit"], dates: Mapping[Path, str], root: Path
+    good: Mapping[Path, Refit], dates: Mapping[Path, str], root: Path
 ) -> dict[str, list[dict[str, Any]]]:
     """Return the changes of each parameter that has any."""
-    from rig.campaigns.drift import changes
-
     folders = list(good)
     found = {}
     for name in next(iter(good.values())).values if good else ():
@@ -120,10 +112,8 @@ def _changes(
 
 
 def _table(
-    good: Mapping[Path, "Refit"], moved: Mapping[str, Sequence[Mapping[str, Any]]]
-) -> "TextTable":
-    from rig.output.table import TextTable
-
+    good: Mapping[Path, Refit], moved: Mapping[str, Sequence[Mapping[str, Any]]]
+) -> TextTable:
     fits = list(good.values())
     rows = []
     for name, unit in fits[0].units.items():

@@ -1,12 +1,15 @@
 """`rig config`: is a configuration sound, and what does it come to."""
 
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from estimation.files import write_text_atomic
 from rig.cli.help import group
 from rig.cli.options import SimFlag, complete_config, config_names, require_new
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, emit_json, present
 
 config_app = group("config", "Begin, check and show a configuration.")
@@ -37,12 +40,8 @@ def init(
     Comments and units stand in it; what was measured on another rig (gains, limits) is to be looked
     at before anything moves.
     """
-    from difflib import get_close_matches
-
-    from estimation.files import write_text_atomic
     from rig.configuration.config import SHIPPED, load_config
     from rig.doctor.ports import serial_ports
-    from rig.errors import UsageError
 
     if like not in config_names():
         near = get_close_matches(like, config_names(), n=1)

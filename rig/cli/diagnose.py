@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from estimation.files import OutputError, check_output
 from rig.cli.options import (
     EquationOption,
     FormatOption,
@@ -62,7 +63,6 @@ def diagnose(
 
     from estimation import model_file
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
-    from estimation.files import check_output
     from rig.diagnosis.durations import default_durations, measured, work_of
     from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import Ledger, default_ledger
@@ -114,7 +114,6 @@ def _kept_with(path: Path) -> Path | None:
     """Return the file of a campaign's diagnosis in its folder; None where it cannot be kept."""
     from estimation.file_kinds import DIAGNOSIS as KIND
     from estimation.file_kinds import HTML
-    from estimation.files import OutputError, check_output
     from rig.campaigns.index import DIAGNOSIS
     from rig.output.console import remarks
 

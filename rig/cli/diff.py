@@ -14,6 +14,7 @@ from rig.cli.options import (
     say_left_out,
 )
 from rig.output.console import JsonFlag, present
+from rig.output.table import TextTable
 
 
 def diff(
@@ -37,7 +38,6 @@ def diff(
     from rig.diagnosis.compared import compared
     from rig.diagnosis.subject import subject
     from rig.output.console import progress
-    from rig.output.table import TextTable
     from rig.reports.changes import change_table, lines, prediction_table
 
     first = subject(a, model, balance, format_, machine)

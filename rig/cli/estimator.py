@@ -1,10 +1,13 @@
 """`rig adapt | export | estimator`: make an estimator fit elsewhere, write it as C, compare two."""
 
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from estimation.errors import nearest
+from estimation.files import write_text_atomic
 from rig.cli.help import group
 from rig.cli.options import (
     FormatOption,
@@ -14,11 +17,12 @@ from rig.cli.options import (
     require_new,
     say_left_out,
 )
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, emit_json, present, progress, show_result, to_json
+from rig.output.table import TextTable, to_page
 
 if TYPE_CHECKING:
     from rig.models.adapt import Adaptation
-    from rig.output.table import TextTable
 
 estimator_app = group("estimator", "Compare estimators.")
 
@@ -42,7 +46,6 @@ def compare(
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
     from rig.models.compared import compare as compared
-    from rig.output.table import to_page
     from rig.reports import compared as shown
 
     files, estimators = (first, second), (load(first), load(second))
@@ -80,7 +83,6 @@ def adapt(
 ) -> None:
     """Adapt an estimator with some runs and report its error on the runs not used."""
     from estimation.estimator import load
-    from estimation.files import write_text_atomic
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
     from rig.models.adapt import open_source, run_adaptation, runs_by_rule
@@ -117,10 +119,6 @@ def adapt(
 
 def _errors(result: "Adaptation") -> "TextTable":
     """Return the errors on the runs not used."""
-    from math import degrees
-
-    from rig.output.table import TextTable
-
     torque = result.target.endswith("_n_m")
     unit, scale = ("mN m", 1e3) if torque else ("deg", degrees(1.0))
     named = {
@@ -158,14 +156,11 @@ def export(
     A model's file states its machine: units, ratios and derived channels follow from it.
     """
     from estimation import model_file
-    from estimation.errors import nearest
     from estimation.estimator import load
     from estimation.estimators.bank import BankEstimator
     from estimation.estimators.c_header import header
     from estimation.estimators.model import ModelEstimator
     from estimation.estimators.network import NetworkEstimator
-    from estimation.files import write_text_atomic
-    from rig.errors import UsageError
 
     estimator = load(model)
     if equation is not None and model.suffix == ".toml":

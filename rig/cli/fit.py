@@ -1,11 +1,14 @@
 """`rig fit`: fit a declared model on a campaign."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from estimation.channels import unit_of
 from rig.cli.options import (
     FormatOption,
     MachineOption,
@@ -17,7 +20,9 @@ from rig.cli.options import (
     require_new,
     say_left_out,
 )
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, progress
+from rig.output.table import TextTable
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -59,7 +64,6 @@ def _learner(kind: str, target: str, surrogate: str, live: bool, seed: int) -> L
     from estimation.estimators.held_out import held_out_score
     from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
     from estimation.networks.training import Settings
-    from rig.errors import UsageError
 
     if kind == "network":
         inputs, settings = (*STATE_INPUTS, surrogate), Settings(nodes=STATE_NODES, seed=seed)
@@ -82,7 +86,6 @@ def _learn(
     learner: Learner, campaign: "Campaign", folds: int, seed: int, out: Path | None, json_: bool
 ) -> None:
     """Fit an estimator, and report its error on runs left out."""
-    from estimation.channels import unit_of
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.models.origins import with_origin
     from rig.reports.diagnosis_words import display
@@ -152,7 +155,6 @@ def fit(
     """
     from estimation import model_file
     from rig.machines.recordings import open_recordings
-    from rig.output.table import TextTable
     from rig.reports.fit import held_out_sentence, parameter_table
 
     require_new(out)
@@ -214,9 +216,6 @@ def declared_models(model: str | None, machine: Path | None) -> "list[Model]":
 
 def _dated(model: "Model") -> "Model":
     """Return a fitted model with the time of its fit."""
-    from dataclasses import replace
-    from datetime import UTC, datetime
-
     assert model.evidence is not None  # noqa: S101  a fit sets its evidence
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return replace(model, evidence=replace(model.evidence, made_at=now))

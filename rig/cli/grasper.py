@@ -8,6 +8,7 @@ import typer
 from rig.cli.help import group
 from rig.cli.options import ConfigOption, SeedOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, present, progress, remarks
+from rig.output.table import TextTable
 
 grasper_app = group(
     "grasper", "The 3-DOF grasper: possible designs, its master, recordings of the simulated one."
@@ -19,7 +20,6 @@ def designs(json: JsonFlag = False) -> None:
     """List every combination of Table 1 of Zhao and Nelson 2016, the most compact one marked."""
     from rig.grasper.wrist import designs as every
     from rig.grasper.wrist import most_compact
-    from rig.output.table import TextTable
 
     found = every()
     best = most_compact(found)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.options import ConfigOption, LiveModel, SimFlag, chosen_rig
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, results
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ def grip(
     """
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
-    from rig.errors import UsageError
     from rig.live.estimator import ModelEstimator
     from rig.live.grip import SHARE, hold_grip
     from rig.protocols.trajectory import SAMPLE_RATE_HZ

@@ -5,14 +5,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from estimation.files import write_text_atomic
 from rig.cli.options import complete_machine, machine_names
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, remarks
+from rig.output.table import TextTable, listed
 
 if TYPE_CHECKING:
     from estimation.recording import Recording
     from rig.importers.table.mapping import Mapping
     from rig.importers.table.preview import Preview
-    from rig.output.table import TextTable
 
 MOST_RUNS = 12
 """Runs listed on the screen; more are counted."""
@@ -73,7 +75,6 @@ def import_(
     The mapping is `[data]` of a machine file or options of this command, which come first. Nothing
     is guessed: a column without a unit is in the SI unit that the channel's name ends in.
     """
-    from rig.errors import UsageError
     from rig.importers.table.mapping import read_mapping
     from rig.importers.table.open import read_runs
     from rig.importers.table.preview import preview as look
@@ -111,8 +112,6 @@ def _flags(
     columns: list[str], conditions: list[str], runs: list[str], others: list[str]
 ) -> list[tuple[tuple[str, ...], Any, str]]:
     """Return the options as entries of a mapping, each with the words that state it."""
-    from rig.errors import UsageError
-
     found: list[tuple[tuple[str, ...], Any, str]] = []
     for option, part, words in (
         ("--column", "columns", columns),
@@ -145,7 +144,6 @@ def _rule(name: str, value: str) -> Any:
 
 def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
     """Write the runs as logs, all or none."""
-    from rig.errors import UsageError
     from rig.importers.derivatives import checked
     from rig.log.convert import write_recording
 
@@ -163,7 +161,6 @@ def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
 
 def _draw(recordings: "list[Recording]", plots: Path) -> None:
     from estimation.campaign import Campaign
-    from estimation.files import write_text_atomic
     from rig.output.provenance import Provenance
     from rig.reports.recordings import page
 
@@ -171,8 +168,6 @@ def _draw(recordings: "list[Recording]", plots: Path) -> None:
 
 
 def _tables(found: "Preview", mapping: "Mapping") -> "list[TextTable]":
-    from rig.output.table import TextTable, listed
-
     runs = [
         (
             run.name,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.options import ConfigOption, LiveModel, PlainFlag, SimFlag, chosen_rig
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, remarks, results
 
 if TYPE_CHECKING:
@@ -63,7 +64,6 @@ def live(
 
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
-    from rig.errors import UsageError
     from rig.live.block import Sink, through
     from rig.live.estimator import estimators_of, half_widths, shown_channels
     from rig.live.keys import OF_SESSION, display_keys, no_keys

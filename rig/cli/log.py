@@ -1,6 +1,7 @@
 """`rig log`: what is in a log, is it whole, repair it, export it."""
 
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,13 +10,14 @@ import typer
 from rig.cli.help import group
 from rig.cli.log_export import export
 from rig.cli.options import say_left_out
+from rig.errors import ExitCode, UsageError
 from rig.output.console import JsonFlag, present, remarks
+from rig.output.table import TextTable, counted, listed
 
 if TYPE_CHECKING:
     from rig.log.check import LogReport
     from rig.log.reader import LogFile
     from rig.log.repair import RepairReport
-    from rig.output.table import TextTable
 
 log_app = group("log", "Inspect, check, repair and export logs.")
 
@@ -57,7 +59,6 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     recorded again, and logs that were repaired, are listed and not counted. Exit code 0 if
     complete, 1 if samples or runs are missing, 5 if a file is damaged.
     """
-    from rig.errors import ExitCode
     from rig.log.attempts import standing
     from rig.log.check import check_log
 
@@ -138,7 +139,6 @@ log_app.command()(export)
 
 def _logs(path: Path) -> list[Path]:
     """Return the logs at a path, at least one."""
-    from rig.errors import UsageError
     from rig.log.check import logs_in
 
     found = logs_in(path)
@@ -187,8 +187,6 @@ def _described(log: "LogFile") -> dict[str, Any]:
 
 def _info_of(log: dict[str, Any]) -> "Iterator[str | TextTable]":
     """Yield the result of `info` for a log, for people."""
-    from rig.output.table import TextTable, listed
-
     run, end = log["run"], log["end"]
     yield f"{log['path']}: {'; '.join(log['problems']) or 'complete, nothing lost'}"
     yield f"  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}"
@@ -231,7 +229,6 @@ def _is_of_another_format(path: Path) -> bool:
 def _show_runs(path: Path, json: bool) -> None:
     """Show each run's conditions, length, rate, flags and exclusion, and the channels."""
     from rig.importers.registry import open_campaign
-    from rig.output.table import counted, listed
 
     campaign = open_campaign(path)
     say_left_out(path, campaign)
@@ -267,8 +264,6 @@ def _described_run(recording: Any) -> dict[str, Any]:
 
 
 def _date(started_at_ns: int | None) -> str:
-    from datetime import UTC, datetime
-
     if started_at_ns is None:
         return "at an unknown time"
     return datetime.fromtimestamp(started_at_ns * 1e-9, UTC).isoformat(timespec="seconds")

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from rig.cli.options import say_left_out
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, remarks
+from rig.output.table import counted
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
@@ -56,7 +58,6 @@ def export(
     the estimate next to the sensor are written into a folder, for Foxglove and PlotJuggler.
     """
     from rig.cli.import_ import write_logs
-    from rig.errors import UsageError
     from rig.log.export import ExportFormat, export_log
 
     if model or path.is_dir() or not path.name.endswith((".mcap", ".part")):
@@ -88,8 +89,6 @@ def _campaign(path: Path, model: Path | None) -> "Campaign":
 
 
 def _said(written: list[Path], campaign: "Campaign", json: bool) -> None:
-    from rig.output.table import counted
-
     where = written[0] if len(written) == 1 else written[0].parent
     data = {"written": written, "runs": campaign.names}
     present(json, data, f"wrote {where}: {counted(len(campaign), 'run')}")
@@ -115,8 +114,6 @@ def _known(name: str, what: str, formats: type[Format]) -> Format:
     Raises:
         UsageError: There is none.
     """
-    from rig.errors import UsageError
-
     names = [one.value for one in formats]
     if name not in names:
         fix = f"Choose one of {', '.join(names)}."

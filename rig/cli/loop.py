@@ -14,6 +14,7 @@ from rig.cli.options import (
     SimulationSeed,
     WorkersOption,
 )
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, progress, remarks, results
 
 if TYPE_CHECKING:
@@ -51,7 +52,6 @@ def loop(
     from rig.diagnosis.engine import engine
     from rig.diagnosis.loop import Budget, Round, run_loop
     from rig.diagnosis.subject import declared_models
-    from rig.errors import UsageError
     from rig.protocols.protocol import load_protocol
     from rig.simulation.hidden import chosen
 

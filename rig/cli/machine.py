@@ -7,6 +7,7 @@ import typer
 
 from rig.cli.help import group
 from rig.cli.options import FormatOption, complete_machine, machine_names, require_new
+from rig.errors import ExitCode
 from rig.output.console import JsonFlag, present
 
 if TYPE_CHECKING:
@@ -55,7 +56,6 @@ def check(
     contradict the file, or where nothing can be identified.
     """
     from estimation.plant_check import check as check_plant
-    from rig.errors import ExitCode
     from rig.machines.recordings import open_recordings
     from rig.machines.shipped import read_machine
 

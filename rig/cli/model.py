@@ -1,12 +1,15 @@
 """`rig model`: which model estimates for a rig, and the choice of another one."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from estimation.channels import unit_of
 from rig.cli.help import group
 from rig.cli.options import ConfigOption, SimFlag, complete_fitted
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, present
 
 if TYPE_CHECKING:
@@ -63,7 +66,6 @@ def use(
     of this rig. --model of a command goes before it.
     """
     from rig.configuration.chosen import choose_rig
-    from rig.errors import UsageError
 
     settings = choose_rig(config, sim)
     file = Path(model)
@@ -88,8 +90,6 @@ def reset(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fa
 
 def _choose(settings: "Config", source: Path | None, json: bool) -> None:
     """Choose, and print what is in use now and what it replaced."""
-    from datetime import UTC, datetime
-
     from rig.configuration.model_in_use import choose
     from rig.live.estimator import estimators_of
 
@@ -106,7 +106,6 @@ def _choose(settings: "Config", source: Path | None, json: bool) -> None:
 
 def _described(path: Path) -> str:
     """Return the channels of a model and their intervals, in a sentence."""
-    from estimation.channels import unit_of
     from rig.live.estimator import estimators_of
 
     parts = []

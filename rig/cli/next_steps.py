@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from rig.errors import KNOWN_ERRORS
+
 if TYPE_CHECKING:
     from rig.campaigns.index import IndexedCampaign
 
@@ -36,7 +38,6 @@ def of_the_rig() -> Iterator[Step]:
         yield "With a board plugged in:", "rig config init"
         return
     from rig.configuration.config import load_config
-    from rig.errors import KNOWN_ERRORS
 
     try:
         settings = load_config(config)

@@ -8,6 +8,7 @@ import typer
 
 import estimation
 import rig
+from rig.errors import UsageError
 from rig.output.console import remarks
 
 if TYPE_CHECKING:
@@ -184,8 +185,6 @@ def require_new(path: Path | None) -> None:
     Raises:
         UsageError: Something is there.
     """
-    from rig.errors import UsageError
-
     if path is not None and path.exists():
         raise UsageError(f"{path} is there already.", fix="Name another file.")
 

@@ -15,7 +15,9 @@ from rig.cli.options import (
     complete_protocol,
     protocol_names,
 )
+from rig.errors import KNOWN_ERRORS, UsageError
 from rig.output.console import JsonFlag, present, progress, remarks
+from rig.output.table import counted
 
 if TYPE_CHECKING:
     from rig.configuration.config import Config
@@ -55,9 +57,7 @@ def record(
     """
     from calibration.rules import refuse_errors
     from rig.configuration.check import refuse_problems
-    from rig.errors import UsageError
     from rig.machines.choose import machine_of
-    from rig.output.table import counted
     from rig.protocols.protocol import load_protocol
     from rig.recording.campaign import open_campaign_folder, read_manifest
     from rig.recording.watch import watch_runs
@@ -105,7 +105,6 @@ def _recorded(
     """Record the runs and show how they go; state how to go on if not all are."""
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
-    from rig.errors import KNOWN_ERRORS
     from rig.recording.campaign import record_campaign
 
     screen = remarks()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.options import FormatOption, MachineOption, PlainFlag, ReplayModel
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, remarks, results
 
 if TYPE_CHECKING:
@@ -56,7 +57,6 @@ def replay(
     """
     if core:
         return _core(log, config, json_)
-    from rig.errors import UsageError
     from rig.live.block import through
     from rig.live.estimator import half_widths, shown_channels
     from rig.live.keys import display_keys

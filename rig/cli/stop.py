@@ -5,6 +5,7 @@ from typing import Any
 
 from rig.bench.holding import Ending
 from rig.cli.options import ConfigOption, SimFlag, announced, chosen_rig
+from rig.errors import ExitCode, RigError, UsageError
 from rig.output.console import JsonFlag, present, remarks, results
 
 
@@ -19,7 +20,6 @@ def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fal
     """
     from rig.configuration.chosen import ONE_OF, choose_config, configured_rigs
     from rig.configuration.config import load_config
-    from rig.errors import ExitCode, UsageError
 
     if config is not None:
         load_config(config)  # a slip in what was typed is said before anything is tried
@@ -42,7 +42,6 @@ def _stopped(path: Path, json: bool) -> dict[str, Any]:
     from drivers.teensy.driver import TeensyLogger
     from rig.bench.logger import open_logger
     from rig.configuration.config import load_config
-    from rig.errors import RigError
     from rig.machines.choose import machine_of
 
     name, ending = str(path), None

@@ -1,11 +1,14 @@
 """`rig view`: recordings as one page in a browser."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from estimation.errors import EstimationError
+from estimation.files import write_text_atomic
 from rig.cli.options import (
     FormatOption,
     MachineOption,
@@ -14,7 +17,9 @@ from rig.cli.options import (
     complete_recordings,
     say_left_out,
 )
+from rig.errors import DataError, UsageError
 from rig.output.console import JsonFlag, present, remarks
+from rig.output.table import counted
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -50,10 +55,8 @@ def view(
     """
     import webbrowser
 
-    from estimation.files import write_text_atomic
     from rig.machines.recordings import open_recordings
     from rig.output.provenance import Provenance
-    from rig.output.table import counted
     from rig.reports.recordings import page
 
     whole = open_recordings(path, machine, format_, skip_bad)
@@ -77,8 +80,6 @@ def chosen_runs(campaign: "Campaign", names: list[str]) -> "Campaign":
         DataError: The campaign has no runs.
         UsageError: It has no run of that name.
     """
-    from rig.errors import DataError, UsageError
-
     if not len(campaign):
         raise DataError("The recordings hold no runs.", "There is nothing to show.")
     for name in names:
@@ -102,10 +103,7 @@ def with_model(campaign: "Campaign", model: Path | None) -> "Campaign":
     Raises:
         EstimationError: The named model cannot estimate a recording.
     """
-    from dataclasses import replace
-
     from estimation.campaign import Campaign, Run
-    from estimation.errors import EstimationError
     from estimation.recording import Recording
     from rig.configuration.model_in_use import model_in_use
     from rig.live.estimator import with_estimates
