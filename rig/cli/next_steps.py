@@ -2,14 +2,16 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
+from calibration.errors import CalibrationError
+from calibration.store import CalibrationStore, default_folder
+from rig.campaigns.index import IndexedCampaign, campaigns, default_index
+from rig.campaigns.search import families, verdict
+from rig.configuration.chosen import default_config
+from rig.configuration.config import load_config
 from rig.errors import KNOWN_ERRORS
-
-if TYPE_CHECKING:
-    from rig.campaigns.index import IndexedCampaign
 
 RECORDINGS = Path("logs")
 
@@ -19,8 +21,6 @@ Step = tuple[str, str]
 
 def show_next_steps() -> None:
     """Print the state of what is here, what to type next, and where all commands are listed."""
-    from rig.configuration.chosen import default_config
-
     sim = " --sim" if default_config() is None else ""
     record = f"rig record{sim} --protocol diagnosis"
     for state, command in (*of_the_rig(), *of_recordings(RECORDINGS, record)):
@@ -30,14 +30,11 @@ def show_next_steps() -> None:
 
 def of_the_rig() -> Iterator[Step]:
     """Yield the state of the configured rig and of its calibrations."""
-    from rig.configuration.chosen import default_config
-
     config = default_config()
     if config is None:
         yield "No rig is configured. Without hardware:", "rig demo"
         yield "With a board plugged in:", "rig config init"
         return
-    from rig.configuration.config import load_config
 
     try:
         settings = load_config(config)
@@ -52,9 +49,6 @@ def of_the_rig() -> Iterator[Step]:
 
 
 def _of_calibrations() -> Iterator[Step]:
-    from calibration.errors import CalibrationError
-    from calibration.store import CalibrationStore, default_folder
-
     try:
         active = CalibrationStore(default_folder()).active()
     except (CalibrationError, OSError):
@@ -73,8 +67,6 @@ def of_recordings(root: Path, record: str) -> Iterator[Step]:
         root: Folder of the campaigns.
         record: Command that records one.
     """
-    from rig.campaigns.index import campaigns, default_index
-
     try:
         found = campaigns(root, default_index(root)) if root.is_dir() else []
     except OSError as error:
@@ -88,9 +80,7 @@ def of_recordings(root: Path, record: str) -> Iterator[Step]:
     yield _of_campaign(recorded[0]) if recorded else ("They are all calibrations.", record)
 
 
-def _of_campaign(newest: "IndexedCampaign") -> Step:
-    from rig.campaigns.search import families, verdict
-
+def _of_campaign(newest: IndexedCampaign) -> Step:
     folder = newest.folder
     broken = [run for run in newest.runs if run.state != "complete" or run.lost]
     if broken:
