@@ -73,18 +73,6 @@ def test_help_has_a_short_option_too(words, capsys):
     assert "..." not in short.replace("COMMAND [ARGS]...", "")
 
 
-def test_the_help_names_what_is_shipped_and_the_default(capsys):
-    main(["record", "-h"])
-    shown = " ".join(capsys.readouterr().out.split())
-    assert (
-        "one of diagnosis, grasper, grasper_fit, quick, reference, still, thorough, unloaded"
-        in shown
-    )
-    assert "If none: diagnosis" in shown
-    main(["fit", "-h"])
-    assert "cable, gearbox, grip" in " ".join(capsys.readouterr().out.split())
-
-
 @pytest.mark.parametrize(
     ("words", "wanted"),
     [
