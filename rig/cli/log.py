@@ -12,7 +12,7 @@ from rig.cli.log_export import export
 from rig.cli.options import say_left_out
 from rig.errors import ExitCode, UsageError
 from rig.output.console import JsonFlag, present, remarks
-from rig.output.table import TextTable, counted, listed
+from rig.output.table import counted, listed
 
 if TYPE_CHECKING:
     from rig.log.check import LogReport
@@ -185,7 +185,7 @@ def _described(log: "LogFile") -> dict[str, Any]:
     }
 
 
-def _info_of(log: dict[str, Any]) -> "Iterator[str | TextTable]":
+def _info_of(log: dict[str, Any]) -> Iterator[str]:
     """Yield the result of `info` for a log, for people."""
     run, end = log["run"], log["end"]
     yield f"{log['path']}: {'; '.join(log['problems']) or 'complete, nothing lost'}"
@@ -197,17 +197,10 @@ def _info_of(log: dict[str, Any]) -> "Iterator[str | TextTable]":
         yield f"  excluded: {excluded}" if excluded else "  counts as evidence"
     state = "not closed" if end is None else "clean" if end.clean else f"not clean: {end.reason}"
     yield f"  end {state}{'; the file is damaged' if log['damaged'] else ''}"
-    rows = [
-        [
-            topic["topic"],
-            str(topic["messages"]),
-            f"{topic['duration_s']:.3f}",
-            f"{topic['rate_hz']:.2f}" if topic["rate_hz"] else "-",
-            ", ".join(topic["fields"]),
-        ]
-        for topic in log["topics"]
-    ]
-    yield TextTable("", ["topic", "messages", "s", "Hz", "fields"], rows)
+    for topic in log["topics"]:
+        rate = f", {topic['rate_hz']:.2f} Hz" if topic["rate_hz"] else ""
+        length = f"{topic['messages']} messages in {topic['duration_s']:.3f} s{rate}"
+        yield f"  {topic['topic']}: {length}: {', '.join(topic['fields'])}"
     for mark in log["marks"]:
         yield f"  mark at {mark.time_s:.3f} s: {mark.text}"
     for name, size in log["attachments"].items():
