@@ -88,7 +88,7 @@ PAGES = (
     Page(
         "archive",
         "python -m benchmarks.archive --out docs/results/archive.md",
-        "benchmarks/archive.py rig/campaigns rig/diagnosis/each.py rig/diagnosis/refit.py"
+        "benchmarks/archive.py rig/campaigns rig/diagnosis/work.py rig/diagnosis/refit.py"
         " rig/reports/diagnosed.py",
         30,
     ),
@@ -196,7 +196,7 @@ PAGES = (
         "wrench",
         "rig study wrench --seeds 2 --state {state} --out docs/results/wrench.md"
         " --figures docs/figures",
-        f"rig/studies/pique {_ARM}",
+        f"rig/studies/wrench {_ARM}",
         30,
     ),
     Page(

@@ -6,16 +6,15 @@ fitted again together with every candidate.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.arm.base import base_of, closed_base_of
-from estimation.arm.closed_chain import FRICTION, ClosedChain, closed_regressor, parameter_names
+from estimation.arm.base import base_of
 from estimation.arm.motion import LOW_PASS, JointNames, Motion, joint_names
-from estimation.arm.regressor import SIGN_WIDTH, regressor
-from estimation.arm.regressor import names as serial_names
+from estimation.arm.regressor import FRICTION, regressor, sign_width
+from estimation.arm.regressor import names as parameters
 from estimation.arm.tables import PSM, Arm
 from estimation.effects import effect
 from estimation.model import Model, Term
@@ -71,78 +70,67 @@ def balances_of(recording: Recording) -> ArmBalances | None:
     for arm in ARMS:
         kinds = [joint.kind == "prismatic" for joint in arm.joints]
         if prismatic[: len(kinds)] == kinds:
-            return serial(arm, recording)
+            return equations(arm, joint_names(recording))
     return None
 
 
-def serial(arm: Arm, recording: Recording) -> ArmBalances:
-    """Return the torque equations of a serial arm.
+def declared_arm(models: Sequence[Model], recordings: Sequence[Recording]) -> ArmBalances | None:
+    """Return the equations of the arm whose joints are declared; None where none is, or no run."""
+    of_joints = any(model.balance.startswith("joint.") for model in models)
+    return balances_of(recordings[0]) if of_joints and recordings else None
+
+
+def equations(arm: Arm, names: Sequence[JointNames]) -> ArmBalances:
+    """Return the torque equations of an arm's joints.
+
+    Of a hydraulic arm the first bodies are those of the actuated joints: their frictions belong to
+    the joints, those of the loops' bodies are shared.
 
     Args:
         arm: The arm.
-        recording: Any of its recordings, for the channels' names.
+        names: Channels of a recording's joints; others, such as a gripper's, may follow.
     """
-    names, base = joint_names(recording), base_of(arm)
-    shared = np.array([not serial_names(arm)[k].startswith(OWN) for k in base.columns])
+    base, joints = base_of(arm), names[: len(arm.joints)]
+    frictions = tuple(f"{kind}{joint.number}" for kind in FRICTION for joint in joints)
+    own = frictions if arm.hydraulic else OWN
+    shared = np.array([not parameters(arm)[k].startswith(own) for k in base.columns])
 
     def columns(motion: Motion) -> FloatArray:
         return regressor(arm, motion)[:, :, base.columns]
 
-    changes = _changes(columns, shared, len(arm.joints))
+    changes = _changes(columns, shared, len(joints))
     models = []
-    for k, joint in enumerate(arm.joints):
-        own = names[k]
-        terms = _of_every_joint(own, changes[k])
+    for k, (joint, own_names) in enumerate(zip(arm.joints, joints, strict=True)):
+        terms = _of_every_joint(own_names, changes[k])
         if joint.spring:
-            terms.append(Term(effect("spring.position"), channels={"position": own.position}))
+            terms.append(Term(effect("spring.position"), channels={"position": own_names.position}))
         terms += [
             Term(effect("friction.viscous"), channels={"speed": names[other].velocity})
             for row, other in arm.viscous_pairs
             if row == k
         ]
-        models.append(_model(own, terms, f"{arm.name}; {arm.source}"))
+        models.append(
+            Model(
+                name=f"joint {own_names.number}",
+                balance=f"joint.{own_names.number}",
+                target=own_names.torque,
+                terms=(*terms, Term(effect("sensor.offset"))),
+                description=f"{arm.name}; {arm.source}",
+                low_pass=LOW_PASS,
+                run_offsets=not arm.hydraulic,
+            )
+        )
     count = len(arm.wrist_coupling)
     coupled = arm.wrist is not None and len(names) >= arm.wrist + count
     return ArmBalances(
         arm.name,
         tuple(models),
-        tuple(names[: len(arm.joints)]),
+        tuple(joints),
         columns,
         shared,
-        SIGN_WIDTH * np.array([joint.speed for joint in arm.joints]),
+        sign_width(arm),
         motors=np.linalg.inv(np.array(arm.wrist_coupling)) if coupled else None,
         wrist=arm.wrist or 0,
-    )
-
-
-def closed(chain: ClosedChain, sign_rad_s: float) -> ArmBalances:
-    """Return the torque equations of a pressure-driven arm with closed loops.
-
-    Its first bodies are those of the actuated joints: their frictions belong to the joints, those
-    of the loops' bodies are shared. Pressures have a true zero, so runs have no separate offsets.
-
-    Args:
-        chain: The arm.
-        sign_rad_s: Speed over which Coulomb friction changes sign.
-    """
-    names = tuple(JointNames(k + 1, prismatic=False) for k in range(chain.closure.shape[1]))
-    own = {f"{kind}{joint.number}" for kind in FRICTION for joint in names}
-    base = closed_base_of(chain, sign_rad_s)
-    shared = np.array([parameter_names(chain)[k] not in own for k in base.columns])
-
-    def columns(motion: Motion) -> FloatArray:
-        return closed_regressor(chain, motion, sign_rad_s)[:, :, base.columns]
-
-    changes = _changes(columns, shared, len(names))
-    models = [
-        replace(
-            _model(joint, _of_every_joint(joint, count), f"{chain.name}; {chain.source}"),
-            run_offsets=False,
-        )
-        for joint, count in zip(names, changes, strict=True)
-    ]
-    return ArmBalances(
-        chain.name, tuple(models), names, columns, shared, np.full(len(names), sign_rad_s)
     )
 
 
@@ -165,14 +153,3 @@ def _changes(columns: Columns, shared: NDArray[np.bool_], joints: int) -> list[i
     table = columns(Motion(position, velocity, acceleration, 1.0))[:, :, shared]
     ranks = [int(np.linalg.matrix_rank(table[:, k])) for k in range(joints)]
     return [min(CORRECTIONS, max(rank - 1, 0)) for rank in ranks]
-
-
-def _model(own: JointNames, terms: Sequence[Term], description: str) -> Model:
-    return Model(
-        name=f"joint {own.number}",
-        balance=f"joint.{own.number}",
-        target=own.torque,
-        terms=(*terms, Term(effect("sensor.offset"))),
-        description=description,
-        low_pass=LOW_PASS,
-    )

@@ -10,7 +10,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.arm.closed_chain import ClosedChain, closed_regressor, parameter_names
 from estimation.arm.motion import Motion
 from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import Arm
@@ -58,32 +57,7 @@ def base_of(arm: Arm, seed: int = 0) -> Base:
         acceleration=10 * rng.uniform(-speed, speed, shape),
         period_s=1.0,
     )
-    stacked = np.concatenate(list(regressor(arm, motion).transpose(1, 0, 2)))
-    return _base(stacked, names(arm))
-
-
-@lru_cache(maxsize=8)
-def closed_base_of(chain: ClosedChain, sign_rad_s: float, seed: int = 0) -> Base:
-    """Find the base parameters of an arm with closed loops, as `base_of` does.
-
-    Args:
-        chain: The arm; its table states no speeds, so random motions of 1 rad/s are taken.
-        sign_rad_s: Speed over which Coulomb friction changes sign.
-        seed: Seed of the motions.
-    """
-    rng, reach = np.random.default_rng(seed), np.array(chain.reach)
-    shape = (SAMPLES, len(reach))
-    motion = Motion(
-        position=rng.uniform(-reach, reach, shape),
-        velocity=rng.uniform(-1, 1, shape),
-        acceleration=10 * rng.uniform(-1, 1, shape),
-        period_s=1.0,
-    )
-    columns = closed_regressor(chain, motion, sign_rad_s)
-    return _base(np.concatenate(list(columns.transpose(1, 0, 2))), parameter_names(chain))
-
-
-def _base(stacked: FloatArray, all_names: tuple[str, ...]) -> Base:
+    stacked, all_names = np.concatenate(list(regressor(arm, motion).transpose(1, 0, 2))), names(arm)
     norms = np.linalg.norm(stacked, axis=0)
     order = np.array(sorted(range(len(all_names)), key=lambda k: _rank(all_names[k])))
     norms = np.where(norms > DEPENDENT * norms.max(), norms, np.inf)  # others act on no joint

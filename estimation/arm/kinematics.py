@@ -33,17 +33,20 @@ def pinocchio() -> Any:
 
 @lru_cache(maxsize=8)
 def built(arm: Arm) -> Any:
-    """Return the arm as a `pinocchio.Model`: massless links, a frame called `tip`, gravity set."""
+    """Return the arm as a `pinocchio.Model`: massless links, a frame called `tip`, gravity set.
+
+    Its joints are those of all bodies; `Arm.closure` gives their positions.
+    """
     pin = pinocchio()
     model = pin.Model()
     model.name = arm.name
     model.gravity = pin.Motion(np.array(arm.gravity_m_s2), np.zeros(3))
-    parent = 0
-    for joint in arm.joints:
-        moves = pin.JointModelRZ() if joint.kind == "revolute" else pin.JointModelPZ()
-        parent = model.addJoint(parent, moves, _placement(pin, joint.row), joint.name)
-        model.appendBodyToJoint(parent, pin.Inertia.Zero(), pin.SE3.Identity())
-    model.addFrame(pin.Frame(TIP, parent, 0, _placement(pin, arm.tip), pin.FrameType.OP_FRAME))
+    for body in arm.bodies:
+        moves = pin.JointModelPZ() if body.prismatic else pin.JointModelRZ()
+        joint = model.addJoint(body.parent, moves, _placement(pin, body.row), body.name)
+        model.appendBodyToJoint(joint, pin.Inertia.Zero(), pin.SE3.Identity())
+    last, placement = arm.tip_body or len(arm.joints), _placement(pin, arm.tip)
+    model.addFrame(pin.Frame(TIP, last, 0, placement, pin.FrameType.OP_FRAME))
     return model
 
 
@@ -68,7 +71,8 @@ def tip_pose(arm: Arm, position: FloatArray) -> FloatArray:
     """
     pin, model = pinocchio(), built(arm)
     data = model.createData()
-    pin.framesForwardKinematics(model, data, _checked(arm, position))
+    q = _checked(arm, position)
+    pin.framesForwardKinematics(model, data, arm.closure @ q if arm.loops else q)
     pose: FloatArray = data.oMf[model.getFrameId(TIP)].homogeneous
     return pose
 

@@ -137,3 +137,33 @@ def motion_of(position: FloatArray, period_s: float, low_pass: LowPass = LOW_PAS
     smooth = zero_phase(position, 1 / period_s, low_pass)
     velocity = np.gradient(smooth, period_s, axis=0)
     return Motion(smooth, velocity, np.gradient(velocity, period_s, axis=0), period_s)
+
+
+def periodic_motion(position: FloatArray, period_s: float, highest_hz: float) -> Motion:
+    """Return a whole number of periods, differentiated in the frequency domain.
+
+    As E. del Sol et al. 2014 do it: bin k of a transform over P samples is multiplied by
+    j 2 pi k f_s / P, k counting negative frequencies in the upper half. The paper's printed factor
+    lacks the imaginary unit.
+
+    Args:
+        position: Shape (n, joints): whole periods, the last sample one before the first again.
+        period_s: Sample period, s.
+        highest_hz: Frequencies above it are left out, on all three alike, Hz.
+
+    Raises:
+        ArmError: Too few samples, or the frequency is not within half the sample rate.
+    """
+    if len(position) < 4 or not 0 < highest_hz <= 0.5 / period_s:
+        raise ArmError(
+            f"{len(position)} samples cannot be differentiated up to {highest_hz:g} Hz.",
+            f"At {1 / period_s:g} samples a second, frequencies reach {0.5 / period_s:g} Hz.",
+        )
+    frequency_hz = np.fft.rfftfreq(len(position), period_s)
+    pulse = 2j * np.pi * frequency_hz[:, None]
+    spectrum = np.fft.rfft(position, axis=0)
+    spectrum[frequency_hz > highest_hz] = 0
+    smooth, velocity, acceleration = (
+        np.fft.irfft(spectrum * pulse**k, len(position), axis=0) for k in range(3)
+    )
+    return Motion(smooth, velocity, acceleration, period_s)

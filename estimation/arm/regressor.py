@@ -1,7 +1,8 @@
 """Regressor of an arm: its joint torques as columns times parameters, tau = Y delta.
 
 Links (parameters about the joint's origin: mass, first moments, inertia); then springs, viscous and
-Coulomb friction, drive inertia and offsets (equation 2.5 of G. A. Piqué's thesis, 2018).
+Coulomb friction, drive inertia and offsets (equation 2.5 of G. A. Piqué's thesis, 2018). Of a
+hydraulic arm the links and two frictions of every body (E. del Sol et al. 2014, equations 4 to 7).
 """
 
 from functools import lru_cache
@@ -15,6 +16,9 @@ from estimation.arm.recursion import COUNTING, LINK, Tree, fill_links
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
 
+FRICTION = ("fc", "fv")
+"""Coulomb and viscous friction of a body of a hydraulic arm."""
+
 SIGN_WIDTH = 0.005
 """Share of a joint's top speed over which Coulomb friction changes sign: tanh(velocity / width)."""
 
@@ -22,8 +26,13 @@ SIGN_WIDTH = 0.005
 def names(arm: Arm) -> tuple[str, ...]:
     """Return the names of the columns of `regressor`; numbers count joints from 1."""
     own = [
-        f"{parameter}{body.label}" for body in arm.bodies for parameter in LINK[COUNTING[body.link]]
+        f"{parameter}{body.label or number}"
+        for number, body in enumerate(arm.bodies, start=1)
+        for parameter in LINK[COUNTING[body.link]]
     ]
+    if arm.hydraulic:
+        every = range(1, len(arm.bodies) + 1)
+        return (*own, *(f"{name}{k}" for name in FRICTION for k in every))
     own += [f"Ke{k + 1}" for k, joint in enumerate(arm.joints) if joint.spring]
     every = range(1, len(arm.joints) + 1)
     own += [f"Fv{k}" for k in every]
@@ -56,14 +65,20 @@ def regressor(arm: Arm, motion: Motion) -> FloatArray:
     table = np.zeros((len(q), joints, len(names(arm))))
     to = _link_columns(arm)
     at = int(to.max()) + 1
+    width = sign_width(arm)
     if arm.loops:
-        closure = np.array([body.closure for body in arm.bodies])
+        closure = arm.closure
         links = np.zeros((len(q), len(closure), at))
-        fill_links(_tree(arm), (q @ closure.T, v @ closure.T, a @ closure.T), to, links)
+        moved = q @ closure.T, v @ closure.T, a @ closure.T
+        fill_links(_tree(arm), moved, to, links)
         table[:, :, :at] = closure.T @ links
+        if arm.hydraulic:
+            speeds = moved[1]
+            rubbing = np.hstack([np.tanh(speeds / width.max()), speeds])
+            table[:, :, at:] = rubbing[:, None, :] * np.tile(closure.T, 2)
+            return table
     else:
         fill_links(_tree(arm), (q, v, a), to, table)
-    width = SIGN_WIDTH * np.array([joint.speed for joint in arm.joints])
     own = (np.tanh(v / width), a, np.ones_like(q))
     springs = [k for k, joint in enumerate(arm.joints) if joint.spring]
     damped = [(k, k) for k in range(joints)]
@@ -76,6 +91,11 @@ def regressor(arm: Arm, motion: Motion) -> FloatArray:
             table[:, row, at] = values[:, other]
             at += 1
     return table
+
+
+def sign_width(arm: Arm) -> FloatArray:
+    """Return the speed over which each joint's Coulomb friction changes sign, shape (joints,)."""
+    return SIGN_WIDTH * np.array([joint.speed for joint in arm.joints])
 
 
 @lru_cache(maxsize=8)

@@ -134,7 +134,11 @@ class Arm:
         wrist: First joint (from 0) that cables drive from coupled motors, or None.
         wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
         loops: Spanning tree of all bodies, parents first, where loops make more bodies than joints;
-            see `bodies`.
+            see `bodies`. The torque of the joints is then the closure's transpose times the tree's
+            (E. del Sol et al. 2014, equations 8 to 13).
+        tip_body: Number of the body that the tip's row is on; 0 is the last joint's.
+        hydraulic: Whether cylinders drive it: every body of the loops rubs on its joint, and the
+            torque, from pressures, has a true zero.
         carried: Payloads and the masses of a tool; `estimation.arm.payload.carried_torque` returns
             their joint torque.
     """
@@ -148,6 +152,8 @@ class Arm:
     wrist: int | None = None
     wrist_coupling: tuple[tuple[float, ...], ...] = ()
     loops: tuple[Body, ...] = ()
+    tip_body: int = 0
+    hydraulic: bool = False
     carried: tuple[PointMass, ...] = ()
 
     def with_payload(self, *masses: PointMass) -> "Arm":
@@ -165,6 +171,11 @@ class Arm:
         table = np.array([(joint.lower, joint.upper, joint.speed) for joint in self.joints])
         lower, upper, speed = table.T.copy()
         return lower, upper, speed
+
+    @property
+    def closure(self) -> FloatArray:
+        """G of q = G y: the bodies' joints by the actuated ones, shape (bodies, joints)."""
+        return np.array([body.closure for body in self.bodies])
 
     @property
     def bodies(self) -> tuple[Body, ...]:

@@ -40,6 +40,11 @@ def spatial_jacobians(arm: Arm, position: FloatArray) -> FloatArray:
     return _jacobians(arm, position, "WORLD")
 
 
+def tip_jacobians(arm: Arm, position: FloatArray) -> FloatArray:
+    """Return Jacobians to the tip's twist, tip's origin and base's axes; (n, 6, joints)."""
+    return _jacobians(arm, position, "LOCAL_WORLD_ALIGNED")
+
+
 def body_jacobians(arm: Arm, position: FloatArray) -> FloatArray:
     """Return body Jacobians along a motion, shape (n, 6, joints), tip's frame and origin."""
     return _jacobians(arm, position, "LOCAL")
@@ -54,7 +59,13 @@ def _jacobians(arm: Arm, position: FloatArray, frame: str) -> FloatArray:
     pin, model = pinocchio(), built(arm)
     data, tip = model.createData(), model.getFrameId(TIP)
     reference = getattr(pin.ReferenceFrame, frame)
-    return np.stack([pin.computeFrameJacobian(model, data, q, tip, reference) for q in position])
+    closure = arm.closure
+    return np.stack(
+        [
+            pin.computeFrameJacobian(model, data, q, tip, reference) @ closure
+            for q in position @ closure.T
+        ]
+    )
 
 
 def by_pseudo_inverse(jacobians: FloatArray, external_torque: FloatArray) -> FloatArray:

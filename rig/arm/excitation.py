@@ -19,6 +19,7 @@ from estimation.arm.excitation import (
 )
 from estimation.arm.tables import PSM
 from estimation.files import write_text_atomic
+from rig.output.page import Page
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable
 
@@ -79,14 +80,14 @@ class ExcitationStudy:
 
 
 def run_excitation(
-    starts: int, evaluations: int, on_start: Callable[[], None] = lambda: None
+    starts: int, evaluations: int, on_start: Callable[[int, int], None] = lambda done, total: None
 ) -> tuple[ExcitationStudy, Excitation]:
     """Search from several starts by both ways.
 
     Args:
         starts: Number of starts; from seed 0.
         evaluations: Condition numbers each search may take of each start.
-        on_start: Called after each start.
+        on_start: Called with the number of starts done and their total.
 
     Returns:
         The comparison, and our excitation of the lowest condition number.
@@ -103,7 +104,7 @@ def run_excitation(
         thesis, ours = _outcome(sampled, thesis_s), _outcome(found, ours_s)
         rows.append(Start(seed, condition(PSM, begin), thesis, shrunk, ours))
         made.append(found)
-        on_start()
+        on_start(len(made), starts)
     study = ExcitationStudy(
         "rig.study.excitation/1", PSM.name, evaluations, tuple(rows), Provenance.now(0)
     )
@@ -114,8 +115,8 @@ def _outcome(found: Excitation, seconds: float) -> Outcome:
     return Outcome(condition(PSM, found), reached(PSM, found), seconds)
 
 
-def table(study: ExcitationStudy) -> TextTable:
-    """Return the comparison as a table."""
+def page(study: ExcitationStudy) -> Page:
+    """Return the comparison's page."""
     rows = [
         [
             str(each.seed),
@@ -130,7 +131,7 @@ def table(study: ExcitationStudy) -> TextTable:
         [f"{way}: {what}" for what in ("condition", "limits used, %", "core time, s")]
         for way in ("active set", "ours")
     )
-    return TextTable(
+    table = TextTable(
         f"Condition number of the base regressor, {study.evaluations} evaluations a search",
         ["start", "condition there", *thesis, "scaled into limits", *ours],
         rows,
@@ -139,6 +140,7 @@ def table(study: ExcitationStudy) -> TextTable:
         " 100 % nothing is passed. The thesis' limits are those within which its arm collides with"
         " nothing; its acceleration is not stated, four times the speed limit a second is assumed.",
     )
+    return Page(f"Excitation of the {study.arm}", [], [table], study.provenance)
 
 
 def _cells(found: Outcome) -> tuple[str, str, str]:

@@ -23,6 +23,7 @@ from estimation.recording import FloatArray, Recording
 from rig.arm.search import EDGE_S, RATE_SHARE, Prepared, prepare
 from rig.arm.within import period_of
 from rig.errors import DataError
+from rig.output.page import Page
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable
 
@@ -167,14 +168,14 @@ def _unit(run: Recording, point_m: tuple[float, float, float], length: int) -> F
     return kept
 
 
-def table(study: Payload) -> TextTable:
-    """Return the masses as a table."""
+def page(study: Payload) -> Page:
+    """Return the page of the masses."""
     rows = []
     for name, found in zip(study.runs, study.masses, strict=True):
         low, high = found.interval_kg
         grams = (found.mass_kg, low, high, *found.by_joint_kg)
         rows.append([name, *(f"{1000 * value:.1f}" for value in grams)])
-    return TextTable(
+    table = TextTable(
         f"Mass added, g, by a model fitted on {study.model}",
         ["run", "mass", "from", "to", "J1 alone", "J2 alone"],
         rows,
@@ -182,3 +183,4 @@ def table(study: Payload) -> TextTable:
         f" {100 * study.height_error_m:g} cm; its distance from the axis is estimated. The interval"
         " is two standard errors: scatter over periods, half the joints' difference, the lever.",
     )
+    return Page("Masses added to an arm", [], [table], study.provenance)

@@ -9,8 +9,7 @@ from typing import Any
 
 from calibration.linear import CalibrationSet
 from calibration.procedure import AbortedError, Answer, Operator, Procedure, Step, carry_out
-from calibration.sessions.current import CurrentSession
-from calibration.sessions.drive import DriveCurrentSession
+from calibration.sessions.current import CurrentSession, DriveCurrentSession
 from calibration.store import CalibrationStore, default_folder
 from drivers.device import Device
 from drivers.registry import open_device

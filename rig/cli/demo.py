@@ -63,12 +63,12 @@ def demo(
     """Record the simulated rig with an unmodelled effect, identify it, and confirm it."""
     from estimation import model_file
     from estimation.cross_validation import held_out_error
-    from estimation.diagnosis.split import evidence, split
+    from estimation.diagnosis.split import split
     from rig.campaigns.index import DIAGNOSIS
     from rig.configuration.config import load_config
     from rig.diagnosis.ledger import Ledger
-    from rig.diagnosis.run import remember, run_diagnosis
-    from rig.diagnosis.written import written_models
+    from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.traces import written_models
     from rig.importers.registry import open_campaign
     from rig.reports.diagnosis import write
     from rig.reports.diagnosis_words import sentences
@@ -94,15 +94,17 @@ def demo(
         say(f"fitting the declared model {MODEL!r} on the training runs")
         campaign = open_campaign(logs)
         # the others are the diagnosis' proof; whoever looks at them first proves nothing with them
-        discover = campaign.select(split(evidence(campaign), number).discover)
+        discover = campaign.select(split(list(campaign.evidence), number).discover)
         held_out = held_out_error(declared, discover, FOLDS, number)
         say(held_out_sentence(declared, held_out))
         looks = Ledger(ledger)
-        done = run_diagnosis(campaign, [declared], looks, seed=number, quick=True, on_stage=say)
+        done, look = run_diagnosis(
+            campaign, [declared], looks, seed=number, quick=True, on_stage=say
+        )
     model_file.write_all(written_models(done), model)
     kept = logs / DIAGNOSIS
     report = write(done, number, kept.with_suffix(".html"), kept)
-    remember(done, looks)
+    looks.enter(look)
     files = {"folder": folder, "report": kept.with_suffix(".html"), "model": model}
     found = {"runs": runs, "held_out": held_out, "diagnosis": done.diagnosis.to_json()}
     present(

@@ -21,7 +21,7 @@ from rig.cli.options import (
     WorkersOption,
     say_left_out,
 )
-from rig.output.console import JsonFlag, present, stages
+from rig.output.console import JsonFlag, present
 
 
 def diagnose(
@@ -63,13 +63,13 @@ def diagnose(
 
     from estimation import model_file
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
-    from rig.diagnosis.durations import default_durations, measured, work_of
-    from rig.diagnosis.engine import engine
+    from rig.diagnosis.durations import timed_stages
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
-    from rig.diagnosis.run import remember, run_diagnosis
+    from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import subject
-    from rig.diagnosis.written import with_cost_of_causal_filters, written_models
+    from rig.diagnosis.traces import with_cost_of_causal_filters, written_models
+    from rig.diagnosis.work import engine
     from rig.reports.diagnosis import write
     from rig.reports.diagnosis_words import sentences
 
@@ -83,9 +83,8 @@ def diagnose(
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_, machine, skip_bad)
         say_left_out(path, asked.campaign)
-        times, work = default_durations(), work_of(asked, quick)
-        with stages(times.expected(*work)) as shown, measured(shown) as (on_stage, seconds):
-            done = run_diagnosis(
+        with timed_stages(asked, quick) as on_stage:
+            done, look = run_diagnosis(
                 asked.campaign,
                 asked.models,
                 looks,
@@ -94,7 +93,6 @@ def diagnose(
                 quick=quick,
                 on_stage=on_stage,
             )
-    times.add(*work, seconds)
     # files first, then the ledger, then the screen: held-out runs are not used up by a diagnosis
     # that left nothing, and nobody sees a result that the ledger does not hold
     written = []
@@ -105,7 +103,7 @@ def diagnose(
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))
     written += write(done, seed, page_file, json_out)
-    remember(done, looks)
+    looks.enter(look)
     said = (*sentences(done.diagnosis), *done.diagnosis.notes, *written)
     present(json_, done.diagnosis.to_json(), *said)
 

@@ -59,9 +59,8 @@ def _learner(kind: str, target: str, surrogate: str, live: bool, seed: int) -> L
         UsageError: The states have no scale for that channel as the load.
     """
     from estimation.bank.states import LOAD_SCALES, Bank
-    from estimation.cross_validation import closing_score
+    from estimation.cross_validation import closing_score, held_out_score
     from estimation.estimators.bank import BankRecipe
-    from estimation.estimators.held_out import held_out_score
     from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
     from estimation.networks.training import Settings
 

@@ -1,8 +1,8 @@
 """`rig log export`: a log, or a campaign as one table, in other formats."""
 
-from enum import Enum
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,9 +14,7 @@ from rig.output.table import counted
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
     from estimation.campaign import Campaign
-
-
-Format = TypeVar("Format", bound=Enum)
+    from rig.log.export import ExportFormat
 
 
 def export(
@@ -98,9 +96,10 @@ def _export_campaign(
     path: Path, campaign: "Campaign", format_name: str, out: Path | None, force: bool, json: bool
 ) -> None:
     """Write all runs as one table."""
-    from rig.importers.tidy import TidyFormat, write_tidy
+    from rig.importers.tidy import write_tidy
+    from rig.log.export import ExportFormat
 
-    known = _known(format_name, "A campaign", TidyFormat)
+    known = _known(format_name, "A campaign", (ExportFormat.CSV, ExportFormat.PARQUET))
     name = f"{path.resolve().name}.{format_name}"
     target = out or path.resolve().with_name(name)
     if target.is_dir():
@@ -108,17 +107,17 @@ def _export_campaign(
     _said([write_tidy(campaign, target, known, force)], campaign, json)
 
 
-def _known(name: str, what: str, formats: type[Format]) -> Format:
+def _known(name: str, what: str, formats: "Iterable[ExportFormat]") -> "ExportFormat":
     """Return the format of a name.
 
     Raises:
         UsageError: There is none.
     """
-    names = [one.value for one in formats]
-    if name not in names:
-        fix = f"Choose one of {', '.join(names)}."
+    known = {one.value: one for one in formats}
+    if name not in known:
+        fix = f"Choose one of {', '.join(known)}."
         raise UsageError(f"{what} is not exported as {name!r}.", fix=fix)
-    return formats(name)
+    return known[name]
 
 
 def _other_calibrations(

@@ -49,9 +49,9 @@ def loop(
     Ends when every effect is unique, when the model is complete, or at the limit of rounds or time.
     """
     from rig.configuration.config import load_config
-    from rig.diagnosis.engine import engine
     from rig.diagnosis.loop import Budget, Round, run_loop
     from rig.diagnosis.subject import declared_models
+    from rig.diagnosis.work import engine
     from rig.protocols.protocol import load_protocol
     from rig.simulation.hidden import chosen
 

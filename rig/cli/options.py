@@ -191,7 +191,7 @@ def require_new(path: Path | None) -> None:
 
 def say_left_out(path: Path, campaign: "Campaign") -> None:
     """Print on stderr the files and runs at a path that a campaign excludes, with the reason."""
-    from rig.importers.left_out import left_out
+    from rig.importers.registry import left_out
 
     for line in left_out(path, campaign):
         remarks().print(line)

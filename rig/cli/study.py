@@ -1,6 +1,5 @@
 """`rig study`: make a paper's results again."""
 
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,16 +8,13 @@ import typer
 
 from rig.cli.help import GroupedHelp
 from rig.cli.options import FiguresFolder, SeedOption, TablesFile, WorkersOption
-from rig.cli.study_arm import StateFolder, arm_studies, resumable
-from rig.cli.study_machines import machine_studies
-from rig.output.console import JsonFlag, emit_json, progress, show_result
+from rig.cli.study_arm import StateFolder, arm_studies, counted, described, resumable, show
+from rig.output.console import JsonFlag, progress
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
-    from rig.studies.oneill.kinds import KindRow
+    from rig.studies.oneill.data import Source
     from rig.studies.oneill.networks import NetworkStudy, Training
-    from rig.studies.oneill.source import Source
-    from rig.studies.oneill.states import StateStudy
 
 study_app = typer.Typer(
     name="study",
@@ -30,7 +26,6 @@ study_app = typer.Typer(
 
 
 study_app.add_typer(arm_studies)
-study_app.add_typer(machine_studies)
 
 
 @study_app.callback()
@@ -73,8 +68,8 @@ def oneill(
     By default it fits Table I's linear models, in seconds. --networks trains the paper's networks,
     which takes long; after an interruption it resumes. --states and --kinds take minutes.
     """
-    from rig.studies.oneill import page as shown
-    from rig.studies.oneill.source import open_reference
+    from rig.studies.oneill.data import open_reference
+    from rig.studies.oneill.page import page
     from rig.studies.oneill.study import run_study
 
     source = _simulated(seed) if data is None else open_reference(data)
@@ -82,7 +77,7 @@ def oneill(
         task = bar.add_task("runs", total=len(source.campaign))
         study = run_study(source, seed=seed, on_run=lambda name: bar.advance(task))
     campaign = source.campaign.exclude(study.left_out)
-    deep = None
+    deep, physical, every_kind, shown = None, None, (), {}
     if networks:
         from rig.studies.oneill.networks import Training
 
@@ -90,70 +85,30 @@ def oneill(
         limit = float("inf") if minutes is None else minutes
         training = Training(kept, every=every, seed=seed, workers=workers, minutes=limit)
         deep = _train(campaign, data, training)
-    physical, drawn = _fit_states(campaign, data, seed, figures) if states else (None, [])
-    every_kind = _fit_kinds(campaign, seed) if kinds else ()
-    more = shown.More(deep, physical, every_kind)
-    lines = [*shown.lead(study, more), f"Data: {source.name}.", *shown.all_notes(study, more)]
+    if states:
+        from rig.studies.oneill.states import run_states
 
-    def markdown() -> str:
-        placed = [(name, os.path.relpath(at, out.parent)) for name, at in drawn] if out else []
-        return shown.markdown(study, more, placed)
+        keep = None if figures is None else shown.__setitem__
+        with counted("estimates from states") as on_row:
+            physical = run_states(campaign, data, seed=seed, on_row=on_row, on_shown=keep)
+    if kinds:
+        from rig.studies.oneill.kinds import run_kinds
 
-    show_result(lines, shown.all_tables(study, more), out, markdown, json)
-    if json:
-        found = {"networks": deep, "states": physical, "kinds": every_kind or None}
-        emit_json(asdict(study) | {k: v for k, v in found.items() if v is not None})
+        with counted("kinds of estimators") as on_fit:
+            every_kind = run_kinds(campaign, seed, on_fit)
+    found = {"networks": deep, "states": physical, "kinds": every_kind or None}
+    whole = asdict(study) | {name: each for name, each in found.items() if each is not None}
+    show(whole, page(study, deep, physical, every_kind, shown), out, json, figures)
 
 
 def _train(campaign: "Campaign", data: Path | None, training: "Training") -> "NetworkStudy":
-    from rig.studies.oneill.data import network_tables
-    from rig.studies.oneill.networks import run_networks
+    from rig.studies.oneill.networks import network_tables, run_networks
 
     with progress() as bar:
         task = bar.add_task("closing samples", total=None)
         tables, notes = network_tables(campaign, data, on_run=lambda name: bar.advance(task))
-        trained = bar.add_task("networks", total=None)
-        return run_networks(
-            tables,
-            training,
-            notes,
-            on_network=lambda done, total: bar.update(trained, completed=done, total=total),
-        )
-
-
-def _fit_states(
-    campaign: "Campaign", data: Path | None, seed: int, figures: Path | None
-) -> tuple["StateStudy", list[tuple[str, Path]]]:
-    from rig.studies.oneill.figures import write
-    from rig.studies.oneill.shown import Shown
-    from rig.studies.oneill.states import run_states
-
-    kept: list[Shown] = []
-
-    with progress() as bar:
-        task = bar.add_task("closing samples", total=None)
-        fitted = bar.add_task("estimates from states", total=None)
-        study = run_states(
-            campaign,
-            data,
-            seed=seed,
-            on_run=lambda name: bar.advance(task),
-            on_row=lambda done, total: bar.update(fitted, completed=done, total=total),
-            on_shown=kept.append if figures is not None else None,
-        )
-    return study, write(figures, kept) if figures is not None else []
-
-
-def _fit_kinds(campaign: "Campaign", seed: int) -> "tuple[KindRow, ...]":
-    from rig.studies.oneill.kinds import run_kinds
-
-    with progress() as bar:
-        task = bar.add_task("kinds of estimators", total=None)
-        return run_kinds(
-            campaign,
-            seed,
-            on_fit=lambda done, total: bar.update(task, completed=done, total=total),
-        )
+    with counted("networks") as on_network:
+        return run_networks(tables, training, notes, on_network)
 
 
 @study_app.command()
@@ -173,8 +128,8 @@ def zhao(
     from rig.errors import UsageError
     from rig.grasper.hidden import FAMILIES, OWN
     from rig.grasper.plant import PROTOTYPES
-    from rig.studies.zhao import page as shown
     from rig.studies.zhao.haptics import haptics_of
+    from rig.studies.zhao.page import page
     from rig.studies.zhao.study import run_study
 
     if prototype not in PROTOTYPES:
@@ -186,18 +141,10 @@ def zhao(
         study = run_study(prototype, seeds, spread, keeper)
         model = study.lacking[OWN, "grasp"].model
         haptics = haptics_of(prototype, seeds, spread, model, keeper)
-    drawn = shown.write_figures(figures, study, haptics) if figures is not None else []
-
-    def markdown() -> str:
-        names = [os.path.relpath(path, out.parent) for path in drawn] if out is not None else []
-        return shown.markdown(study, haptics, names)
-
-    lines = [shown.lead(study), *shown.notes(study)]
-    show_result(lines, shown.tables(study, haptics), out, markdown, json)
-    if json:
-        cells = {"prototype": study.prototype, "spread": study.spread, "cells": study.cells}
-        found = {", ".join(key): each.findings for key, each in study.lacking.items()}
-        emit_json({"study": {**cells, "findings": found}, "haptics": haptics})
+    cells = {"prototype": study.prototype, "spread": study.spread, "cells": study.cells}
+    found = {", ".join(key): each.findings for key, each in study.lacking.items()}
+    whole = {"study": {**cells, "findings": found}, "haptics": haptics}
+    show(whole, page(study, haptics), out, json, figures)
 
 
 @study_app.command()
@@ -212,21 +159,15 @@ def loop(
 ) -> None:
     """Add effects to the paper's linear models, confirmed on held-out test runs."""
     from rig.errors import UsageError
-    from rig.studies.loop import page as shown
+    from rig.studies.loop.page import page
     from rig.studies.loop.study import TASKS, run_study
 
     if any(not 1 <= number <= len(TASKS) for number in task or []):
         raise UsageError(f"There are {len(TASKS)} rows.", fix="Write for example --task 1.")
     tasks = [TASKS[number - 1] for number in task] if task else TASKS
-    with progress() as bar:
-        shown_stage = bar.add_task("loop", total=None)
-        study = run_study(
-            data, seed, tasks, on_stage=lambda s: bar.update(shown_stage, description=s)
-        )
-    lines = [shown.lead(study), *shown.notes(study)]
-    show_result(lines, shown.tables(study), out, lambda: shown.markdown(study), json)
-    if json:
-        emit_json(study)
+    with described("loop") as step:
+        study = run_study(data, seed, tasks, on_stage=step)
+    show(study, page(study), out, json)
 
 
 @study_app.command()
@@ -243,24 +184,20 @@ def instruments(
 ) -> None:
     """Adapt one instrument's estimators to others, with one run or three."""
     from rig.importers.registry import open_campaign
-    from rig.studies.instruments import page as shown
+    from rig.studies.instruments.page import page
     from rig.studies.instruments.study import run_instruments
-    from rig.studies.oneill.source import part_of
+    from rig.studies.oneill.data import part_of
 
     others = other or ["Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"]
-    with progress() as bar:
-        task = bar.add_task("instruments", total=None)
+    with counted("instruments") as on_row:
         study = run_instruments(
             (source, open_campaign(part_of(data, source))),
             {name: open_campaign(part_of(data, name)) for name in others},
             networks=networks,
             seed=seed,
-            on_row=lambda done, total: bar.update(task, completed=done, total=total),
+            on_row=on_row,
         )
-    tables = [shown.table(study), shown.drawn_table(study)]
-    show_result([shown.lead(study)], tables, out, lambda: shown.markdown(study), json)
-    if json:
-        emit_json(study)
+    show(study, page(study), out, json)
 
 
 @study_app.command()
@@ -279,28 +216,52 @@ def intervals(
 ) -> None:
     """Measure how often intervals hold, on levels left out and on other instruments."""
     from rig.importers.registry import open_campaign
-    from rig.studies.instruments import intervals_page as shown
     from rig.studies.instruments.intervals import INSTRUMENTS, run_intervals
-    from rig.studies.oneill.source import part_of
+    from rig.studies.instruments.intervals_page import page
+    from rig.studies.oneill.data import part_of
 
     names = instrument or INSTRUMENTS
     campaigns = {name: open_campaign(part_of(data, name)) for name in names}
-    with progress() as bar:
-        task = bar.add_task("intervals", total=None)
-        study = run_intervals(
-            campaigns,
-            source or names[:3],
-            seed,
-            on_step=lambda what: bar.update(task, description=what),
+    with described("intervals") as step:
+        study = run_intervals(campaigns, source or names[:3], seed, on_step=step)
+    show(study, page(study), out, json)
+
+
+@study_app.command()
+def machines(
+    data: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DATA_FOLDER",
+            help="Folder with emps, smart-grasper, sts3215 and ur10e, as folders or as"
+            " machine-NAME.tar.xz; what is not there is left out.",
+        ),
+    ],
+    out: TablesFile = None,
+    seed: SeedOption = 0,
+    json: JsonFlag = False,
+) -> None:
+    """Diagnose machines that other people built, and compare with what they published."""
+    from rig.errors import UsageError
+    from rig.studies.machines.page import page
+    from rig.studies.machines.study import run_study
+
+    if not data.is_dir():
+        raise UsageError(f"There is no folder {data}.", fix="Name the folder of the recordings.")
+    with described("machines") as step:
+        study = run_study(data, seed, on_stage=step)
+    if not study.rows:
+        raise UsageError(
+            f"No machine's recordings are in {data}.",
+            " ".join(study.skipped),
+            "Put emps, smart-grasper, sts3215 or ur10e there.",
         )
-    show_result(shown.lead(study), shown.tables(study), out, lambda: shown.markdown(study), json)
-    if json:
-        emit_json(study)
+    show(study, page(study), out, json)
 
 
 def _simulated(seed: int) -> "Source":
     from rig.simulation.campaign import simulate_reference_campaign
-    from rig.studies.oneill.source import Source
+    from rig.studies.oneill.data import Source
 
     return Source(
         simulate_reference_campaign(seed),

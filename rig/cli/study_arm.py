@@ -1,10 +1,10 @@
-"""`rig study` on arms: a paper's results on joint torque, wrench, added mass, grasp."""
+"""`rig study` on simulated and measured arms, and what all studies share: page and kept parts."""
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +14,7 @@ from rig.cli.options import FiguresFolder, TablesFile, WorkersOption
 from rig.output.console import JsonFlag, emit_json, progress, show_result
 
 if TYPE_CHECKING:
-    from rig.output.table import TextTable
+    from rig.output.page import Page
     from rig.studies.seeds import Keeper
 
 arm_studies = typer.Typer(rich_markup_mode=None)
@@ -24,37 +24,48 @@ StateFolder = Annotated[
     typer.Option("--state", help="Folder of finished parts; a cache folder by default."),
 ]
 
-Arms = Annotated[int, typer.Option(min=1, help="Simulated arms of each family, from seed 0.")]
+ArmData = Annotated[
+    Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
+]
 
 
-def _from_page(drawn: list[Path], out: Path | None) -> list[str]:
-    """Return the places of figures from where a page will be."""
-    return [] if out is None else [os.path.relpath(path, out.parent) for path in drawn]
-
-
-def _show(
-    study: object,
-    lines: Sequence[str],
-    tables: "Sequence[TextTable]",
-    page: Callable[[Sequence[str]], str],
-    drawn: list[Path],
-    out: Path | None,
-    json: bool,
+def show(
+    study: object, page: "Page", out: Path | None, json: bool, figures: Path | None = None
 ) -> None:
-    """Print a study, write its page with the figures drawn, and print it as JSON if asked.
+    """Print a study, write its page and its figures, and print it as JSON if asked.
 
     Args:
-        study: The study.
-        lines: Lines printed before its tables.
-        tables: Its tables.
-        page: Makes its page, with figures at the places given.
-        drawn: Figures that were drawn.
+        study: What goes to stdout as JSON.
+        page: Its page.
         out: File for the page.
-        json: Whether it goes to stdout as JSON.
+        json: Whether it is wanted as JSON.
+        figures: Folder for its figures.
     """
-    show_result(lines, tables, out, lambda: page(_from_page(drawn, out)), json)
+    drawn = []
+    if figures is not None:
+        from rig.output.figures import write_svgs
+
+        drawn = write_svgs(figures, page.figures())
+    places = [] if out is None else [os.path.relpath(path, out.parent) for path in drawn]
+    show_result(page.paragraphs, page.tables, out, lambda: page.markdown(places), json)
     if json:
         emit_json(study)
+
+
+@contextmanager
+def described(what: str) -> Iterator[Callable[[str], None]]:
+    """Show what a study does; yields what is called with each step, in words."""
+    with progress() as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda step: bar.update(task, description=step)
+
+
+@contextmanager
+def counted(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Show how much of a study is done; yields what is called with that, and the total."""
+    with progress() as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 @contextmanager
@@ -80,9 +91,7 @@ def resumable(
 
 @arm_studies.command()
 def pique(
-    data: Annotated[
-        Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
-    ],
+    data: ArmData,
     paths: Annotated[
         tuple[str, str], typer.Option(help="Two runs: effects are chosen fitting the first.")
     ] = ("one18", "two18"),
@@ -96,19 +105,13 @@ def pique(
 ) -> None:
     """Make table 3.2 of Piqué 2018 again: an arm's joint torques in free space."""
     from rig.arm.search import open_paths
-    from rig.studies.pique import page as shown
+    from rig.studies.pique.page import page
     from rig.studies.pique.study import run_study
 
-    with progress() as bar:
-        task = bar.add_task("paths", total=None)
+    with described("paths") as step:
         first, second, *others = open_paths(data, [*paths, *(also or [])])
-        study = run_study(
-            first, second, also=others, on_step=lambda step: bar.update(task, description=step)
-        )
-    drawn = shown.write_figures(figures, study) if figures is not None else []
-    lines = [shown.lead(study), *shown.notes(study)]
-    page = partial(shown.markdown, study)
-    _show(study, lines, shown.tables(study), page, drawn, out, json)
+        study = run_study(first, second, also=others, on_step=step)
+    show(study, page(study), out, json, figures)
 
 
 @arm_studies.command()
@@ -124,95 +127,51 @@ def excitation(
     json: JsonFlag = False,
 ) -> None:
     """Design an arm's excitation within its limits at every instant, compared with the thesis'."""
-    from rig.arm.excitation import run_excitation, table, write_trajectory
-    from rig.output.table import to_page
+    from rig.arm.excitation import page, run_excitation, write_trajectory
 
-    with progress() as bar:
-        task = bar.add_task("starts", total=starts)
-        study, best = run_excitation(starts, evaluations, lambda: bar.advance(task))
+    with counted("starts") as on_start:
+        study, best = run_excitation(starts, evaluations, on_start)
     if trajectory is not None:
         write_trajectory(best, trajectory)
-
-    def page() -> str:
-        return to_page([f"Excitation of the {study.arm}"], [table(study)], study.provenance)
-
-    show_result([], [table(study)], out, page, json)
-    if json:
-        emit_json(study)
+    show(study, page(study), out, json)
 
 
-@arm_studies.command()
-def wrench(
-    seeds: Arms = 2,
-    workers: WorkersOption = 1,
-    state: StateFolder = None,
-    out: TablesFile = None,
-    figures: FiguresFolder = None,
-    json: JsonFlag = False,
-) -> None:
-    """Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and contact."""
-    from rig.arm.hidden import FAMILIES
-    from rig.studies.pique import wrench_page as shown
-    from rig.studies.pique.wrench import run_wrench_study
+def _of_simulated_arms(name: str) -> Callable[..., None]:
+    """Return the command of a study on simulated arms of every family of hidden torque."""
 
-    with resumable(state, "wrench", seeds * len(FAMILIES), workers) as keeper:
-        study = run_wrench_study(seeds, keeper)
-    drawn = shown.write_figures(figures, study) if figures is not None else []
-    lines = [shown.lead(study), *shown.NOTES]
-    page = partial(shown.markdown, study)
-    _show(study, lines, shown.tables(study), page, drawn, out, json)
+    def command(
+        seeds: Annotated[
+            int, typer.Option(min=1, help="Simulated arms of each family, from seed 0.")
+        ] = 2,
+        workers: WorkersOption = 1,
+        state: StateFolder = None,
+        out: TablesFile = None,
+        figures: FiguresFolder = None,
+        json: JsonFlag = False,
+    ) -> None:
+        from rig.arm.hidden import FAMILIES
 
+        page, made = (import_module(f"rig.studies.{name}.{part}") for part in ("page", "study"))
+        with resumable(state, name, seeds * len(FAMILIES), workers) as keeper:
+            study = made.run(seeds, keeper)
+        show(study, page.page(study), out, json, figures)
 
-@arm_studies.command()
-def delsol(
-    seeds: Arms = 2,
-    workers: WorkersOption = 1,
-    state: StateFolder = None,
-    out: TablesFile = None,
-    figures: FiguresFolder = None,
-    json: JsonFlag = False,
-) -> None:
-    """Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms."""
-    from rig.arm.hidden import FAMILIES
-    from rig.studies.delsol import page as shown
-    from rig.studies.delsol.study import run_delsol
-
-    with resumable(state, "delsol", seeds * len(FAMILIES), workers) as keeper:
-        study = run_delsol(seeds, keeper)
-    drawn = shown.write_figures(figures, study) if figures is not None else []
-    lines = [shown.lead(study), shown.NOTE]
-    page = partial(shown.markdown, study)
-    _show(study, lines, shown.tables(study), page, drawn, out, json)
+    return command
 
 
-@arm_studies.command()
-def zhang(
-    seeds: Arms = 2,
-    workers: WorkersOption = 1,
-    state: StateFolder = None,
-    out: TablesFile = None,
-    figures: FiguresFolder = None,
-    json: JsonFlag = False,
-) -> None:
-    """Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and wrench."""
-    from rig.arm.hidden import FAMILIES
-    from rig.studies.zhang import page as shown
-    from rig.studies.zhang.figures import write_figures
-    from rig.studies.zhang.study import run_zhang
-
-    with resumable(state, "zhang", seeds * len(FAMILIES), workers) as keeper:
-        study = run_zhang(seeds, keeper)
-    drawn = write_figures(figures, study) if figures is not None else []
-    lines = [shown.lead(study), *shown.notes(study)]
-    page = partial(shown.markdown, study)
-    _show(study, lines, shown.tables(study), page, drawn, out, json)
+for _name, _what in {
+    "wrench": "Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and"
+    " contact.",
+    "delsol": "Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms.",
+    "zhang": "Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and"
+    " wrench.",
+}.items():
+    arm_studies.command(_name, help=_what)(_of_simulated_arms(_name))
 
 
 @arm_studies.command()
 def payload(
-    data: Annotated[
-        Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
-    ],
+    data: ArmData,
     on: Annotated[list[str], typer.Option(help="A run to look for an added mass on.")],
     model: Annotated[str, typer.Option(help="Run without the mass, to fit a model on.")] = "two18",
     height_m: Annotated[
@@ -225,20 +184,10 @@ def payload(
     json: JsonFlag = False,
 ) -> None:
     """Find a mass added to an arm's insertion axis from its joints' torque."""
-    from rig.arm.payload import find_payload, table
+    from rig.arm.payload import find_payload, page
     from rig.arm.search import open_paths
-    from rig.output.table import to_page
 
-    with progress() as bar:
-        task = bar.add_task("paths", total=None)
+    with described("paths") as step:
         fitted, *runs = open_paths(data, [model, *on])
-        found = find_payload(
-            fitted, runs, height_m, height_error_m, lambda name: bar.update(task, description=name)
-        )
-
-    def page() -> str:
-        return to_page(["Masses added to an arm"], [table(found)], found.provenance)
-
-    show_result([], [table(found)], out, page, json)
-    if json:
-        emit_json(found)
+        found = find_payload(fitted, runs, height_m, height_error_m, step)
+    show(found, page(found), out, json)

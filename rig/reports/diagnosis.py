@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from estimation.causes.verdict import Answer
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.files import write_text_atomic
 from estimation.model import Model
-from rig.diagnosis.run import Diagnosed
 from rig.diagnosis.traces import Traces, traces
 from rig.output.charts import embedded, scripts
-from rig.output.console import plain
 from rig.output.provenance import Provenance
 from rig.output.render import render
 from rig.output.table import TextTable
@@ -103,18 +102,18 @@ def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
     )
 
 
-def page_of(done: Diagnosed, seed: int) -> str:
+def page_of(done: Answer, seed: int) -> str:
     """Return the page of a diagnosis that this process made now."""
-    return page(done.diagnosis, traces(done.answer), Provenance.now(seed))
+    return page(done.diagnosis, traces(done), Provenance.now(seed))
 
 
-def json_of(done: Diagnosed) -> str:
+def json_of(done: Answer) -> str:
     """Return a diagnosis as the text of its JSON file."""
-    return json.dumps(plain(done.diagnosis.to_json()), indent=2, allow_nan=False) + "\n"
+    return json.dumps(done.diagnosis.to_json(), indent=2, allow_nan=False) + "\n"
 
 
 def write(
-    done: Diagnosed, seed: int, page_file: Path | None, json_file: Path | None = None
+    done: Answer, seed: int, page_file: Path | None, json_file: Path | None = None
 ) -> list[str]:
     """Write the page and the JSON of a diagnosis where they are asked for.
 

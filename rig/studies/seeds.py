@@ -6,11 +6,13 @@ was interrupted goes on where it stopped and never mixes in what other source ma
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
+from threading import Thread
 from typing import TypeVar
 
 from pydantic import TypeAdapter
@@ -18,6 +20,7 @@ from pydantic import TypeAdapter
 from estimation.files import write_text_atomic
 
 T = TypeVar("T")
+Task = TypeVar("Task")
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,13 @@ def kept_outcomes(
             continue
         keeper.on_seed()
     missing = [seed for seed in places if seed not in outcomes]
-    for seed, outcome in _done(one_seed, missing, keeper.workers, start):
+    alone = keeper.workers == 1 and start is None
+    made = (
+        ((seed, one_seed(seed)) for seed in missing)
+        if alone
+        else in_processes(one_seed, missing, keeper.workers, start)
+    )
+    for seed, outcome in made:
         write_text_atomic(places[seed], json.dumps(json_of.dump_python(outcome)))
         outcomes[seed] = outcome
         keeper.on_seed()
@@ -86,21 +95,52 @@ def source_digest(schema: str) -> str:
     return digest.hexdigest()[:16]
 
 
-def _done(
-    one_seed: Callable[[int], T], seeds: list[int], workers: int, start: Callable[[], None] | None
-) -> Iterator[tuple[int, T]]:
-    if workers == 1 and start is None:
-        for seed in seeds:
-            yield seed, one_seed(seed)
-        return
-    if not seeds:
-        return
+def in_processes(
+    one: Callable[[Task], T],
+    tasks: Iterable[Task],
+    workers: int,
+    start: Callable[[], None] | None = None,
+    goes_on: Callable[[], bool] = lambda: True,
+) -> Iterator[tuple[Task, T]]:
+    """Yield tasks with their results as they are done, each worker on one at a time.
+
+    Args:
+        one: Does one task.
+        tasks: The tasks.
+        workers: Processes.
+        start: Called first in each.
+        goes_on: Whether another task may begin; those at work end.
+    """
+    queue = iter(tasks)
+    running: dict[Future[T], Task] = {}
     # threads, such as a learning library's, do not survive a fork
     with ProcessPoolExecutor(workers, get_context("spawn"), start) as pool:
-        running = {pool.submit(one_seed, seed): seed for seed in seeds}
         try:
-            for future in as_completed(running):
-                yield running[future], future.result()
+            while True:
+                while len(running) < workers and goes_on():
+                    task = next(queue, None)
+                    if task is None:
+                        break
+                    running[pool.submit(one, task)] = task
+                if not running:
+                    return
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    yield running.pop(future), future.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def begin_learning() -> None:
+    """Keep this process' torch to one core, and end when the study was killed."""
+    import torch
+
+    torch.set_num_threads(1)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()  # one that is killed closes no pool
+    if parent is not None:
+        parent.join()
+        os._exit(1)

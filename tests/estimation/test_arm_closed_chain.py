@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.arm.closed_chain import (
-    closed_jacobians,
-    closed_regressor,
-    tree,
-)
 from estimation.arm.identification import damped_around
-from estimation.arm.kinematics import ArmError
-from estimation.arm.periodic import periodic_motion
+from estimation.arm.kinematics import ArmError, built, tip_pose
+from estimation.arm.motion import periodic_motion
+from estimation.arm.regressor import regressor
+from estimation.arm.wrench import tip_jacobians
 from rig.studies.delsol.hydraulic_arm import HYDRAULIC
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
@@ -30,10 +27,10 @@ def test_gravity_torque_is_the_derivative_of_the_energy_through_the_loop():
     still = replace(motion(), position=pose, velocity=0 * pose, acceleration=0 * pose)
     values = np.zeros(96)
     values[70] = mass  # of the tie bar, at its joint
-    torque = (closed_regressor(HYDRAULIC, still, 0.01) @ values)[0]
+    torque = (regressor(HYDRAULIC, still) @ values)[0]
 
     def energy(q):
-        model = tree(HYDRAULIC)
+        model = built(HYDRAULIC)
         data = model.createData()
         pin.forwardKinematics(model, data, HYDRAULIC.closure @ q)
         return mass * 9.80665 * data.oMi[8].translation[2]
@@ -46,13 +43,10 @@ def test_gravity_torque_is_the_derivative_of_the_energy_through_the_loop():
 
 def test_power_at_the_tip_is_the_joints():
     pose = np.array([[0.1, 0.2, -0.3, 0.2, 0.1]])
-    jacobian = closed_jacobians(HYDRAULIC, pose)[0]
-    model = tree(HYDRAULIC)
+    jacobian = tip_jacobians(HYDRAULIC, pose)[0]
 
     def tip(q):
-        data = model.createData()
-        pin.framesForwardKinematics(model, data, HYDRAULIC.closure @ q)
-        return data.oMf[model.getFrameId("tip")].translation.copy()
+        return tip_pose(HYDRAULIC, q)[:3, 3]
 
     for k in range(5):
         step = 1e-6 * np.eye(5)[k]

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.arm.closed_chain import closed_regressor, tree
 from estimation.arm.kinematics import built
 from estimation.arm.motion import Motion
 from estimation.arm.regressor import regressor
@@ -40,9 +39,9 @@ def test_a_serial_arms_columns_are_pinocchios(arm: Arm, seed: int):
 
 @given(seed=seeds)
 def test_a_trees_columns_are_pinocchios_through_the_loop_closure(seed: int):
-    motion, model = random_motion(seed, 5), tree(HYDRAULIC)
+    motion, model = random_motion(seed, 5), built(HYDRAULIC)
     data, closure = model.createData(), HYDRAULIC.closure
-    for k, columns in enumerate(closed_regressor(HYDRAULIC, motion, 0.01)[:, :, :80]):
+    for k, columns in enumerate(regressor(HYDRAULIC, motion)[:, :, :80]):
         state = (closure @ x[k] for x in (motion.position, motion.velocity, motion.acceleration))
         theirs = closure.T @ pin.computeJointTorqueRegressor(model, data, *state)
         np.testing.assert_allclose(columns, theirs, atol=1e-9)

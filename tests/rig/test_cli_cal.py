@@ -124,8 +124,12 @@ def test_records_of_the_simulated_rig_are_listed_by_their_gains_and_found(
 ):
     monkeypatch.setenv("RIG_CALIBRATIONS", str(tmp_path / "store"))
     monkeypatch.chdir(tmp_path)
-    assert main(["calibrate", "current", "--sim", "--yes", "--operator", "Ada", "--use"]) == 0
-    said = " ".join(capsys.readouterr().out.split())
+    assert main(["calibrate", "current", "--sim", "--yes", "--operator", "Ada"]) == 0
+    out = capsys.readouterr().out
+    hints = [line for line in out.splitlines() if line.startswith("Use it:")]
+    assert [main(hint.partition("rig ")[2].split()) for hint in hints] == [0, 0]
+    said = " ".join(out.split())
+    capsys.readouterr()
     assert f'calibration_store = "{tmp_path / "store-simulated"}"' in said
     assert main(["calibrate", "list"]) == 0
     lines = capsys.readouterr().out.splitlines()

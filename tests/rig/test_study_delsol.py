@@ -11,7 +11,7 @@ from rig.cli.study import study_app
 from rig.output.provenance import Provenance
 from rig.studies.delsol import study as delsol
 from rig.studies.delsol.diagnosis import PULLS, Named
-from rig.studies.delsol.page import lead
+from rig.studies.delsol.page import page
 from rig.studies.delsol.study import DelSolStudy
 
 pytestmark = pytest.mark.long
@@ -54,7 +54,8 @@ def test_the_page_begins_with_every_false_name():
     arms += [()] * (len(FAMILIES) - len(arms) - 1) + [(named(2, "friction.stribeck"),)]
     same = (delsol.Outcome((1.0,) * 5, 1.0, 1.0, 1.0),) * len(FAMILIES)
     outcomes = dict.fromkeys((delsol.PAPER, delsol.DISCARDED, delsol.OURS), same)
-    said = lead(DelSolStudy("", 1, outcomes, tuple(arms), Provenance.now(0)))
+    study = DelSolStudy("", 1, outcomes, tuple(arms), Provenance.now(0))
+    said = page(study).paragraphs[0]
     assert f"joint 1 of 1 of {len(FAMILIES)} arms" in said
     assert f"Of 7 names on {5 * len(FAMILIES)} joints 2 are false" in said
     assert "coupling.kinematic on joint 3, friction.stribeck on joint 2" in said

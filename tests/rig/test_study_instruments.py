@@ -6,7 +6,7 @@ import pytest
 
 from estimation.campaign import Campaign
 from estimation.recording import Recording
-from rig.studies.instruments import page as shown
+from rig.studies.instruments.page import page
 from rig.studies.instruments.study import run_instruments
 from tests.estimation.synthetic import campaign
 
@@ -49,4 +49,4 @@ def test_every_single_run_and_threes_are_adapted_with(study):
     # the single run of the first row is one of the choices, there scored on every fourth sample
     wanted = study.rows[0].result.adapted.rmse
     assert min(abs(error - wanted) for error in one.rmse_n_m) < 0.01 * wanted
-    assert [row[2] for row in shown.drawn_table(study).rows] == ["9", "40"]
+    assert [row[2] for row in page(study).tables[1].rows] == ["9", "40"]

@@ -3,8 +3,8 @@
 import pytest
 
 from estimation.campaign import Campaign
-from rig.studies.instruments import intervals_page as shown
 from rig.studies.instruments.intervals import TARGETS, run_intervals
+from rig.studies.instruments.intervals_page import page
 from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
 from tests.estimation.synthetic import campaign
 
@@ -43,10 +43,10 @@ def test_adapted_rows_hold_the_runs_that_were_not_adapted_with(study):
 
 
 def test_the_page_states_the_aims_and_every_row(study):
-    page = shown.markdown(study)
-    levels, adapted = shown.tables(study)
+    shown = page(study)
+    levels, adapted = shown.tables
     assert len(levels.rows) == len(study.levels)
     assert len(adapted.rows) == len(study.adapted)
-    assert "1.4 times that on unseen runs" in page
+    assert "1.4 times that on unseen runs" in shown.paragraphs[0]
     usual = [row for row in levels.rows if row[2] == "run"]
     assert {row[-2] for row in usual} == {"1.00"}

@@ -3,18 +3,18 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
-import typer
 from typer.testing import CliRunner
 
 from estimation.campaign import Campaign
 from estimation.recording import Flag, Stretch
 from rig.cli.study import study_app
 from rig.errors import DataError
-from rig.studies.oneill import page as shown
-from rig.studies.oneill import source as data
-from rig.studies.oneill.source import Source, open_reference
-from rig.studies.oneill.study import Study, run_study
+from rig.studies.oneill import data
+from rig.studies.oneill.data import Source, open_reference
+from rig.studies.oneill.page import page
+from rig.studies.oneill.study import Study, StudyError, fit_line, run_study
 from tests.estimation.synthetic import campaign
 
 pytestmark = pytest.mark.long
@@ -38,6 +38,14 @@ def test_every_surrogate_is_fitted_by_every_protocol(result):
     row = next(r for r in result.rows if r.protocol == "authors" and r.surrogate == "current")
     assert row.gain_unit == "N m/A"
     assert row.gain == pytest.approx(0.94, rel=0.1)
+    held_out = [r for r in result.rows if r.protocol in ("run-wise", "lofo", "lopo")]
+    assert {r.score.samples for r in held_out} == {result.closing_samples}  # each run once
+    assert {r.runs for r in result.rows} == {9}
+
+
+def test_a_constant_surrogate_cannot_be_fitted():
+    with pytest.raises(StudyError, match="closing samples"):
+        fit_line(np.ones(10), np.arange(10.0))
 
 
 def test_a_run_with_flagged_closing_samples_is_left_out_with_the_reason():
@@ -46,7 +54,7 @@ def test_a_run_with_flagged_closing_samples_is_left_out_with_the_reason():
     found = run_study(Source(Campaign.of(runs), "x", measured=False))
     assert found.left_out == {"11": "runaway of the motor"}
     assert len(found.runs) == 8
-    assert any("Run 11 left out: runaway" in note for note in shown.notes(found))
+    assert any("Run 11 left out: runaway" in note for note in page(found).paragraphs)
 
 
 def test_what_is_missing_is_reported_and_too_little_is_refused():
@@ -68,7 +76,7 @@ def test_what_is_missing_is_reported_and_too_little_is_refused():
 
 
 def test_markdown_states_counts_rows_and_provenance(result):
-    text = shown.markdown(result)
+    text = page(result).markdown()
     assert f"{result.closing_samples:,} closing samples; the paper states 260,581" in text
     (line,) = [row for row in text.splitlines() if row.startswith("| linear: current |")]
     assert line.endswith("| 10.06 | 23.26 | 12.26 | 0.97 | 0.97 |")
@@ -104,19 +112,13 @@ def test_the_reference_part_is_picked_and_reported(tmp_path, monkeypatch):
     assert "do not apply" in other.notes[0]
 
 
-def command_line() -> typer.Typer:
-    app = typer.Typer()
-    app.add_typer(study_app)
-    return app
-
-
 def test_the_command_writes_tables_and_json(tmp_path, monkeypatch):
     monkeypatch.setattr(
         data, "open_reference", lambda path: Source(campaign(), "analytic rig", measured=False)
     )
-    words = ["study", "oneill", "--data", str(tmp_path), "--json", "--seed", "5"]
+    words = ["oneill", "--data", str(tmp_path), "--json", "--seed", "5"]
     words += ["--out", str(tmp_path / "d" / "oneill.md")]
-    done = CliRunner().invoke(command_line(), words, catch_exceptions=False)
+    done = CliRunner().invoke(study_app, words, catch_exceptions=False)
     assert done.exit_code == 0
     found = json.loads(done.stdout)
     assert found["schema"] == "rig.study.oneill/1"

@@ -11,7 +11,7 @@ from rig.studies.delsol.study import PEAK_PERCENT, STIFFNESS_N_M, TABLE_1_HZ, TA
 from rig.studies.oneill.paper import PAPER as ONEILL
 from rig.studies.oneill.paper import PAPER_POSE_SAMPLES
 from rig.studies.pique.study import THESIS_TABLE_3_2
-from rig.studies.pique.wrench import SERIES, TABLES
+from rig.studies.wrench.study import SERIES, TABLES
 from rig.studies.zhang.study import PAPER as ZHANG
 from rig.studies.zhang.study import PAPER_FORCE_N, PAPER_MOMENT_N_M
 from rig.studies.zhao.paper import PAPER_COEFFICIENTS, PAPER_DELAYS_MS, PAPER_ERRORS_N

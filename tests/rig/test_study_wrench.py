@@ -16,7 +16,7 @@ from estimation.arm.tables import PSM
 from estimation.arm.wrench import body_jacobians, in_tip_frame, spatial_jacobians
 from rig.arm.hidden import FAMILIES
 from rig.arm.simulated import contact_motion
-from rig.studies.pique.wrench import (
+from rig.studies.wrench.study import (
     BODY,
     HAND,
     OURS,
@@ -33,7 +33,7 @@ FREE = (HAND, SERIES)
 def test_the_command_reports_every_family(tmp_path, monkeypatch):
     done = {number: one_arm(number) for number in (0, 1)}
     monkeypatch.setattr(
-        "rig.studies.pique.wrench.one_arm",
+        "rig.studies.wrench.study.one_arm",
         lambda number: replace(done[min(number, 1)], family=FAMILIES[number]),
     )
     out = tmp_path / "wrench.md"
@@ -69,6 +69,6 @@ def test_an_interrupted_study_reports_how_to_go_on(tmp_path, monkeypatch, capsys
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("rig.studies.pique.wrench.run_wrench_study", stopped)
+    monkeypatch.setattr("rig.studies.wrench.study.run", stopped)
     assert main(["study", "wrench", "--state", str(tmp_path)]) == 130
     assert f"kept in {tmp_path}" in capsys.readouterr().err

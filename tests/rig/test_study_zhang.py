@@ -19,7 +19,7 @@ from rig.studies.zhang.psm import GRIPPER, simulate, with_instrument
 from rig.studies.zhang.psm_instruments import KINDS
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
 from rig.studies.zhang.seed import one_arm
-from rig.studies.zhang.study import PAPER, run_zhang
+from rig.studies.zhang.study import PAPER, run
 
 pytestmark = pytest.mark.long
 
@@ -110,7 +110,7 @@ def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path,
     assert "| M+C on M: paper | lost | lost | 6.11 | lost | lost | lost |" in out.read_text()
     assert (tmp_path / "zhang-grasp.svg").exists()
     monkeypatch.setattr("rig.studies.seeds._done", nothing_left)
-    again = run_zhang(1, Keeper(state))
+    again = run(1, Keeper(state))
     assert {cell: list(numbers) for cell, numbers in again.outcomes[0].items()} == cells
     assert set(PAPER) <= {cell.rsplit(" | ", 1)[0] for cell in cells}
 

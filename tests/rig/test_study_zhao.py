@@ -10,8 +10,7 @@ from estimation.filters import CausalFilter, LowPass
 from estimation.model import Estimate, Term
 from estimation.model_file import parse, to_toml
 from rig.cli.main import main
-from rig.grasper.angle_led import angle_led
-from rig.grasper.current_force import CurrentForce
+from rig.grasper.current_force import CurrentForce, angle_led
 from rig.grasper.hidden import FAMILIES, OWN, with_family
 from rig.grasper.inputs import end_of_hold, hold
 from rig.grasper.plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis
@@ -19,7 +18,7 @@ from rig.studies.seeds import Keeper
 from rig.studies.zhao import study as zhao
 from rig.studies.zhao.haptics import run_haptics
 from rig.studies.zhao.methods import Lacking, axes_of, declared, fitted, lacking
-from rig.studies.zhao.page import markdown
+from rig.studies.zhao.page import page
 from rig.studies.zhao.paper import DOFS, PAPER_ERRORS_N
 
 pytestmark = pytest.mark.long
@@ -135,11 +134,11 @@ def test_every_family_is_in_the_report(mean_grasper):
     cells = {dof: [mean_grasper["yaw"]] * len(FAMILIES) for dof in DOFS}
     found = (("friction.load", "identified"),)
     lacked = {(family, dof): Lacking(found, bearing(dof)) for family in FAMILIES for dof in DOFS}
-    text = markdown(zhao.Study("third prototype", 0.1, cells, lacked))
+    text = page(zhao.Study("third prototype", 0.1, cells, lacked)).markdown()
     assert "| pitch, periodic | +0.71 |" in text
     assert all(f"| {family} |" in text for family in FAMILIES)
     assert "friction.load (identified)" in text
-    other = markdown(zhao.Study("ball bearings", 0.1, cells, lacked))
+    other = page(zhao.Study("ball bearings", 0.1, cells, lacked)).markdown()
     assert "The paper states no errors of this prototype" in other
     assert "+0.71" not in other
 

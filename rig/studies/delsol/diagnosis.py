@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.arm.balances import closed
+from estimation.arm.balances import equations
 from estimation.arm.effects import on_joint
 from estimation.arm.motion import JointNames, Motion
 from estimation.arm.shared import laid_out
@@ -20,7 +20,6 @@ from rig.arm.simulated import recorded
 from rig.studies.delsol.hydraulic_arm import (
     HYDRAULIC,
     RATE_HZ,
-    SIGN_RAD_S,
     HydraulicArm,
     free_motions,
     measured_torque,
@@ -29,7 +28,7 @@ from rig.studies.delsol.hydraulic_arm import (
 PULLS = ("spring.position", "friction.position")
 """What the catalogue calls the pull and the rub of hoses or wires."""
 
-JOINTS = len(HYDRAULIC.reach)
+JOINTS = len(HYDRAULIC.joints)
 NAMES = tuple(JointNames(k + 1, prismatic=False) for k in range(JOINTS))
 
 
@@ -62,7 +61,7 @@ def diagnosed(arm: HydraulicArm, rng: np.random.Generator) -> tuple[tuple[Named,
     """Move an arm freely and diagnose its joints; return the result and its effects."""
     recordings = free_runs(arm, rng)
     sealed = split(recordings)
-    balances = closed(HYDRAULIC, SIGN_RAD_S)
+    balances = equations(HYDRAULIC, NAMES)
     whole = laid_out(balances, recordings, sealed.discover)
     found = answer(whole, balances.models, sealed)
     told = tuple(

@@ -10,14 +10,10 @@ from math import pi
 
 import numpy as np
 
-from estimation.arm.closed_chain import (
-    ClosedChain,
-    closed_jacobians,
-    closed_regressor,
-)
-from estimation.arm.motion import Motion
-from estimation.arm.periodic import periodic_motion
-from estimation.arm.tables import Body, DhRow
+from estimation.arm.motion import Motion, periodic_motion
+from estimation.arm.regressor import regressor
+from estimation.arm.tables import Arm, Body, DhRow, Joint
+from estimation.arm.wrench import tip_jacobians
 from estimation.recording import FloatArray
 from rig.arm.hidden import OWN, HiddenTorque, bouc_wen, draw_hidden
 
@@ -29,24 +25,35 @@ FUNDAMENTALS = (1, 2, 3)
 position, is not collinear with inertia, proportional to position times frequency squared."""
 
 HIGHEST_HZ = 5.0
-SIGN_RAD_S = 0.01
 
-HYDRAULIC = ClosedChain(
+SPEED_RAD_S = 2.0
+"""Frictions change sign over half a per cent of it."""
+
+_BODIES = (
+    Body("shoulder azimuth", 0, DhRow(0.0, 0.0, 0.3, 0.0), (1, 0, 0, 0, 0)),
+    Body("shoulder elevation", 1, DhRow(0.0, pi / 2, 0.0, 0.3), (0, 1, 0, 0, 0)),
+    Body("elbow", 2, DhRow(0.5, 0.0, 0.0, -0.6), (0, 0, 1, 0, 0)),
+    Body("wrist pitch", 3, DhRow(0.45, 0.0, 0.0, 0.2), (0, 0, 0, 1, 0)),
+    Body("wrist yaw", 4, DhRow(0.1, pi / 2, 0.0, 0.0), (0, 0, 0, 0, 1)),
+    Body("held axis", 5, DhRow(0.1, -pi / 2, 0.0, 0.0), (0, 0, 0, 0, 0)),
+    Body("coupling", 1, DhRow(0.0, pi / 2, 0.0, -0.3), (0, 1, 1, 0, 0)),
+    Body("tie bar", 7, DhRow(0.12, 0.0, 0.0, 0.6), (0, 0, -1, 0, 0)),
+)
+REACH = (0.9, 0.5, 0.6, 0.7, 0.8)
+"""Half the range of each actuated joint around zero, rad."""
+
+HYDRAULIC = Arm(
     name="hydraulic manipulator with tie bar",
-    bodies=(
-        Body("shoulder azimuth", 0, DhRow(0.0, 0.0, 0.3, 0.0), (1, 0, 0, 0, 0)),
-        Body("shoulder elevation", 1, DhRow(0.0, pi / 2, 0.0, 0.3), (0, 1, 0, 0, 0)),
-        Body("elbow", 2, DhRow(0.5, 0.0, 0.0, -0.6), (0, 0, 1, 0, 0)),
-        Body("wrist pitch", 3, DhRow(0.45, 0.0, 0.0, 0.2), (0, 0, 0, 1, 0)),
-        Body("wrist yaw", 4, DhRow(0.1, pi / 2, 0.0, 0.0), (0, 0, 0, 0, 1)),
-        Body("held axis", 5, DhRow(0.1, -pi / 2, 0.0, 0.0), (0, 0, 0, 0, 0)),
-        Body("coupling", 1, DhRow(0.0, pi / 2, 0.0, -0.3), (0, 1, 1, 0, 0)),
-        Body("tie bar", 7, DhRow(0.12, 0.0, 0.0, 0.6), (0, 0, -1, 0, 0)),
+    joints=tuple(
+        Joint(body.name, "revolute", body.row, -reach, reach, SPEED_RAD_S)
+        for body, reach in zip(_BODIES, REACH, strict=False)
     ),
     tip=DhRow(0.139, 0.0, 0.0, 0.0),
     tip_body=6,
-    reach=(0.9, 0.5, 0.6, 0.7, 0.8),
+    viscous_pairs=(),
     gravity_m_s2=(0.0, 0.0, -9.80665),
+    loops=_BODIES,
+    hydraulic=True,
     source="E. del Sol et al. 2014: reach and tie bar; every other dimension and mass is assumed",
 )
 
@@ -70,7 +77,7 @@ class HydraulicArm:
     """One arm drawn at random around the plausible one.
 
     Attributes:
-        values: Parameters in the order of `parameter_names`.
+        values: Parameters in the order of `estimation.arm.regressor.names`.
         hidden: Amplitude of hidden friction of each actuated joint, N m.
         hose: Stiffness of the hoses on joint 1, N m/rad.
         constants: True over nominal pressure constant of each actuated joint.
@@ -111,7 +118,7 @@ def draw(rng: np.random.Generator, family: str = OWN) -> HydraulicArm:
 def free_motions(rng: np.random.Generator) -> list[Motion]:
     """Return motions of all joints along finite Fourier series (equation 14), about poses."""
     time = np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
-    reach = np.array(HYDRAULIC.reach)
+    reach = np.array(REACH)
     motions = []
     for number in range(RUNS):
         slowest = FUNDAMENTALS[number % len(FUNDAMENTALS)] / SECONDS
@@ -137,8 +144,8 @@ def measured_torque(
     arm: HydraulicArm, motion: Motion, force: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
     """Return the torque that the pressures show of a motion, with a force at the tip (n, 3)."""
-    inner = closed_regressor(HYDRAULIC, motion, SIGN_RAD_S) @ arm.values
-    jacobians = closed_jacobians(HYDRAULIC, motion.position)[:, :3]
+    inner = regressor(HYDRAULIC, motion) @ arm.values
+    jacobians = tip_jacobians(HYDRAULIC, motion.position)[:, :3]
     outer = np.einsum("nij,ni->nj", jacobians, force)
     hidden = friction(arm, motion)
     hidden[:, 0] += hose_drag(motion, arm.hose)

@@ -1,15 +1,16 @@
-"""The study of del Sol et al. 2014 as tables for any medium, as Markdown, and as figures."""
+"""The page of the study of del Sol et al. 2014."""
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, names_of
-from rig.output.figures import paired_bars, write_svgs
-from rig.output.table import TextTable, to_page
+from rig.output.figures import paired_bars
+from rig.output.page import Page
+from rig.output.table import TextTable
 from rig.studies.coverage import coverage
 from rig.studies.delsol.diagnosis import JOINTS, PULLS, Named
 from rig.studies.delsol.hydraulic_arm import HYDRAULIC, RUNS
@@ -70,7 +71,7 @@ def is_false(finding: Named, family: str) -> bool:
     return finding.family != "unknown" and true.isdisjoint({finding.family, *finding.alternatives})
 
 
-def lead(study: DelSolStudy) -> str:
+def _lead(study: DelSolStudy) -> str:
     """Return how ours compares, on how many arms the hoses were found, and what was false."""
     found = [(f, family) for family, arms in _by_family(study).items() for arm in arms for f in arm]
     hoses = sum(map(_has_hoses, study.named))
@@ -84,25 +85,25 @@ def lead(study: DelSolStudy) -> str:
     )
 
 
-def markdown(study: DelSolStudy, figures: Sequence[str] = ()) -> str:
-    """Return the study as a Markdown page."""
-    return to_page([TITLE, lead(study), NOTE], tables(study), study.provenance, figures)
+def page(study: DelSolStudy) -> Page:
+    """Return the study's page."""
+    paragraphs = [_lead(study), NOTE]
+    return Page(TITLE, paragraphs, _tables(study), study.provenance, lambda: _figures(study))
 
 
-def write_figures(folder: Path, study: DelSolStudy) -> list[Path]:
-    """Write the median residual of each joint and the median errors of force, by method."""
+def _figures(study: DelSolStudy) -> Mapping[str, Markup]:
+    """Draw the median residual of each joint and the median errors of force, by method."""
     sides = ("paper's method", "ours")
     paper, ours = (np.median(_errors(study, method), axis=0) for method in (PAPER, OURS))
     joints = {f"joint {k + 1}": (paper[k], ours[k]) for k in range(JOINTS)}
     named = {n: (paper[k], ours[k]) for n, k in (("impact", JOINTS), ("sliding", JOINTS + 1))}
-    drawn = {
+    return {
         "delsol-residual": paired_bars(joints, sides, "RMS residual, N m", "Table 2, medians"),
         "delsol-forces": paired_bars(named, sides, "RMS error of force, N", "Table 5, medians"),
     }
-    return write_svgs(folder, drawn)
 
 
-def tables(study: DelSolStudy) -> list[TextTable]:
+def _tables(study: DelSolStudy) -> list[TextTable]:
     """Return the paper's tables with ours next to them."""
     joints = [f"joint {k + 1}" for k in range(JOINTS)]
     excited = [[f"joint {k + 1}", *(f"{f:.3f}" for f in row)] for k, row in enumerate(TABLE_1_HZ)]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.arm.closed_chain import closed_jacobians, closed_regressor
 from estimation.arm.identification import damped_around
-from estimation.arm.motion import Motion
-from estimation.arm.periodic import periodic_motion
+from estimation.arm.motion import Motion, periodic_motion
+from estimation.arm.regressor import regressor
+from estimation.arm.wrench import tip_jacobians
 from estimation.filters import LowPass, zero_phase
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES
@@ -24,7 +24,7 @@ from rig.studies.delsol.hydraulic_arm import (
     HIGHEST_HZ,
     HYDRAULIC,
     RATE_HZ,
-    SIGN_RAD_S,
+    REACH,
     HydraulicArm,
     draw,
     measured_torque,
@@ -100,7 +100,7 @@ class Seed:
     named: tuple[Named, ...]
 
 
-def run_delsol(seeds: int, keeper: Keeper) -> DelSolStudy:
+def run(seeds: int, keeper: Keeper) -> DelSolStudy:
     """Do the study on arms of every family of hidden friction.
 
     Args:
@@ -166,9 +166,9 @@ def swings(rng: np.random.Generator) -> list[Motion]:
             for _ in range(POSES):
                 samples = round(RATE_HZ / frequency)
                 phase = 2 * np.pi * np.arange(2 * samples) / samples
-                pose = np.array(HYDRAULIC.reach) * rng.uniform(-0.6, 0.6, JOINTS)
+                pose = np.array(REACH) * rng.uniform(-0.6, 0.6, JOINTS)
                 position = np.tile(pose, (len(phase), 1))
-                size = min(0.8 * HYDRAULIC.reach[joint], 1.2 / (2 * np.pi * frequency))
+                size = min(0.8 * REACH[joint], 1.2 / (2 * np.pi * frequency))
                 position[:, joint] = size * np.sin(phase)
                 motions.append(periodic_motion(position, 1 / RATE_HZ, HIGHEST_HZ))
     return motions
@@ -178,7 +178,7 @@ def impact(arm: HydraulicArm, rng: np.random.Generator) -> tuple[Motion, FloatAr
     """Return joint 2's up and down onto a spring: motion, torque shown, force on the spring."""
     pose = np.array([0.1, -0.2, -0.1, 0.2, 0.0]) + 0.05 * rng.normal(size=JOINTS)
     motion = _around(pose, 1, 0.12, 0.2)
-    lever = float(np.abs(closed_jacobians(HYDRAULIC, pose[None])[0, 2, 1]))
+    lever = float(np.abs(tip_jacobians(HYDRAULIC, pose[None])[0, 2, 1]))
     depth = lever * np.clip(pose[1] - motion.position[:, 1], 0, None)
     force = np.zeros((len(motion), 3))
     force[:, 2] = -STIFFNESS_N_M * np.clip(depth - depth.max() + PEAK_N / STIFFNESS_N_M, 0, None)
@@ -203,7 +203,7 @@ def _around(pose: FloatArray, joint: int, size_rad: float, frequency_hz: float) 
 
 def paper_columns(motion: Motion) -> FloatArray:
     """Return the 96 columns of eight links, ten parameters and two frictions each."""
-    return closed_regressor(HYDRAULIC, motion, SIGN_RAD_S)
+    return regressor(HYDRAULIC, motion)
 
 
 def conditions(table: FloatArray) -> FloatArray:
@@ -219,7 +219,7 @@ def tip_force(motion: Motion, external: FloatArray) -> FloatArray:
     Six components are not observable with five joints: the tip is assumed to push and not to twist.
     """
     smooth = zero_phase(external, RATE_HZ, LOW_PASS)
-    jacobians = closed_jacobians(HYDRAULIC, motion.position)[:, :3]
+    jacobians = tip_jacobians(HYDRAULIC, motion.position)[:, :3]
     force: FloatArray = np.einsum(
         "nij,nj->ni", np.linalg.pinv(jacobians.transpose(0, 2, 1)), smooth
     )

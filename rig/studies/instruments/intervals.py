@@ -15,12 +15,10 @@ from estimation.estimators.bank import EVERY, BankEstimator, fit_runs, rows_of
 from estimation.estimators.run_evidence import RunEvidence
 from rig.importers.jaw_steps import JAW, with_one_zero
 from rig.output.provenance import Provenance
-from rig.studies.oneill.paper import DISTAL, PROXIMAL
-from rig.studies.oneill.state_rows import CONDITIONS
+from rig.studies.oneill.paper import CONDITIONS, DISTAL, FOLDS, PROXIMAL
 
 TARGETS = (PROXIMAL, DISTAL, JAW)
 BANK = Bank("motor_current_a")
-FOLDS = 5
 INSTRUMENTS = (
     *("Tool_4_Maryland_L_4", "Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"),
     *(f"Tool_4_Maryland_L_{pose}_{k}" for pose in ("Pitch", "Roll") for k in range(1, 6)),

@@ -1,12 +1,13 @@
-"""How often intervals hold, as tables and as a page."""
+"""The page of how often intervals hold."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from rig.output.table import TextTable, to_page
+from rig.output.page import Page
+from rig.output.table import TextTable
 from rig.studies.instruments.intervals import CHOSEN_ON, COUNTS, Held, IntervalStudy
-from rig.studies.oneill.networks_page import SHOWN
+from rig.studies.oneill.paper import SHOWN
 
 TITLE = "How often the intervals hold"
 AIM = (0.93, 0.97)
@@ -18,7 +19,12 @@ LEFT_OUT = {
 }
 
 
-def lead(study: IntervalStudy) -> list[str]:
+def page(study: IntervalStudy) -> Page:
+    """Return the study's page."""
+    return Page(TITLE, [" ".join(_lead(study))], _tables(study), study.provenance)
+
+
+def _lead(study: IntervalStudy) -> list[str]:
     """Return the result in sentences."""
     usual = _usual(study)
     found = [
@@ -76,7 +82,7 @@ def _usual(study: IntervalStudy) -> dict[tuple[str, str], float]:
     return {(row.instrument, row.target): row.half_width for row in runs}
 
 
-def tables(study: IntervalStudy) -> list[TextTable]:
+def _tables(study: IntervalStudy) -> list[TextTable]:
     """Return the table of levels left out and that of other instruments."""
     usual = _usual(study)
     columns = ["instrument", "estimate", "left out", "runs", "RMSE", "covered", "standard error"]
@@ -118,8 +124,3 @@ def _cells(row: Held) -> Iterator[str]:
 
 def _none(row: Held) -> str:
     return f"{row.no_width:.0%}"
-
-
-def markdown(study: IntervalStudy) -> str:
-    """Return the study as a Markdown page."""
-    return to_page([TITLE, " ".join(lead(study))], tables(study), study.provenance)

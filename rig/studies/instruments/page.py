@@ -1,8 +1,9 @@
-"""Estimators of one instrument on others, as a table and as a page."""
+"""The page of estimators of one instrument on others."""
 
 from statistics import median
 
-from rig.output.table import TextTable, to_page
+from rig.output.page import Page
+from rig.output.table import TextTable
 from rig.studies.instruments.study import InstrumentStudy
 
 TITLE = "An estimator of one instrument on others"
@@ -15,8 +16,13 @@ NOTE = (
 )
 
 
-def lead(study: InstrumentStudy) -> str:
-    """Return the result in a sentence."""
+def page(study: InstrumentStudy) -> Page:
+    """Return the study's page."""
+    tables = [_table(study), _drawn_table(study)]
+    return Page(TITLE, [_lead(study)], tables, study.provenance)
+
+
+def _lead(study: InstrumentStudy) -> str:
     parts = [
         f"{1e3 * median(row.rmse_n_m):.2f} mN m on {row.instrument} with {row.runs}"
         f" run{'s' if row.runs > 1 else ''}"
@@ -26,7 +32,7 @@ def lead(study: InstrumentStudy) -> str:
     return f"Fitted on {study.source} and adapted{reach}: the median over choices of these runs."
 
 
-def drawn_table(study: InstrumentStudy) -> TextTable:
+def _drawn_table(study: InstrumentStudy) -> TextTable:
     """Return the effect of the choice of the runs on the errors."""
     cells = [
         [
@@ -47,7 +53,7 @@ def drawn_table(study: InstrumentStudy) -> TextTable:
     return TextTable(title, [*columns, "interval of 95 % covers"], cells, note)
 
 
-def table(study: InstrumentStudy) -> TextTable:
+def _table(study: InstrumentStudy) -> TextTable:
     """Return the errors."""
     cells = []
     for row in study.rows:
@@ -65,8 +71,3 @@ def table(study: InstrumentStudy) -> TextTable:
     return TextTable(
         "Other instruments", [*columns, "interval of 95 % covers", "runs not used"], cells, NOTE
     )
-
-
-def markdown(study: InstrumentStudy) -> str:
-    """Return the study as a Markdown page."""
-    return to_page([TITLE, lead(study)], [table(study), drawn_table(study)], study.provenance)

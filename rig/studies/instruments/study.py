@@ -21,7 +21,8 @@ from estimation.estimators.run_evidence import RunEvidence
 from estimation.networks.training import Settings, has_torch
 from rig.models.adapt import Adaptation, open_source, run_adaptation
 from rig.output.provenance import Provenance
-from rig.studies.oneill.kinds import EVERY, LOAD, PAPER_INPUTS, TARGET
+from rig.studies.oneill.kinds import EVERY, LOAD, PAPER_INPUTS
+from rig.studies.oneill.paper import PROXIMAL as TARGET
 
 USED = (("11",), ("22",), ("00", "11", "22"), ("03", "21", "42"))
 """Runs adapted with."""

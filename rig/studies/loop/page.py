@@ -1,12 +1,19 @@
-"""The study of the closed loop as tables for any medium, and as Markdown."""
+"""The page of the study of the closed loop."""
 
-from rig.output.table import TextTable, to_page
+from rig.output.page import Page
+from rig.output.table import TextTable
 from rig.studies.loop.study import TIMELESS, LoopStudy, Row
 
 TITLE = "The loop closed on measured data: from a linear model to named effects"
 
 
-def lead(study: LoopStudy) -> str:
+def page(study: LoopStudy) -> Page:
+    """Return the study's page."""
+    tables = [_errors(study), *(_effects(row) for row in study.rows)]
+    return Page(TITLE, [_lead(study), *_notes(study)], tables, study.provenance)
+
+
+def _lead(study: LoopStudy) -> str:
     """Return the study's result in one sentence."""
     parts = [
         f"{row.task.name} over {row.task.samples} samples {_mn_m(row.linear)} to {_mn_m(row.rmse)}"
@@ -19,7 +26,7 @@ def lead(study: LoopStudy) -> str:
     )
 
 
-def notes(study: LoopStudy) -> list[str]:
+def _notes(study: LoopStudy) -> list[str]:
     """Return remarks for a comparison."""
     sealed = study.sealed
     found = [
@@ -35,16 +42,6 @@ def notes(study: LoopStudy) -> list[str]:
     ]
     found += [f"Left out: run {name}, {reason}." for name, reason in study.left_out.items()]
     return found
-
-
-def tables(study: LoopStudy) -> list[TextTable]:
-    """Return the study's tables."""
-    return [_errors(study), *(_effects(row) for row in study.rows)]
-
-
-def markdown(study: LoopStudy) -> str:
-    """Return the study as a Markdown page."""
-    return to_page([TITLE, lead(study), *notes(study)], tables(study), study.provenance)
 
 
 def _errors(study: LoopStudy) -> TextTable:

@@ -1,6 +1,7 @@
-"""The study of other people's machines as tables and as a Markdown page."""
+"""The page of the study of other people's machines."""
 
-from rig.output.table import TextTable, to_page
+from rig.output.page import Page
+from rig.output.table import TextTable
 from rig.studies.machines.cases import CASES
 from rig.studies.machines.study import MachineStudy
 
@@ -13,17 +14,21 @@ NOTE = (
 )
 
 
-def lead(study: MachineStudy) -> str:
-    """Return the study in a sentence."""
+def page(study: MachineStudy) -> Page:
+    """Return the study's page."""
     found = [row for row in study.rows if row.found_percent < row.declared_percent]
-    return (
+    lead = (
         f"{len(study.rows)} equations of {len({row.case for row in study.rows})} machines;"
         f" effects were found in {len(found)}."
     )
+    cards = sorted({case.card for case in CASES})
+    linked = "Cards: " + ", ".join(f"[{card}](../machines/{card}.md)" for card in cards) + "."
+    skipped = ["Not studied: " + " ".join(study.skipped)] if study.skipped else []
+    return Page(TITLE, [lead, *skipped, linked], _tables(study), study.provenance)
 
 
-def tables(study: MachineStudy) -> list[TextTable]:
-    """Return errors, findings, and the published estimates made again."""
+def _tables(study: MachineStudy) -> list[TextTable]:
+    """Return the published estimates made again, errors, and findings."""
     errors = [
         [
             f"{row.case}, {row.equation}",
@@ -61,11 +66,3 @@ def tables(study: MachineStudy) -> list[TextTable]:
         )
     made.append(TextTable("Findings", ("machine, equation", "finding", "to check"), found))
     return made
-
-
-def markdown(study: MachineStudy) -> str:
-    """Return the study as a Markdown page."""
-    cards = sorted({case.card for case in CASES})
-    linked = "Cards: " + ", ".join(f"[{card}](../machines/{card}.md)" for card in cards) + "."
-    skipped = ["Not studied: " + " ".join(study.skipped)] if study.skipped else []
-    return to_page([TITLE, lead(study), *skipped, linked], tables(study), study.provenance)

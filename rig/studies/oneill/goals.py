@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from estimation.bank.interval import COVERAGE
 from rig.output.table import TextTable
 from rig.studies.oneill.networks import NetworkStudy
-from rig.studies.oneill.networks_page import SHOWN
-from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
+from rig.studies.oneill.paper import CONDITIONS, DISTAL, JAW, PROXIMAL, SHOWN
 from rig.studies.oneill.state_rows import StateJob, StateRow
 from rig.studies.oneill.states import StateStudy
 
@@ -85,7 +84,7 @@ def reached(study: StateStudy, deep: NetworkStudy | None) -> list[Reached]:
                 continue
             unseen = {
                 protocol: rows[job]
-                for protocol in ("lofo", "lopo")
+                for protocol in CONDITIONS
                 if (job := StateJob(pose, surrogate, target, "live", protocol)) in rows
             }
             found.append(Reached(live, whole, unseen, _network(deep, live.job)))
@@ -156,7 +155,7 @@ def table(found: list[Reached]) -> TextTable:
             _cell(one, one.without_lag.score.rmse),
             *(
                 _cell(one, row.score.rmse) if (row := one.unseen.get(p)) is not None else ""
-                for p in ("lofo", "lopo")
+                for p in CONDITIONS
             ),
             ", ".join(one.missed) or "nothing",
         ])  # fmt: skip

@@ -23,11 +23,10 @@ from estimation.estimators.residual import ResidualRecipe
 from estimation.networks.training import Settings, has_torch
 from estimation.recording import FloatArray
 from estimation.scores import Score, score
-from rig.studies.oneill import fits
+from rig.studies.oneill.paper import FOLDS, SURROGATES
+from rig.studies.oneill.paper import PROXIMAL as TARGET
 
-FOLDS = 5
-LOAD = "motor_current_a"
-TARGET = fits.TARGET
+LOAD = SURROGATES["current"]
 PAPER_INPUTS = ("spindle_angle_rad", "spindle_velocity_rad_s", LOAD)
 FILTERS = ("zero-phase", "live")
 EVERY = 24

@@ -3,42 +3,26 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from rig.studies.oneill.closing_table import CAUSAL
-from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
-
-FOLDS = 5
-
+from rig.studies.oneill.data import CAUSAL
+from rig.studies.oneill.paper import DISTAL, JAW, POSES, PROXIMAL, SURROGATES
 
 BASE = ("spindle_angle_rad", "spindle_velocity_rad_s")
 
-
-SURROGATES = {
-    "command": ("motor_command_ratio",),
-    "current": ("motor_current_a",),
-    "gearbox": ("gearbox_differential_rad",),
-    "all": ("motor_command_ratio", "motor_current_a", "gearbox_differential_rad"),
+LOADS = {
+    **{name: (channel,) for name, channel in SURROGATES.items()},
+    "all": tuple(SURROGATES.values()),
     "sensor": (PROXIMAL,),
 }
-
+"""Channels of each surrogate of the paper's tables."""
 
 ACCELERATION, TRAVEL = "motor_acceleration_rad_s2", "motor_travel_rad"
 
-
-POSES = {"neutral": (), "pitch": ("wrist_pitch_rad",), "roll": ("wrist_roll_rad",)}
-"""The paper's experiments 1 and 2, and the two halves of experiment 3: inputs each one adds."""
-
-
-CHANNELS = (
-    *BASE, *SURROGATES["all"], PROXIMAL, DISTAL, JAW, ACCELERATION, TRAVEL,
-)  # fmt: skip
-
+CHANNELS = (*BASE, *SURROGATES.values(), PROXIMAL, DISTAL, JAW, ACCELERATION, TRAVEL)
 
 STATE_NODES = 12
 
-
 ALONE = (PROXIMAL, DISTAL, JAW)
 """Targets of the networks with physical states, one network each."""
-
 
 MOTOR = [("end-to-end", "command"), ("end-to-end", "current")]
 """The rows of the paper that the physical states are compared with."""
@@ -52,7 +36,7 @@ class Job:
         pose: Key of `POSES`.
         way: `end-to-end` or `staged` as in the paper; `+ acceleration`, `+ travel` for networks
             with physical states, and `causal` for the last of them on channels filtered as live.
-        surrogate: Key of `SURROGATES`.
+        surrogate: Key of `LOADS`.
         protocol: As for `held_out_masks`.
         targets: Estimated channels.
     """
@@ -68,10 +52,10 @@ class Job:
         """Columns the network reads."""
         states = {"+ acceleration": (ACCELERATION,), "end-to-end": ()}
         own = states.get(self.way, (ACCELERATION, TRAVEL))
-        channels = (*BASE, *SURROGATES[self.surrogate], *own)
+        channels = (*BASE, *LOADS[self.surrogate], *own)
         if self.way == "causal":
             channels = tuple(CAUSAL + name for name in channels)
-        return (*channels, *POSES[self.pose])
+        return (*channels, *filter(None, [POSES[self.pose]]))
 
     @property
     def nodes(self) -> int:
@@ -93,10 +77,10 @@ def jobs(poses: tuple[str, ...]) -> list[Job]:
     """Return the rows of the study, the most telling ones first."""
     both = (DISTAL, JAW)
     paper: list[Kind] = []
-    paper += [("neutral", "end-to-end", s, (PROXIMAL,)) for s in tuple(SURROGATES)[:4]]
-    paper += [("neutral", "end-to-end", s, both) for s in SURROGATES]
-    paper += [("neutral", "staged", s, both) for s in tuple(SURROGATES)[:4]]
-    posed = [(p, "end-to-end", s, both) for p in ("pitch", "roll") for s in SURROGATES]
+    paper += [("neutral", "end-to-end", s, (PROXIMAL,)) for s in tuple(LOADS)[:4]]
+    paper += [("neutral", "end-to-end", s, both) for s in LOADS]
+    paper += [("neutral", "staged", s, both) for s in tuple(LOADS)[:4]]
+    posed = [(p, "end-to-end", s, both) for p in ("pitch", "roll") for s in LOADS]
     ways = {
         way: [("neutral", way, s, (t,)) for s in ("command", "current") for t in ALONE]
         for way in ("+ travel", "causal", "+ acceleration")

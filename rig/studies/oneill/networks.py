@@ -5,26 +5,30 @@ name made of the data and of all settings; a study that was interrupted goes on 
 """
 
 import hashlib
-import os
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, field, replace
-from multiprocessing import get_context, parent_process
 from pathlib import Path
-from threading import Thread
 
 import numpy as np
 
+from estimation.campaign import Campaign
 from estimation.networks import network as net
 from estimation.networks.network import Network
 from estimation.networks.training import Settings, require_torch, train
-from estimation.recording import FloatArray
 from estimation.scores import Score, score
 from rig.output.provenance import Provenance
-from rig.studies.oneill.closing_table import ClosingTable, held_out_masks, mapped
-from rig.studies.oneill.network_jobs import FOLDS, Job, jobs
-from rig.studies.oneill.paper import DISTAL, GRIP_ARM_M, PROXIMAL
+from rig.studies.oneill.data import ClosingTable, closing_table, held_out_masks, pose_runs
+from rig.studies.oneill.network_jobs import CHANNELS, Job, jobs
+from rig.studies.oneill.paper import (
+    DISTAL,
+    FOLDS,
+    GRIP_ARM_M,
+    PAPER_POSE_SAMPLES,
+    POSES,
+    PROXIMAL,
+)
+from rig.studies.seeds import begin_learning, in_processes
 
 SCHEMA = "rig.study.network/1"
 
@@ -136,7 +140,7 @@ class Trainer:
         key = (job.pose, job.protocol)
         if key not in self._masks:
             self._masks[key] = held_out_masks(
-                self.tables[job.pose], job.protocol, FOLDS, self.training.seed
+                self.tables[job.pose], job.protocol, self.training.seed
             )
         return self._masks[key]
 
@@ -196,9 +200,40 @@ class Trainer:
         ]  # fmt: skip
 
 
+def network_tables(
+    neutral: Campaign,
+    folder: Path | None,
+    on_run: Callable[[str], None] = lambda name: None,
+) -> tuple[dict[str, ClosingTable], tuple[str, ...]]:
+    """Return the closing samples by pose, and remarks about them.
+
+    Args:
+        neutral: The runs of experiments 1 and 2.
+        folder: Folder that may hold the folders or archives of experiment 3, or be next to them.
+        on_run: Called with each run's name when it has been processed.
+
+    Raises:
+        DataError: A run is damaged, or nothing is left.
+        MissingChannelError: A run lacks a channel.
+    """
+    tables = {"neutral": closing_table(neutral.evidence, CHANNELS, on_run=on_run)}
+    notes = []
+    for pose in ("pitch", "roll"):
+        runs = pose_runs(folder, pose)
+        if runs is None:
+            notes.append(f"No data of experiment 3, {pose}: its rows are left out.")
+        else:
+            tables[pose] = closing_table(runs.evidence, CHANNELS, [POSES[pose]], on_run)
+    if len(tables) == 3:
+        count = sum(len(tables[pose].run) for pose in ("pitch", "roll"))
+        same = "the paper's count" if count == PAPER_POSE_SAMPLES else "the paper has 962,936"
+        notes.append(f"Experiment 3 has {count:,} closing samples: {same}.")
+    return tables, tuple(notes)
+
+
 def train_task(task: Task) -> None:
     """Train one network and keep it."""
-    table = mapped(Path(task.train), task.columns)
+    table = ClosingTable.mapped(Path(task.train), task.columns)
     job = task.job
     trained = train(
         table[job.inputs][task.rows],
@@ -238,7 +273,17 @@ def run_networks(
     planned = [job for job in jobs(tuple(tables)) if trainer.masks(job)]
     waiting = {task.path: task for job in planned for task in trainer.tasks(job)}
     until_s = time.monotonic() + 60 * training.minutes
-    _train_all(list(waiting.values()), training.workers, until_s, on_network)
+    if waiting:
+        on_network(0, len(waiting))
+    trained = in_processes(
+        train_task,
+        waiting.values(),
+        training.workers,
+        begin_learning,
+        lambda: time.monotonic() < until_s,
+    )
+    for done, _ in enumerate(trained, start=1):
+        on_network(done, len(waiting))
     rows: list[NetworkRow] = []
     not_run = []
     for job in planned:
@@ -252,59 +297,9 @@ def run_networks(
         rows=tuple(rows),
         not_run=tuple(not_run),
         samples={pose: len(table.run) for pose, table in tables.items()},
-        peak_torque_n_m=float(np.max(_column(neutral, DISTAL))),
+        peak_torque_n_m=float(np.max(neutral.column(DISTAL))),
         every={pose: trainer.step(pose) for pose in tables},
         settings=training.settings,
         notes=notes,
         provenance=Provenance.now(training.seed),
     )
-
-
-def _column(table: ClosingTable, name: str) -> FloatArray:
-    return table[[name]][:, 0]
-
-
-def _train_all(
-    tasks: list[Task], workers: int, until_s: float, on_network: Callable[[int, int], None]
-) -> None:
-    """Train in processes of their own, so that each keeps to one core and can be stopped."""
-    if not tasks:
-        return
-    queue = iter(tasks)
-    done = 0
-    on_network(0, len(tasks))
-    # torch's threads do not survive a fork
-    with ProcessPoolExecutor(workers, get_context("spawn"), _begin_worker) as pool:
-        running: set[Future[None]] = set()
-        try:
-            while True:
-                while len(running) < workers and time.monotonic() < until_s:
-                    task = next(queue, None)
-                    if task is None:
-                        break
-                    running.add(pool.submit(train_task, task))
-                if not running:
-                    return
-                finished, running = wait(running, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    future.result()
-                done += len(finished)
-                on_network(done, len(tasks))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _begin_worker() -> None:
-    import torch
-
-    torch.set_num_threads(1)
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End when the study was killed, which closes no pool."""
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -2,26 +2,17 @@
 
 from collections import Counter
 
-import numpy as np
-
 from rig.output.table import TextTable
-from rig.studies.oneill.network_jobs import FOLDS, STATE_NODES
+from rig.studies.oneill.network_jobs import STATE_NODES
 from rig.studies.oneill.networks import NetworkRow, NetworkStudy
 from rig.studies.oneill.paper import (
-    DISTAL,
+    FOLDS,
     GRIP_ARM_M,
-    JAW,
+    HELD_OUT,
     PAPER_GRIP_N,
     PAPER_GRIP_SHARE,
-    PROXIMAL,
+    SHOWN,
 )
-
-SHOWN = {
-    PROXIMAL: ("proximal torque", "mN m", 1e3),
-    DISTAL: ("distal torque", "mN m", 1e3),
-    JAW: ("jaw angle", "deg", float(np.degrees(1.0))),
-}
-"""Name, unit and scale of each target."""
 
 WAYS = {
     "end-to-end": "the paper's inputs and 30 nodes",
@@ -67,7 +58,6 @@ def tables(study: NetworkStudy) -> list[TextTable]:
 
 
 def _held_out_table(study: NetworkStudy, pose: str) -> TextTable:
-    protocols = ("random", "run-wise", "lofo", "lopo")
     found: dict[tuple[str, str, str], dict[str, NetworkRow]] = {}
     for row in study.rows:
         if row.pose == pose:
@@ -75,9 +65,9 @@ def _held_out_table(study: NetworkStudy, pose: str) -> TextTable:
     rows = []
     for (target, surrogate, way), by in sorted(found.items(), key=_order):
         name, unit, scale = SHOWN[target]
-        cells = [f"{scale * by[p].score.rmse:.2f}" if p in by else "" for p in protocols]
+        cells = [f"{scale * by[p].score.rmse:.2f}" if p in by else "" for p in HELD_OUT]
         rows.append([f"{name}, {unit}: {surrogate}, {way}", *cells])
-    columns = ["RMSE", "samples at random", "runs", "a frequency (LOFO)", "a power level (LOPO)"]
+    columns = ["RMSE", *HELD_OUT.values()]
     note = f"Runs: {FOLDS} folds of whole runs. " + "; ".join(f"{k}: {v}" for k, v in WAYS.items())
     return TextTable(f"Networks, {pose} pose: RMSE by what was held out", columns, rows, note + ".")
 

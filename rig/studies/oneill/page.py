@@ -1,49 +1,106 @@
-"""The study of O'Neill et al. 2018 as tables for any medium and as Markdown."""
+"""The page of the study of O'Neill et al. 2018."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rig.output.page import Page
 from rig.output.table import TextTable, to_markdown
 from rig.studies.coverage import coverage
 from rig.studies.oneill import goals
 from rig.studies.oneill import networks_page as networks
 from rig.studies.oneill import states_page as states
 from rig.studies.oneill import tables as paper
+from rig.studies.oneill.figures import draw
 from rig.studies.oneill.kinds import FILTERS, KindRow
 from rig.studies.oneill.networks import NetworkStudy
-from rig.studies.oneill.states import StateStudy
-from rig.studies.oneill.study import PROTOCOLS, Study
+from rig.studies.oneill.paper import HELD_OUT, PROTOCOLS
+from rig.studies.oneill.states import Shown, StateStudy
+from rig.studies.oneill.study import Study
 
 TITLE = "Grip torque and jaw angle from motor current: O'Neill et al. 2018, made again"
 
-HEADINGS = {
-    "random": "samples at random",
-    "run-wise": "runs",
-    "lofo": "a frequency (LOFO)",
-    "lopo": "a power level (LOPO)",
-}
-"""Heading of each protocol that holds something out."""
+
+@dataclass(frozen=True)
+class OneillPage(Page):
+    """The page, whose Markdown has its first table above the remarks, and figures with captions.
+
+    Attributes:
+        lead: How many of the paragraphs are the result.
+        captions: Caption of each figure.
+    """
+
+    lead: int = 1
+    captions: Sequence[str] = ()
+
+    def markdown(self, places: Sequence[str] = ()) -> str:
+        """Return the page as Markdown, with its figures at places relative to it."""
+        first, *others = (to_markdown(table).rstrip() for table in self.tables)
+        known = "\n".join(f"- {note}" for note in self.paragraphs[self.lead :])
+        parts = [f"# {self.title}", *self.paragraphs[: self.lead], first]
+        parts += ["## Before comparing", known, *(["## Figures"] if places else [])]
+        for caption, place in zip(self.captions, places, strict=False):
+            parts += [f"![{caption}]({place})", caption]
+        return "\n\n".join([*parts, *others, self.provenance.line()]) + "\n"
+
+
+def page(
+    study: Study,
+    deep: NetworkStudy | None = None,
+    physical: StateStudy | None = None,
+    kinds: Sequence[KindRow] = (),
+    shown: Mapping[str, Sequence[Shown]] | None = None,
+) -> Page:
+    """Return the study's page: what is reached, the paper's tables, then all by what was held out.
+
+    Args:
+        study: The linear rows.
+        deep: The network rows, where they were trained.
+        physical: The estimates from physical states.
+        kinds: Every kind of estimator on the same folds.
+        shown: Target to what its figures are drawn from.
+    """
+    found = goals.reached(physical, deep) if physical is not None else []
+    lead = list(goals.lead(found)) or [_lead(study)]
+    tables = [*paper.tables(study, deep), _held_out_table(study)]
+    notes = [f"Data: {study.source}.", *_notes(study)]
+    if found:
+        tables.insert(0, goals.table(found))
+    if deep is not None:
+        tables += networks.tables(deep)
+        notes += networks.notes(deep)
+    if kinds:
+        tables.append(_kinds_table(kinds))
+    if physical is not None:
+        tables += states.tables(physical)
+        notes += states.notes(physical)
+    drawn = draw(shown or {})
+    return OneillPage(
+        TITLE,
+        [*lead, *notes],
+        [*tables, coverage("oneill")],
+        study.provenance,
+        lambda: {name: figure for name, (_, figure) in drawn.items()},
+        len(lead),
+        [caption for caption, _ in drawn.values()],
+    )
 
 
 def _mn_m(torque_n_m: float) -> str:
     return f"{1e3 * torque_n_m:.2f}"
 
 
-def lead(study: Study, more: "More | None" = None) -> list[str]:
-    """Return the study's result, a paragraph each: of all that was estimated, the best."""
-    if more is not None and (found := list(goals.lead(more.reached))):
-        return found
+def _lead(study: Study) -> str:
     kept = {row.surrogate: row for row in study.rows if row.protocol == "run-wise"}
     best = min(kept.values(), key=lambda row: row.score.rmse)
-    return [
+    return (
         f"A straight line through the {best.surrogate} estimates the proximal torque to"
         f" {_mn_m(best.score.rmse)} mN m on whole runs it has not seen (RMSE over"
         f" {best.score.samples:,} closing samples of {best.runs} runs). Better estimators:"
         " --states; the paper's networks, Tables I to V: --networks."
-    ]
+    )
 
 
-def notes(study: Study) -> list[str]:
+def _notes(study: Study) -> list[str]:
     """Return remarks for the reader: the sample counts, runs left out, and the study's notes."""
     counts = (
         f"The paper's processing gives {study.closing_samples:,} closing samples; the paper states"
@@ -71,40 +128,14 @@ def _held_out_table(study: Study) -> TextTable:
     rows = [
         [name, *(_mn_m(by[p]) if p in by else "" for p in protocols)] for name, by in found.items()
     ]
-    note = "; ".join(f"{HEADINGS[name]}: {PROTOCOLS[name]}" for name in protocols) + "."
-    columns = ["surrogate", *(HEADINGS[name] for name in protocols)]
+    note = "; ".join(f"{HELD_OUT[name]}: {PROTOCOLS[name]}" for name in protocols) + "."
+    columns = ["surrogate", *(HELD_OUT[name] for name in protocols)]
     return TextTable(
         "Straight lines, proximal torque, mN m: RMSE by what was held out", columns, rows, note
     )
 
 
-@dataclass(frozen=True)
-class More:
-    """What goes beyond the linear rows, where it was done.
-
-    Attributes:
-        networks: The network rows.
-        states: The estimates from physical states.
-        kinds: Every kind of estimator on the same folds.
-    """
-
-    networks: NetworkStudy | None = None
-    states: StateStudy | None = None
-    kinds: tuple[KindRow, ...] = ()
-
-    @property
-    def reached(self) -> list[goals.Reached]:
-        """What the best estimator reaches."""
-        return goals.reached(self.states, self.networks) if self.states is not None else []
-
-    @property
-    def notes(self) -> list[str]:
-        """Notes of both."""
-        deep = networks.notes(self.networks) if self.networks is not None else []
-        return [*deep, *(states.notes(self.states) if self.states is not None else [])]
-
-
-def kinds_table(kinds: tuple[KindRow, ...]) -> TextTable:
+def _kinds_table(kinds: Sequence[KindRow]) -> TextTable:
     """Return the errors of every kind of estimator."""
     found: dict[str, list[str]] = {}
     for row in kinds:
@@ -115,42 +146,3 @@ def kinds_table(kinds: tuple[KindRow, ...]) -> TextTable:
         " runs, closing samples; each was written to a file and read again before it estimated."
     )
     return TextTable("Every kind of estimator", columns, list(found.values()), note)
-
-
-NOTHING_MORE = More()
-
-
-def markdown(study: Study, more: More = NOTHING_MORE, drawn: Sequence[tuple[str, str]] = ()) -> str:
-    """Return the study, and what goes beyond where there is any, as a Markdown page.
-
-    Args:
-        study: The linear rows.
-        more: What goes beyond.
-        drawn: Caption and place of each figure, relative to the page.
-    """
-    first, *others = all_tables(study, more)
-    known = [f"Data: {study.source}.", *all_notes(study, more)]
-    parts = [f"# {TITLE}", *lead(study, more), to_markdown(first).rstrip()]
-    parts += ["## Before comparing", "\n".join(f"- {note}" for note in known)]
-    parts += ["## Figures"] if drawn else []
-    parts += [f"![{caption}]({place})\n\n{caption}" for caption, place in drawn]
-    parts += [to_markdown(table).rstrip() for table in others]
-    return "\n\n".join([*parts, study.provenance.line()]) + "\n"
-
-
-def all_notes(study: Study, more: More) -> list[str]:
-    """Return the notes of the study and of what goes beyond."""
-    return notes(study) + more.notes
-
-
-def all_tables(study: Study, more: More) -> list[TextTable]:
-    """Return the tables: what is reached, the paper's, then all by what was held out."""
-    return [
-        *([goals.table(more.reached)] if more.reached else []),
-        *paper.tables(study, more.networks),
-        _held_out_table(study),
-        *(networks.tables(more.networks) if more.networks is not None else []),
-        *([kinds_table(more.kinds)] if more.kinds else []),
-        *(states.tables(more.states) if more.states is not None else []),
-        coverage("oneill"),
-    ]

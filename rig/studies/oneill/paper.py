@@ -1,10 +1,87 @@
-"""Tables I to V of O'Neill et al. 2018 as printed, rows of the networks.
+"""What O'Neill et al. 2018 did and what they found: channels, protocols, Tables I to V as printed.
 
-Each row is mean absolute error, 95th percentile of the absolute error, and root mean square error:
-mN m for torques, degrees for the jaw angle. Source: IEEE Robotics and Automation Letters 2018.
+Source: J. J. O'Neill, T. K. Stephens, T. M. Kowalewski, "Evaluation of torque measurement
+surrogates as applied to grip torque and jaw angle estimation of robotic surgical tools", IEEE
+Robotics and Automation Letters 2018.
 """
 
+from dataclasses import dataclass
+
+import numpy as np
+
+INSTRUMENT = "Tool_4_Maryland_L_4"
+"""Folder of the measured data that the paper's first two experiments were made of."""
+
 PROXIMAL, DISTAL, JAW = "proximal_torque_n_m", "distal_torque_n_m", "jaw_angle_rad"
+
+SHOWN = {
+    PROXIMAL: ("proximal torque", "mN m", 1e3),
+    DISTAL: ("distal torque", "mN m", 1e3),
+    JAW: ("jaw angle", "deg", float(np.degrees(1.0))),
+}
+"""Name, unit and scale of each target."""
+
+SURROGATES = {
+    "command": "motor_command_ratio",
+    "current": "motor_current_a",
+    "gearbox": "gearbox_differential_rad",
+}
+"""The paper's torque surrogates by short name, and the channel of each."""
+
+POSES = {"neutral": "", "pitch": "wrist_pitch_rad", "roll": "wrist_roll_rad"}
+"""The paper's experiments 1 and 2, and the two halves of experiment 3: the input each one adds."""
+
+FOLDS = 5
+
+CONDITIONS = {"lofo": "frequency_hz", "lopo": "load_command_a"}
+"""Condition each leave-one-out protocol holds out: one frequency, one power level."""
+
+PROTOCOLS = {
+    "authors": "the authors' way: fitted and scored on the last 7/8 of the closing samples",
+    "random": "the paper's split: 85 % of the samples at random to fit, 15 % to score",
+    "run-wise": f"{FOLDS} folds of whole runs",
+    "lofo": "one frequency left out at a time",
+    "lopo": "one power level left out at a time",
+}
+
+HELD_OUT = {
+    "random": "samples at random",
+    "run-wise": "runs",
+    "lofo": "a frequency (LOFO)",
+    "lopo": "a power level (LOPO)",
+}
+"""Heading of each protocol that holds something out."""
+
+AUTHORS_SKIP = 1 / 8
+"""The authors' linear fit omits this first part of the closing samples."""
+
+TEST_SHARE = 0.15
+"""Share of the samples that the paper's random split tests on."""
+
+PAPER_SAMPLES = 260_581
+PUBLIC_SAMPLES = 308_117
+"""Closing samples as the paper states them, and as the public data gives them."""
+
+
+@dataclass(frozen=True)
+class PaperRow:
+    """One linear row of the paper's Table I, torques in N m."""
+
+    mae: float
+    p95: float
+    rmse: float
+    pearson_r: float
+    spearman_rho: float
+
+
+PAPER_TABLE_I = {
+    "command": PaperRow(10.03e-3, 22.94e-3, 12.18e-3, 0.97, 0.97),
+    "current": PaperRow(10.06e-3, 23.26e-3, 12.26e-3, 0.97, 0.97),
+    "gearbox": PaperRow(33.91e-3, 76.30e-3, 40.53e-3, 0.60, 0.62),
+}
+
+OTHERS_REACH_N_M = {"command": 14.17e-3, "current": 14.24e-3, "gearbox": 43.14e-3}
+"""RMSE of the authors' linear fit on the public data as others have reproduced it, N m."""
 
 _FOUR = ("command", "current", "gearbox", "all")
 _FIVE = (*_FOUR, "sensor")
@@ -39,7 +116,8 @@ PAPER: dict[tuple[str, str, str, str], tuple[float, float, float]] = {
     for surrogate, row in zip(_FIVE, rows, strict=False)
     for mae, p95, rmse in [tuple(map(float, row.split()))]
 }
-"""(pose, way, target, surrogate) to the printed row."""
+"""(pose, way, target, surrogate) to the network's printed row: mean absolute error, 95th percentile
+of the absolute error and root mean square error; mN m for torques, degrees for the jaw angle."""
 
 PAPER_POSE_SAMPLES = 962_936
 """Closing samples of pitch and roll together, as the paper states them."""

@@ -12,16 +12,9 @@ from estimation.bank.states import Bank
 from estimation.estimators.bank import Estimates
 from estimation.recording import FloatArray
 from estimation.scores import Score, score
-from rig.studies.oneill.paper import PROXIMAL
+from rig.studies.oneill.paper import CONDITIONS, POSES, PROXIMAL, SURROGATES
 
-POSES = {"neutral": "", "pitch": "wrist_pitch_rad", "roll": "wrist_roll_rad"}
-LOADS = {
-    "command": "motor_command_ratio",
-    "current": "motor_current_a",
-    "sensor": PROXIMAL,
-}
-CONDITIONS = {"lofo": "frequency_hz", "lopo": "load_command_a"}
-"""What each protocol that holds a level out holds out."""
+LOADS = {**SURROGATES, "sensor": PROXIMAL}
 
 RESAMPLED = 2000
 """Campaigns resampled from the runs, for the standard error of a share."""

@@ -10,9 +10,10 @@ from itertools import groupby
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.bank.states import EFFECTS, Bank
-from estimation.campaign import Campaign, in_folds
+from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
 from estimation.estimators.bank import (
     EVERY,
@@ -24,12 +25,11 @@ from estimation.estimators.bank import (
 from estimation.estimators.run_evidence import RunEvidence
 from estimation.live_channels import causal_channels
 from estimation.recording import FloatArray, Recording
-from rig.studies.oneill.data import pose_runs
-from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
-from rig.studies.oneill.shown import Closing, Shown, shown
-from rig.studies.oneill.state_rows import CONDITIONS, LOADS, POSES, StateJob, StateRow, scored
+from rig.studies.oneill.data import held_out_runs, pose_runs
+from rig.studies.oneill.paper import CONDITIONS, DISTAL, JAW, POSES, PROXIMAL
+from rig.studies.oneill.state_rows import LOADS, StateJob, StateRow, scored
+from rig.studies.oneill.study import fit_line
 
-FOLDS = 5
 FILTERS = ("zero-phase", "live")
 TARGETS = (PROXIMAL, DISTAL, JAW)
 DRAWN = (Bank(LOADS["command"]), "live")
@@ -51,6 +51,27 @@ class StateStudy:
     rows: tuple[StateRow, ...]
     weights: int
     notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """Estimates of one target on the closing samples of a run held out, in its SI unit.
+
+    Attributes:
+        name: The run.
+        time_s: Shape (n,).
+        rows: Filtered channels of the bank, shape (n, channels).
+        truth: The target without lag, shape (n,).
+        before: Estimate by a straight line through the surrogate, as in Table I of the paper.
+        after: Estimate by physical states, fitted on the same runs.
+    """
+
+    name: str
+    time_s: FloatArray
+    rows: FloatArray
+    truth: FloatArray
+    before: FloatArray
+    after: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +119,7 @@ def run_states(
     seed: int = 0,
     on_run: Callable[[str], None] = lambda name: None,
     on_row: Callable[[int, int], None] = lambda done, total: None,
-    on_shown: Callable[[Shown], None] | None = None,
+    on_shown: Callable[[str, list[Shown]], None] | None = None,
 ) -> StateStudy:
     """Fit and score all rows.
 
@@ -108,7 +129,8 @@ def run_states(
         seed: Seed of the folds.
         on_run: Called with each run's name when it has been processed.
         on_row: Called with the number of rows done and their total.
-        on_shown: Called with what figures are drawn from; nothing is made for them if None.
+        on_shown: Called with a target and what its figures are drawn from; nothing is made for
+            them if None.
 
     Raises:
         MissingChannelError: A run lacks a channel.
@@ -134,7 +156,7 @@ def run_states(
             on_row(len(rows), len(planned))
             if on_shown is not None and kind == DRAWN:
                 for target in (PROXIMAL, DISTAL):
-                    on_shown(_shown(kind, target, runs, evidence[target], seed))
+                    on_shown(target, _shown(kind, target, runs, evidence[target], seed))
     return StateStudy(
         "rig.study.oneill-states/1",
         tuple(rows),
@@ -167,16 +189,12 @@ def _reduced(recording: Recording, pose: str, wanted: list[tuple[str, str]]) -> 
     )
 
 
-def _splits(runs: Sequence[_Run], protocol: str, seed: int) -> list[np.ndarray]:
-    """Return the indices of the runs held out together; empty when it cannot be done."""
-    if protocol == "run-wise":
-        return in_folds(len(runs), FOLDS, seed) if len(runs) >= FOLDS else []
-    condition = CONDITIONS[protocol]
-    if any(condition not in run.conditions for run in runs):
-        return []
-    values = np.array([float(run.conditions[condition]) for run in runs])
-    levels = np.unique(values)
-    return [np.flatnonzero(values == level) for level in levels] if len(levels) > 1 else []
+def _splits(runs: Sequence[_Run], protocol: str, seed: int) -> list[NDArray[np.intp]]:
+    stated = {
+        name: np.array([float(run.conditions.get(name, np.nan)) for run in runs])
+        for name in CONDITIONS.values()
+    }
+    return held_out_runs(stated, protocol, seed)
 
 
 def _evidence(kind: tuple[Bank, str], runs: Sequence[_Run]) -> dict[str, list[RunEvidence]]:
@@ -199,12 +217,24 @@ def _shown(
     runs: Sequence[_Run],
     evidence: Sequence[RunEvidence],
     seed: int,
-) -> Shown:
+) -> list[Shown]:
+    """Estimate each run by fits without it."""
     bank, filters = kind
-    closing = [
-        Closing(r.name, r.time_s, r.rows[bank.surrogate, filters], r.truth[target]) for r in runs
-    ]
-    return shown(target, bank, closing, evidence, _splits(runs, "run-wise", seed))
+    load = bank.channels.index(bank.surrogate)
+    rows = [run.rows[bank.surrogate, filters] for run in runs]
+    found: dict[int, Shown] = {}
+    for held_out in _splits(runs, "run-wise", seed):
+        rest = [k for k in range(len(runs)) if k not in held_out]
+        line = fit_line(
+            np.concatenate([rows[k][:, load] for k in rest]),
+            np.concatenate([runs[k].truth[target] for k in rest]),
+        )
+        estimator = fit_runs([evidence[k] for k in rest], bank, target)
+        for k in map(int, held_out):
+            before, after = line(rows[k][:, load]), estimator.of_rows(rows[k]).value
+            run = runs[k]
+            found[k] = Shown(run.name, run.time_s, rows[k], run.truth[target], before, after)
+    return [found[k] for k in sorted(found)]
 
 
 def _rows(

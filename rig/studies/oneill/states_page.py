@@ -6,12 +6,9 @@ from estimation.bank.fitting import CHOICES
 from estimation.bank.states import EFFECTS
 from estimation.derived import TRAVEL_WINDOW_S
 from rig.output.table import TextTable
-from rig.studies.oneill.networks_page import SHOWN
-from rig.studies.oneill.paper import JAW
+from rig.studies.oneill.paper import CONDITIONS, FOLDS, HELD_OUT, JAW, SHOWN
 from rig.studies.oneill.state_rows import Level, StateRow, ablated
-from rig.studies.oneill.states import FOLDS, StateStudy
-
-PROTOCOLS = ("run-wise", "lofo", "lopo")
+from rig.studies.oneill.states import StateStudy
 
 
 def notes(study: StateStudy) -> list[str]:
@@ -65,10 +62,9 @@ def _errors(study: StateStudy) -> TextTable:
     cells = []
     for name, by in found.items():
         first = by["run-wise"]
-        unseen = [_worse(by.get(p), first) for p in PROTOCOLS[1:]]
+        unseen = [_worse(by.get(p), first) for p in CONDITIONS]
         cells.append([name, _scaled(first), *unseen, _scaled(first, "run_offset")])
-    columns = ["RMSE", "runs", "a frequency (LOFO)", "a power level (LOPO)"]
-    columns += ["runs' offsets"]
+    columns = ["RMSE", *list(HELD_OUT.values())[1:], "runs' offsets"]
     note = (
         f"Runs: {FOLDS} folds of whole runs, as of the networks. The runs' offsets: root mean"
         " square of each held-out run's mean error; an estimate with a memory of half a second"

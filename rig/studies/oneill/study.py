@@ -6,56 +6,41 @@ of runs explains the difference. The same processing gives the paper's count of 
 exactly. So the paper's errors are printed next to ours, and are not expected to agree.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
 
-from estimation.campaign import Campaign, CampaignError, Split, Table
+from estimation.campaign import Campaign
 from estimation.channels import unit_of
 from estimation.derived import measured_channels
-from estimation.scores import Score, rmse
+from estimation.errors import EstimationError
+from estimation.recording import FloatArray
+from estimation.scores import Score, rmse, score
 from estimation.units import evaluate
 from rig.errors import DataError
 from rig.output.provenance import Provenance
-from rig.studies.oneill import fits
-from rig.studies.oneill.source import Source
+from rig.studies.oneill.data import ClosingTable, Source, closing_table, held_out_masks
+from rig.studies.oneill.paper import (
+    AUTHORS_SKIP,
+    CONDITIONS,
+    HELD_OUT,
+    OTHERS_REACH_N_M,
+    PAPER_SAMPLES,
+    PAPER_TABLE_I,
+    PROXIMAL,
+    PUBLIC_SAMPLES,
+    SURROGATES,
+    PaperRow,
+)
 
-PAPER_SAMPLES = 260_581
-PUBLIC_SAMPLES = 308_117
-
-FOLDS = 5
-CONDITIONS = {"lofo": "frequency_hz", "lopo": "load_command_a"}
-"""Condition each leave-one-out protocol holds out: one frequency, one power level."""
-
-PROTOCOLS = {
-    "authors": "the authors' way: fitted and scored on the last 7/8 of the closing samples",
-    "random": "the paper's split: 85 % of the samples at random to fit, 15 % to score",
-    "run-wise": f"{FOLDS} folds of whole runs",
-    "lofo": "one frequency left out at a time",
-    "lopo": "one power level left out at a time",
-}
+Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class PaperRow:
-    """One linear row of the paper's Table I, torques in N m."""
-
-    mae: float
-    p95: float
-    rmse: float
-    pearson_r: float
-    spearman_rho: float
-
-
-PAPER_TABLE_I = {
-    "command": PaperRow(10.03e-3, 22.94e-3, 12.18e-3, 0.97, 0.97),
-    "current": PaperRow(10.06e-3, 23.26e-3, 12.26e-3, 0.97, 0.97),
-    "gearbox": PaperRow(33.91e-3, 76.30e-3, 40.53e-3, 0.60, 0.62),
-}
-
-OTHERS_REACH_N_M = {"command": 14.17e-3, "current": 14.24e-3, "gearbox": 43.14e-3}
-"""RMSE of the authors' linear fit on the public data as others have reproduced it, N m."""
+class StudyError(EstimationError):
+    """After the paper's processing no samples remain to fit or to score."""
 
 
 @dataclass(frozen=True)
@@ -138,24 +123,31 @@ def run_study(
     """
     campaign, remarks = source.campaign, list(source.notes)
     surrogates = _surrogates(campaign, remarks)
-    names = [fits.TARGET, *surrogates.values()]
-    closing = fits.closing_campaign(campaign, names, on_run=lambda run: on_run(run.name))
-    kept, left_out = without_flagged(closing)
-    splits = _splits(kept, seed, remarks)
-    rows = []
-    for surrogate, channel in surrogates.items():
-        rows += _whole_rows(surrogate, channel, closing, kept, seed)
-        rows += [
-            _split_row(surrogate, channel, protocol, parts) for protocol, parts in splits.items()
-        ]
-    shown = "current" if "current" in surrogates else next(iter(surrogates))
-    by_run = _rmse_by_run(_held_out(splits["run-wise"], surrogates[shown]))
+    whole = closing_table(campaign, [PROXIMAL, *surrogates.values()], on_run=on_run, live=False)
+    reasons = {**whole.excluded, **whole.flagged}
+    left_out = {name: reasons[name] for name in whole.names if name in reasons}
+    kept = whole.without(left_out)
+    if len(kept.names) < 2 or len(kept.run) == 0:
+        raise DataError(
+            f"{len(kept.names)} of {len(campaign)} runs can be used: too few to hold runs out.",
+            "Each needs closing motion faster than 0.25 rad/s between its first and last second.",
+        )
+    splits = {protocol: held_out_masks(kept, protocol, seed) for protocol in HELD_OUT}
+    for protocol, condition in CONDITIONS.items():
+        if not splits[protocol]:
+            remarks.append(f"No {protocol} rows: not every run states one of several {condition}.")
+    rows = [
+        row
+        for surrogate, channel in surrogates.items()
+        for row in _rows(surrogate, channel, whole.without(whole.excluded), kept, splits)
+    ]
+    shown = surrogates.get("current", next(iter(surrogates.values())))
     return Study(
         schema="rig.study.oneill/1",
         source=source.name,
         measured=source.measured,
         notes=tuple(remarks),
-        closing_samples=sum(len(run) for run in closing),
+        closing_samples=len(whole.run),
         paper_samples=PAPER_SAMPLES,
         public_samples=PUBLIC_SAMPLES,
         runs=kept.names,
@@ -163,7 +155,7 @@ def run_study(
         rows=tuple(rows),
         paper=PAPER_TABLE_I,
         others_reach_n_m=OTHERS_REACH_N_M,
-        rmse_by_run_n_m=by_run,
+        rmse_by_run_n_m=_rmse_by_run(kept, shown, splits["run-wise"]),
         provenance=Provenance.now(seed),
     )
 
@@ -175,83 +167,70 @@ def _surrogates(campaign: Campaign, notes: list[str]) -> dict[str, str]:
     columns = set(next(iter(campaign)).columns)
     found = {
         name: channel
-        for name, channel in fits.SURROGATES.items()
+        for name, channel in SURROGATES.items()
         if set(measured_channels([channel])) <= columns
     }
-    for name in fits.SURROGATES.keys() - found.keys():
+    for name in SURROGATES.keys() - found.keys():
         notes.append(f"The recordings carry no {name}; its rows are left out.")
     if not found:
         raise DataError(
             "The recordings carry none of the paper's torque surrogates.",
-            f"Needed is one of: {', '.join(fits.SURROGATES.values())}.",
+            f"Needed is one of: {', '.join(SURROGATES.values())}.",
         )
     return found
 
 
-def without_flagged(closing: Campaign) -> tuple[Campaign, dict[str, str]]:
-    """Exclude runs with flagged closing samples, with the reason."""
-    left_out = {}
-    for run in closing:
-        flagged = [s for s in run.stretches if np.any(run.flags & np.uint8(s.flag))]
-        if run.excluded is not None:
-            left_out[run.name] = run.excluded
-        elif not run.valid.all():
-            reasons = "; ".join(s.reason for s in flagged) or "flagged samples"
-            left_out[run.name] = reasons
-    kept = closing.exclude(left_out).evidence
-    if len(kept) < 2 or sum(len(run) for run in kept) == 0:
-        raise DataError(
-            f"{len(kept)} of {len(closing)} runs can be used: too few to hold runs out.",
-            "Each needs closing motion faster than 0.25 rad/s between its first and last second.",
-        )
-    return kept, left_out
+def fit_line(surrogate: FloatArray, torque: FloatArray) -> Polynomial:
+    """Fit the paper's line by least squares: torque = gain x surrogate + offset, SI units.
 
+    Args:
+        surrogate: Shape (n,).
+        torque: Shape (n,), N m.
 
-def _splits(kept: Campaign, seed: int, notes: list[str]) -> dict[str, list[Split]]:
-    splits = {"run-wise": kept.folds(min(FOLDS, len(kept)), seed)}
-    for protocol, condition in CONDITIONS.items():
-        try:
-            splits[protocol] = kept.leave_one_condition_out(condition)
-        except CampaignError as error:
-            notes.append(f"No {protocol} rows: {error.what}")
-    return splits
-
-
-def _whole_rows(
-    surrogate: str, channel: str, closing: Campaign, kept: Campaign, seed: int
-) -> list[Row]:
-    """Return the rows of the paper's own protocols: the authors' fit and the random split.
-
-    The authors' fit takes all runs in file order, flagged ones too, as the paper has no flags.
+    Raises:
+        StudyError: Fewer than two samples, or the surrogate does not vary.
     """
-    rows = []
-    for protocol, campaign in (("authors", closing), ("random", kept)):
-        table = campaign.concatenate([channel, fits.TARGET], valid_only=False)
-        x, y = table.columns[channel], table.columns[fits.TARGET]
-        if protocol == "authors":
-            line, score = fits.score_authors(x, y)
-        else:
-            line, score = fits.score_random(x, y, seed)
-        unit = _gain_unit(channel)
-        rows.append(Row(surrogate, protocol, len(campaign), line.gain, unit, line.offset, score))
-    return rows
+    if len(surrogate) < 2 or np.ptp(surrogate) == 0:
+        raise StudyError(
+            f"A line cannot be fitted to {len(surrogate)} closing samples.",
+            "The spindle never closes fast enough, or the surrogate is constant.",
+        )
+    centre = surrogate.mean()
+    gain = float((surrogate - centre) @ torque / np.sum((surrogate - centre) ** 2))
+    return Polynomial([float(torque.mean() - gain * centre), gain])
 
 
-def _split_row(surrogate: str, channel: str, protocol: str, splits: list[Split]) -> Row:
-    table = _held_out(splits, channel)
-    score = fits.score_table(table)
-    return Row(surrogate, protocol, len(table.names), None, _gain_unit(channel), None, score)
+def _rows(
+    surrogate: str,
+    channel: str,
+    whole: ClosingTable,
+    kept: ClosingTable,
+    splits: dict[str, list[Mask]],
+) -> Iterator[Row]:
+    """Yield a row a protocol; the authors' fit takes all runs, as the paper has no flags."""
+    unit = evaluate("target / source", {"target": "N m", "source": unit_of(channel)})
+    late = np.arange(len(whole.run)) >= round(len(whole.run) * AUTHORS_SKIP)
+    tried = {"authors": (whole, [(late, late)])}
+    tried |= {name: (kept, [(~mask, mask) for mask in own]) for name, own in splits.items() if own}
+    for protocol, (table, parts) in tried.items():
+        lines, found = _fitted(table.column(channel), table.column(PROXIMAL), parts)
+        offset, gain = lines[0].coef.tolist() if len(lines) == 1 else (None, None)
+        yield Row(surrogate, protocol, len(table.names), gain, unit, offset, found)
 
 
-def _held_out(splits: list[Split], channel: str) -> Table:
-    return fits.held_out(splits, [channel], fits.linear_fitter(channel))
+def _fitted(
+    x: FloatArray, y: FloatArray, splits: list[tuple[Mask, Mask]]
+) -> tuple[list[Polynomial], Score]:
+    """Fit a line on the first samples of each split; return all, and the score on the second."""
+    lines = [fit_line(x[fitted], y[fitted]) for fitted, _ in splits]
+    estimates = [line(x[scored]) for line, (_, scored) in zip(lines, splits, strict=True)]
+    truths = [y[scored] for _, scored in splits]
+    return lines, score(np.concatenate(estimates), np.concatenate(truths))
 
 
-def _gain_unit(channel: str) -> str:
-    return evaluate("target / source", {"target": "N m", "source": unit_of(channel)})
-
-
-def _rmse_by_run(table: Table) -> dict[str, float]:
-    estimate, truth = table.columns[fits.ESTIMATE], table.columns[fits.TARGET]
+def _rmse_by_run(table: ClosingTable, channel: str, masks: list[Mask]) -> dict[str, float]:
+    x, y, estimate = table.column(channel), table.column(PROXIMAL), np.zeros(len(table.run))
+    for mask in masks:
+        estimate[mask] = fit_line(x[~mask], y[~mask])(x[mask])
     parts = {name: table.run == index for index, name in enumerate(table.names)}
-    return {n: rmse(estimate[p], truth[p]) for n, p in sorted(parts.items()) if p.any()}
+    return {n: rmse(estimate[p], y[p]) for n, p in sorted(parts.items()) if p.any()}

@@ -3,10 +3,9 @@
 from collections.abc import Iterator
 
 from rig.output.table import TextTable
-from rig.studies.oneill.networks import NetworkRow, NetworkStudy
-from rig.studies.oneill.networks_page import SHOWN
-from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROXIMAL
-from rig.studies.oneill.study import PROTOCOLS, Study
+from rig.studies.oneill.networks import NetworkStudy
+from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROTOCOLS, PROXIMAL, SHOWN
+from rig.studies.oneill.study import Study
 
 ORDER = {
     "I": ("experiment 1", PROXIMAL, (("neutral", "end-to-end"),)),
@@ -44,20 +43,24 @@ def _linear(study: Study) -> Iterator[list[str]]:
     """Yield the linear rows by the paper's split, then by the authors' way."""
     for protocol, kind in (("random", "linear"), ("authors", "linear, the authors' way")):
         for row in study.rows:
-            if row.protocol == protocol:
+            if row.protocol != protocol:
+                continue
+            stated = [""] * 5
+            if protocol == "random":
                 printed = study.paper[row.surrogate]
-                beside = (
-                    [printed.mae, printed.p95, printed.rmse] if protocol == "random" else [None] * 3
-                )
-                fits = [printed.pearson_r, printed.spearman_rho] if protocol == "random" else []
-                yield [
-                    f"{kind}: {row.surrogate}",
-                    *_cells(1e3, row.score.mae, row.score.p95, row.score.rmse),
-                    f"{row.score.pearson_r:.2f}",
-                    f"{row.score.spearman_rho:.2f}",
-                    *_cells(1e3, *beside),
-                    *([f"{value:.2f}" for value in fits] or ["", ""]),
+                stated = [
+                    *_cells(1e3, printed.mae, printed.p95, printed.rmse),
+                    f"{printed.pearson_r:.2f}",
+                    f"{printed.spearman_rho:.2f}",
                 ]
+            found = row.score
+            yield [
+                f"{kind}: {row.surrogate}",
+                *_cells(1e3, found.mae, found.p95, found.rmse),
+                f"{found.pearson_r:.2f}",
+                f"{found.spearman_rho:.2f}",
+                *stated,
+            ]
 
 
 def _linear_note(study: Study) -> str:
@@ -79,21 +82,17 @@ def _block(deep: NetworkStudy, pose: str, way: str, target: str) -> Iterator[lis
     label = "network" if target == PROXIMAL else way if pose == "neutral" else f"varied {pose}"
     for p, w, t, surrogate in PAPER:
         if (p, w, t) == (pose, way, target) and surrogate in trained:
-            yield _beside(f"{label}: {surrogate}", trained[surrogate], PAPER[p, w, t, surrogate])
+            score = trained[surrogate].score
+            yield [
+                f"{label}: {surrogate}",
+                *_cells(SHOWN[target][2], score.mae, score.p95, score.rmse),
+                f"{score.pearson_r:.3f}",
+                f"{score.spearman_rho:.3f}",
+                *_cells(1.0, *PAPER[p, w, t, surrogate]),
+                "",
+                "",
+            ]
 
 
-def _beside(label: str, row: NetworkRow, printed: tuple[float, float, float]) -> list[str]:
-    score, scale = row.score, SHOWN[row.target][2]
-    return [
-        label,
-        *_cells(scale, score.mae, score.p95, score.rmse),
-        f"{score.pearson_r:.3f}",
-        f"{score.spearman_rho:.3f}",
-        *_cells(1.0, *printed),
-        "",
-        "",
-    ]
-
-
-def _cells(scale: float, *values: float | None) -> list[str]:
-    return ["" if value is None else f"{scale * value:.2f}" for value in values]
+def _cells(scale: float, *values: float) -> list[str]:
+    return [f"{scale * value:.2f}" for value in values]

@@ -1,14 +1,15 @@
-"""The study of Piqué 2018 as tables for any medium, and as Markdown."""
+"""The page of the study of Piqué 2018."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
+from markupsafe import Markup
 
 from rig.arm.search import DAMPING, LEAST_GAIN
 from rig.arm.within import STRETCHES
-from rig.output.figures import paired_bars, write_svgs
-from rig.output.table import TextTable, to_page
+from rig.output.figures import paired_bars
+from rig.output.page import Page
+from rig.output.table import TextTable
 from rig.studies.coverage import coverage
 from rig.studies.pique.study import EFFECTS, THESIS, WITHIN, Row, Study
 
@@ -23,7 +24,13 @@ PUBLIC_PATHS = {"one18", "two18"}
 TITLE = "Joint torques of a patient-side manipulator: table 3.2 of Piqué 2018, made again"
 
 
-def lead(study: Study) -> str:
+def page(study: Study) -> Page:
+    """Return the study's page."""
+    paragraphs = [_lead(study), f"Arm: {study.arm}.", *_notes(study)]
+    return Page(TITLE, paragraphs, _tables(study), study.provenance, lambda: _figures(study))
+
+
+def _lead(study: Study) -> str:
     """Return the study's result in one sentence or two."""
     models = list(dict.fromkeys(row.model for row in study.rows))
     before, after = (_mean(study, model) for model in (models[0], EFFECTS))
@@ -51,7 +58,7 @@ def _reached(study: Study) -> str:
     )
 
 
-def notes(study: Study) -> list[str]:
+def _notes(study: Study) -> list[str]:
     """Return remarks for a comparison."""
     first, second = study.paths
     return [
@@ -69,7 +76,7 @@ def notes(study: Study) -> list[str]:
     ]
 
 
-def tables(study: Study) -> list[TextTable]:
+def _tables(study: Study) -> list[TextTable]:
     """Return the study's tables."""
     others = [_others(study)] if any(r.tested_on not in study.paths for r in study.rows) else []
     return [
@@ -82,23 +89,13 @@ def tables(study: Study) -> list[TextTable]:
     ]
 
 
-def markdown(study: Study, figures: Sequence[str] = ()) -> str:
-    """Return the study as a Markdown page."""
-    return to_page(
-        [TITLE, lead(study), f"Arm: {study.arm}.", *notes(study)],
-        tables(study),
-        study.provenance,
-        figures,
-    )
-
-
-def write_figures(folder: Path, study: Study) -> list[Path]:
-    """Write the errors of each joint by the thesis' model and with effects, mean of both ways."""
+def _figures(study: Study) -> Mapping[str, Markup]:
+    """Draw the errors of each joint by the thesis' model and with effects, mean of both ways."""
     before, after = _mean(study, THESIS), _mean(study, EFFECTS)
     pairs = {f"J{k + 1}": (before[k], after[k]) for k in range(len(before))}
     caption = "NRMSD on the path that was not fitted, mean of both directions"
     bars = paired_bars(pairs, ("thesis' model", "with the effects kept"), "NRMSD, %", caption)
-    return write_svgs(folder, {"pique-joints": bars})
+    return {"pique-joints": bars}
 
 
 def _mean(study: Study, model: str) -> np.ndarray:

@@ -1,12 +1,15 @@
-"""The study of Zhang et al. 2022 as tables for any medium, and as Markdown."""
+"""The page of the study of Zhang et al. 2022."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from markupsafe import Markup
 
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES
-from rig.output.table import TextTable, to_page
+from rig.output.figures import bars, over_time
+from rig.output.page import Page
+from rig.output.table import TextTable
 from rig.studies.coverage import coverage
 from rig.studies.families import ratios, verdict
 from rig.studies.zhang.free import (
@@ -61,7 +64,20 @@ ADJUSTED = TextTable(
 )
 
 
-def lead(study: ZhangStudy) -> str:
+TRACES = {
+    "grasp": "Grip force of grasping and letting go, first arm",
+    "contact": "Force along the tip's y axis in contact, first arm",
+    "held": "Grip force in contact, first arm",
+}
+
+
+def page(study: ZhangStudy) -> Page:
+    """Return the study's page."""
+    paragraphs = [_lead(study), *_notes()]
+    return Page(TITLE, paragraphs, _tables(study), study.provenance, lambda: _figures(study))
+
+
+def _lead(study: ZhangStudy) -> str:
     """Return the study's result in a few sentences."""
     near = [word for condition in PAPER for word in study.near(condition) if word is not None]
     near += study.near_in_contact()
@@ -72,8 +88,7 @@ def lead(study: ZhangStudy) -> str:
     )
 
 
-def notes(study: ZhangStudy) -> list[str]:
-    """Return remarks for a comparison."""
+def _notes() -> list[str]:
     return [
         "The simulated arms are not measured ones: strengths of friction, noise and vibration, the"
         " coupling's error, and how instruments differ, were chosen over several rounds on other"
@@ -96,7 +111,37 @@ def notes(study: ZhangStudy) -> list[str]:
     ]
 
 
-def tables(study: ZhangStudy) -> list[TextTable]:
+def _figures(study: ZhangStudy) -> Mapping[str, Markup]:
+    """Draw how joints and instruments do, and the first arm's grasp and contact over time."""
+    networks = study.median(f"I | M+C on M | {NETWORKS}")
+    ours = study.median(f"I | M+C on M | {OURS}")
+    joints = {
+        f"{joint} {who}": float(value)
+        for k, joint in enumerate(JOINTS)
+        for who, value in (("networks", networks[k]), ("ours", ours[k]))
+    }
+    instruments = {
+        f"{name} {when}": float(study.median(f"II {when} | {name} | {NETWORKS}")[0])
+        for name in OTHERS
+        for when in ("before", "after")
+    }
+    traces = {name: np.array(values) for name, values in study.traces.items()}
+    return {
+        **{
+            f"zhang-{name}": over_time(
+                traces[f"{name} | time, s"],
+                {who: traces[f"{name} | {who}"] for who in ("sensor", NETWORKS, OURS)},
+                "N",
+                caption,
+            )
+            for name, caption in TRACES.items()
+        },
+        "zhang-joints": bars(joints, "NRMSE, %", "Free-space torque, gripper moving"),
+        "zhang-instruments": bars(instruments, "NRMSE, %", "Gripper torque, networks' transfer"),
+    }
+
+
+def _tables(study: ZhangStudy) -> list[TextTable]:
     """Return the study's tables."""
     columns = [*(f"{joint}, M" for joint in JOINTS), "instruments", "grasp", "force", "moment"]
     title = f"Ours over the paper's networks, {study.seeds} arms a family"
@@ -113,11 +158,6 @@ def tables(study: ZhangStudy) -> list[TextTable]:
         ADJUSTED,
         coverage("zhang"),
     ]
-
-
-def markdown(study: ZhangStudy, figures: Sequence[str] = ()) -> str:
-    """Return the study as a Markdown page."""
-    return to_page([TITLE, lead(study), *notes(study)], tables(study), study.provenance, figures)
 
 
 def _missed(study: ZhangStudy) -> str:

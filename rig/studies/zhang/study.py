@@ -10,7 +10,7 @@ from estimation.networks.training import require_torch
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, OWN
 from rig.output.provenance import Provenance
-from rig.studies.seeds import Keeper, kept_outcomes
+from rig.studies.seeds import Keeper, begin_learning, kept_outcomes
 from rig.studies.zhang.free import NETWORKS, Cells
 from rig.studies.zhang.seed import Outcome, one_arm
 
@@ -104,7 +104,7 @@ def worst_axes(contact: FloatArray) -> tuple[float, float, float]:
     return float(contact[:3].max()), float(contact[3:6].max()), float(contact[6])
 
 
-def run_zhang(seeds: int, keeper: Keeper) -> ZhangStudy:
+def run(seeds: int, keeper: Keeper) -> ZhangStudy:
     """Do the study on arms of every family of hidden torque.
 
     Args:
@@ -118,7 +118,7 @@ def run_zhang(seeds: int, keeper: Keeper) -> ZhangStudy:
     require_torch()
     pinocchio()
     arms = seeds * len(FAMILIES)
-    outcomes = kept_outcomes(Outcome, one_arm, arms, SCHEMA, keeper, start=_one_thread)
+    outcomes = kept_outcomes(Outcome, one_arm, arms, SCHEMA, keeper, start=begin_learning)
     found = Counter(name for outcome in outcomes for name in outcome.effects)
     return ZhangStudy(
         schema=SCHEMA,
@@ -128,9 +128,3 @@ def run_zhang(seeds: int, keeper: Keeper) -> ZhangStudy:
         effects=dict(found.most_common()),
         provenance=Provenance.now(0),
     )
-
-
-def _one_thread() -> None:
-    import torch
-
-    torch.set_num_threads(1)

@@ -1,18 +1,19 @@
-"""The study of Zhao and Nelson 2016 as tables and figures for any medium, and as Markdown."""
+"""The page of the study of Zhao and Nelson 2016."""
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 
 from estimation.recording import FloatArray
 from rig.grasper.current_force import CurrentForce
 from rig.grasper.hidden import FAMILIES, NOT_IN_CATALOGUE, OWN
 from rig.grasper.inputs import hold, periodic
 from rig.grasper.plant import PROTOTYPES, RATE_HZ
-from rig.output.figures import bars, over_time, write_svgs
+from rig.output.figures import bars, over_time
+from rig.output.page import Page
 from rig.output.provenance import Provenance
-from rig.output.table import TextTable, to_page
+from rig.output.table import TextTable
 from rig.studies.coverage import coverage
 from rig.studies.families import ratios, verdict
 from rig.studies.zhao.haptics import LEVEL, Answer
@@ -43,7 +44,19 @@ ADJUSTED = TextTable(
 )
 
 
-def lead(study: Study) -> str:
+def page(study: Study, haptics: Sequence[Sequence[Answer]] = ()) -> Page:
+    """Return the study's page.
+
+    Args:
+        study: The study.
+        haptics: The haptic experiments, one list of answers a grasper.
+    """
+    paragraphs = [_lead(study), *_notes(study)]
+    made = Provenance.now(0)
+    return Page(TITLE, paragraphs, _tables(study, haptics), made, lambda: _figures(study, haptics))
+
+
+def _lead(study: Study) -> str:
     """Return the study's result in a sentence or two."""
     near = (
         f" On the graspers that were matched to it ({study.prototype}) the paper's method lands"
@@ -54,7 +67,7 @@ def lead(study: Study) -> str:
     return verdict(_ratios(study)) + near
 
 
-def notes(study: Study) -> list[str]:
+def _notes(study: Study) -> list[str]:
     """Return remarks for a comparison."""
     return [
         "No grasper was measured. A grasper's friction is the simulation's own, in proportion to"
@@ -74,13 +87,7 @@ def notes(study: Study) -> list[str]:
     ]
 
 
-def tables(study: Study, haptics: Sequence[Sequence[Answer]] = ()) -> list[TextTable]:
-    """Return the study's tables.
-
-    Args:
-        study: The study.
-        haptics: The haptic experiments, one list of answers a grasper.
-    """
+def _tables(study: Study, haptics: Sequence[Sequence[Answer]]) -> list[TextTable]:
     tests = [f"{dof}, {kind}" for dof in DOFS for kind in INPUTS]
     graspers = len(study.cells[DOFS[0]]) // len(FAMILIES)
     title = (
@@ -101,18 +108,9 @@ def tables(study: Study, haptics: Sequence[Sequence[Answer]] = ()) -> list[TextT
     return made
 
 
-def markdown(
-    study: Study, haptics: Sequence[Sequence[Answer]] = (), figures: Sequence[str] = ()
-) -> str:
-    """Return the study as a Markdown page."""
-    paragraphs = [TITLE, lead(study), *notes(study)]
-    return to_page(paragraphs, tables(study, haptics), Provenance.now(0), figures)
-
-
-def write_figures(
-    folder: Path, study: Study, haptics: Sequence[Sequence[Answer]], seed: int = 0
-) -> list[Path]:
-    """Write the paper's kinds of figures for one grasper: Figures 12 to 14 and 16."""
+def _figures(study: Study, haptics: Sequence[Sequence[Answer]]) -> Mapping[str, Markup]:
+    """Draw the paper's kinds of figures for one grasper: Figures 12 to 14 and 16."""
+    seed = 0
     short = next(name for name, one in PROTOTYPES.items() if one.name == study.prototype)
     axes = axes_of(PROTOTYPES[short], "grasp", seed, 0.0)
     model = fitted("grasp", axes, seed, study.lacking[OWN, "grasp"].model)
@@ -135,7 +133,7 @@ def write_figures(
         ours = next(answer for answer in haptics[0] if answer.method == "ours")
         heights = {f"place {s.name}": s.mean_n_rad for s in ours.places}
         drawn[f"{stem}-stiffness"] = bars(heights, "stiffness, N/rad", "Stiffness along the edge")
-    return write_svgs(folder, drawn)
+    return drawn
 
 
 def _own(study: Study, dof: str, family: str = OWN) -> Sequence[Cell]:
