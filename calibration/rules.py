@@ -111,7 +111,7 @@ def refuse_errors(verdicts: list[Verdict]) -> list[Verdict]:
         raise UnfitCalibrationError(
             f"The active calibration of {errors[0].channel} must not be used.",
             "; ".join(f"{e.record}: {e.message}" for e in errors) + ".",
-            "Calibrate again, or choose another record with `rig cal use`.",
+            "Calibrate again, or choose another record with `rig calibrate use`.",
         )
     return verdicts
 

@@ -99,7 +99,7 @@ class CalibrationStore:
         """
         if not re.fullmatch(r"[0-9a-f]{1,16}", start):
             raise NoRecordError(
-                f"{start!r} is not the beginning of a hash.", fix="Type rig cal list."
+                f"{start!r} is not the beginning of a hash.", fix="Type rig calibrate list."
             )
         paths = sorted((self.folder / "records").glob(f"*-{start}*.json"))
         paths = [path for path in paths if path.stem.rpartition("-")[2].startswith(start)]
@@ -110,7 +110,7 @@ class CalibrationStore:
                 if paths
                 else f"No record begins with {start!r}.",
                 names or f"The store is {self.folder}.",
-                "Type `rig cal list` for the hashes.",
+                "Type `rig calibrate list` for the hashes.",
             )
         return _read(paths[0])
 
@@ -187,7 +187,7 @@ def compose(base: CalibrationSet, records: Iterable[CalibrationRecord]) -> Calib
             raise CalibrationError(
                 f"A record gives {name} from {line.counts!r}.",
                 f"In the set {base.name!r} that channel {has}.",
-                "Choose another record with `rig cal use`.",
+                "Choose another record with `rig calibrate use`.",
             )
     return CalibrationSet(f"{base.name}+store", {**base.channels, **lines})
 

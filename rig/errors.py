@@ -7,10 +7,8 @@ link, 4 safety trip, 5 data damaged or unreadable, 70 a bug in rig, 130 interrup
 from enum import IntEnum
 
 from calibration.errors import CalibrationError
-from calibration.errors import UnknownNameError as NoSuchRecord
 from drivers.errors import DriverError
 from estimation.errors import EstimationError, ExplainedError
-from estimation.errors import UnknownNameError as NoSuchModel
 from estimation.files import OutputError
 
 
@@ -64,55 +62,47 @@ class SafetyTripError(RigError):
     exit_code = ExitCode.SAFETY
 
 
-ROOM_EXIT_CODES: dict[type[Exception], ExitCode] = {
-    OutputError: ExitCode.USAGE,
-    NoSuchModel: ExitCode.USAGE,
-    NoSuchRecord: ExitCode.USAGE,
-    EstimationError: ExitCode.DATA,
-    CalibrationError: ExitCode.DATA,
-    DriverError: ExitCode.DEVICE,
-}
-"""Exit code of each other room's errors; the first class that fits counts."""
-
 PAGE = "docs/troubleshooting.md"
 """The page of symptoms, in the source tree and on the documentation site."""
-
-ANCHORS: dict[str, str] = {
-    "rig.SafetyTripError": "the-rig-stops",
-    "drivers.DisarmUnconfirmedError": "the-rig-stops",
-    "drivers.DriveFaultError": "the-rig-stops",
-    "drivers.DriverError": "the-rig-does-not-answer",
-    "calibration.UnfitCalibrationError": "a-calibration-must-not-be-used",
-    "calibration.StoreError": "a-calibration-must-not-be-used",
-    "calibration.UnknownNameError": "a-command-is-refused",
-    "calibration.CalibrationError": "a-calibration-is-refused",
-    "estimation.OutputError": "an-output-is-refused",
-    "estimation.UnknownNameError": "a-command-is-refused",
-    "estimation.EstimationError": "recordings-or-a-model-do-not-fit",
-    "rig.DataError": "a-log-is-refused",
-    "rig.UsageError": "a-command-is-refused",
-    "rig.RigError": "the-rig-does-not-answer",
-}
-"""Room and class of an error to the section of the page; the nearest base of a class counts."""
 
 A_BUG = "a-fault-in-rig-itself"
 """Section for an error that nobody raised on purpose."""
 
+KNOWN: dict[str, tuple[str, ExitCode]] = {
+    "drivers.DisarmUnconfirmedError": ("the-rig-stops", ExitCode.DEVICE),
+    "drivers.DriveFaultError": ("the-rig-stops", ExitCode.DEVICE),
+    "drivers.DriverError": ("the-rig-does-not-answer", ExitCode.DEVICE),
+    "calibration.UnfitCalibrationError": ("a-calibration-must-not-be-used", ExitCode.DATA),
+    "calibration.NoRecordError": ("a-calibration-must-not-be-used", ExitCode.USAGE),
+    "calibration.StoreError": ("a-calibration-must-not-be-used", ExitCode.DATA),
+    "calibration.UnknownNameError": ("a-command-is-refused", ExitCode.USAGE),
+    "calibration.CalibrationError": ("a-calibration-is-refused", ExitCode.DATA),
+    "estimation.OutputError": ("an-output-is-refused", ExitCode.USAGE),
+    "estimation.UnknownNameError": ("a-command-is-refused", ExitCode.USAGE),
+    "estimation.EstimationError": ("recordings-or-a-model-do-not-fit", ExitCode.DATA),
+    "rig.SafetyTripError": ("the-rig-stops", ExitCode.SAFETY),
+    "rig.DataError": ("a-log-is-refused", ExitCode.DATA),
+    "rig.UsageError": ("a-command-is-refused", ExitCode.USAGE),
+    "rig.RigError": ("the-rig-does-not-answer", ExitCode.FAILED),
+}
+"""Room and class of an error to the section of the page and the exit code.
+
+The nearest base of a class counts; an error of the application states its own exit code.
+"""
+
+KNOWN_ERRORS = (RigError, OutputError, EstimationError, CalibrationError, DriverError)
+
+
+def _known(kind: type[Exception]) -> tuple[str, ExitCode]:
+    names = (f"{base.__module__.partition('.')[0]}.{base.__name__}" for base in kind.__mro__)
+    return next((KNOWN[name] for name in names if name in KNOWN), (A_BUG, ExitCode.BUG))
+
 
 def anchor_of(kind: type[Exception]) -> str:
     """Return the section of the troubleshooting page for a kind of error."""
-    names = (f"{base.__module__.partition('.')[0]}.{base.__name__}" for base in kind.__mro__)
-    return next((ANCHORS[name] for name in names if name in ANCHORS), A_BUG)
-
-
-KNOWN_ERRORS: tuple[type[Exception], ...] = (RigError, *ROOM_EXIT_CODES)
+    return _known(kind)[0]
 
 
 def exit_code_of(error: Exception) -> ExitCode:
     """Return the documented exit code of an error raised on purpose."""
-    if isinstance(error, RigError):
-        return error.exit_code
-    for base, code in ROOM_EXIT_CODES.items():
-        if isinstance(error, base):
-            return code
-    return ExitCode.BUG
+    return error.exit_code if isinstance(error, RigError) else _known(type(error))[1]

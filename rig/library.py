@@ -14,6 +14,7 @@ project.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,7 @@ from estimation.diagnosis.result import Diagnosis
 from estimation.effects import Effect
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
-from rig.errors import MissingExtraError, UsageError
+from rig.errors import MissingExtraError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -286,10 +287,7 @@ def to_pandas(campaign: Campaign) -> Any:
     Raises:
         MissingExtraError: pandas is not installed.
     """
-    try:
-        import pandas as pd
-    except ImportError as error:
-        raise _missing("pandas") from error
+    pd = _library("pandas")
     from estimation.channels import unit_of
 
     parts = [pd.DataFrame(_columns(recording)) for recording in campaign.evidence]
@@ -308,10 +306,7 @@ def to_polars(campaign: Campaign) -> Any:
     Raises:
         MissingExtraError: Polars is not installed.
     """
-    try:
-        import polars as pl
-    except ImportError as error:
-        raise _missing("Polars") from error
+    pl = _library("polars")
     parts = [pl.DataFrame(_columns(recording)) for recording in campaign.evidence]
     return pl.concat(parts, how="diagonal")
 
@@ -331,10 +326,7 @@ def to_xarray(recording: Recording) -> Any:
     Raises:
         MissingExtraError: xarray is not installed.
     """
-    try:
-        import xarray as xr
-    except ImportError as error:
-        raise _missing("xarray") from error
+    xr = _library("xarray")
     from estimation.channels import unit_of
 
     columns = {
@@ -344,5 +336,9 @@ def to_xarray(recording: Recording) -> Any:
     return xr.Dataset(columns, {"time_s": recording.time_s}, {**recording.conditions})
 
 
-def _missing(library: str) -> UsageError:
-    return MissingExtraError(f"{library} is not installed.", "The result is one of its.", "tables")
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        why = "The result is one of its."
+        raise MissingExtraError(f"{name} is not installed.", why, "tables") from error

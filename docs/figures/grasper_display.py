@@ -15,12 +15,14 @@ from rich.console import Console
 from estimation.files import write_text_atomic
 from rig.bench.logger import open_logger
 from rig.configuration.config import SHIPPED, load_config
-from rig.live.estimator import HalfWidths, estimators_of
-from rig.live.joint_forces import JOINTS, with_joint_forces
-from rig.live.keys import OF_SESSION, in_a_line
-from rig.live.model_status import with_model_status
+from rig.live.block import through
+from rig.live.estimator import estimators_of, half_widths
+from rig.live.joint_forces import JOINTS
+from rig.live.keys import OF_SESSION
+from rig.live.options import ShowOptions, in_a_line
 from rig.live.session_blocks import session_blocks
 from rig.live.state import LiveState
+from rig.live.status import model_steps
 from rig.live.view import View
 from rig.machines.choose import machine_of
 from rig.protocols.protocol import load_protocol
@@ -36,10 +38,8 @@ def draw() -> str:
     rate_hz = machine_of(config).profile.rate_hz
     estimators = estimators_of(MODEL, rate_hz)
     plans = [plan for plan in load_protocol("grasper").any_plans() if "grasp-hold" in plan.name]
-    blocks = with_model_status(
-        with_joint_forces(session_blocks(config, lambda: open_logger(config), plans, estimators)),
-        estimators,
-    )
+    session = session_blocks(config, lambda: open_logger(config), plans, estimators)
+    blocks = through(session, model_steps(estimators))
     state = LiveState(JOINTS)
     held = 0
     with closing(blocks):
@@ -52,9 +52,13 @@ def draw() -> str:
         record=True, file=io.StringIO(), width=80, height=24, force_terminal=True,
         color_system="truecolor",
     )  # fmt: skip
-    title = f"rig live: {config.name}"
-    footer, known = in_a_line(OF_SESSION), HalfWidths(estimators)
-    console.print(View(state.snapshot(), title, lever_m=0.01, footer=footer, half_widths=known))
+    options = ShowOptions(
+        title=f"rig live: {config.name}",
+        lever_m=0.01,
+        footer=in_a_line(OF_SESSION),
+        half_widths=lambda: half_widths(estimators),
+    )
+    console.print(View(state.snapshot(), options))
     svg = console.export_svg(title="rig live -c grasper", unique_id="grasper")
     # the fonts rich names are fetched from the network; any monospaced one will do
     return re.sub(r"\s*@font-face \{.*?\}", "", svg, flags=re.DOTALL)

@@ -18,7 +18,8 @@ from rich.console import Console
 
 from estimation.recording import Recording
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
-from rig.live.keys import OF_SESSION, in_a_line
+from rig.live.keys import OF_SESSION
+from rig.live.options import ShowOptions, in_a_line
 from rig.live.replay import replay_blocks
 from rig.live.state import LiveState
 from rig.live.view import View
@@ -91,14 +92,12 @@ def draw() -> str:
         record=True, file=io.StringIO(), width=80, height=24, force_terminal=True,
         color_system="truecolor",
     )  # fmt: skip
-    view = View(
-        state.snapshot(),
-        "rig live, synthetic recording",
-        lever_m=0.012,
+    options = ShowOptions(
+        title="rig live, synthetic recording",
         footer=in_a_line(OF_SESSION),
-        half_widths={estimator.target_channel: 0.014},
+        half_widths=lambda: {estimator.target_channel: 0.014},
     )
-    console.print(view)
+    console.print(View(state.snapshot(), options))
     svg = console.export_svg(title="rig live", unique_id="live")
     # the fonts rich names are fetched from the network; any monospaced one will do
     return re.sub(r"\s*@font-face \{.*?\}", "", svg, flags=re.DOTALL)

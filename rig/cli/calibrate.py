@@ -1,34 +1,32 @@
-"""`rig calibrate`: guided calibrations on the bench or on the simulated rig."""
+"""`rig calibrate`: guided calibrations and the store of their records."""
 
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rig.cli.calibrate_check import check
-from rig.cli.help import GroupedHelp
-from rig.cli.options import SimulationSeed
-from rig.cli.rig_options import ConfigOption, SimFlag
+from rig.cli.calibrate_store import add, diagnose, diff, list_, show, use
+from rig.cli.help import group
+from rig.cli.options import ConfigOption, SimFlag, SimulationSeed
+from rig.errors import UsageError
 from rig.output.console import JsonFlag
 
 if TYPE_CHECKING:
     from calibration.procedure import Procedure
 
-calibrate_app = typer.Typer(
-    name="calibrate",
-    help="Calibrate a sensor or a part of the rig, step by step.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
+calibrate_app = group(
+    "calibrate", "Calibrate a sensor or a part of the rig; store, check and choose calibrations."
 )
 
 
 @calibrate_app.callback()
 def calibrate() -> None:
-    """Calibrate a sensor or a part of the rig, step by step.
+    """Calibrate a sensor or a part of the rig; store, check and choose calibrations.
 
     The reading is shown after each step; b measures the step before again. Nothing becomes a
     calibration before the last step has been measured and its data were found good. Ctrl-C or q
@@ -76,9 +74,6 @@ class Keeping:
     json: JsonFlag = False
 
 
-calibrate_app.command("check")(check)
-
-
 def session(make: "Callable[..., Procedure]") -> None:
     """Register a command that makes a procedure of its own options and carries it out."""
     own = inspect.signature(make)
@@ -95,7 +90,7 @@ def session(make: "Callable[..., Procedure]") -> None:
     command.__signature__ = inspect.Signature(keyword)  # type: ignore[attr-defined]
     command.__doc__ = make.__doc__
     command.__name__ = make.__name__
-    calibrate_app.command(make.__name__)(command)
+    calibrate_app.command(make.__name__, rich_help_panel="Step by step")(command)
 
 
 @session
@@ -201,8 +196,6 @@ def ft(
     repeats: Annotated[int, typer.Option(min=1, help="Number of rounds through the poses.")] = 1,
 ) -> "Procedure":
     """Force sensor: bias, weight and centre of mass of its tool, and the lever arm to the jaw."""
-    from math import radians
-
     from calibration.sessions.ft import FtSession
 
     jaw, turn = _three(jaw_mm, "--jaw-mm"), _three(jaw_turn_deg, "--jaw-turn-deg")
@@ -246,10 +239,13 @@ def fsr(
     )
 
 
+for function in (check, add, list_, show, diff, use, diagnose):
+    calibrate_app.command(function.__name__.rstrip("_"), rich_help_panel="Records")(function)
+
+
 def _made(make: "Callable[..., Procedure]", options: dict[str, Any]) -> "Procedure":
     """Make a procedure of its options; what they cannot be is a slip of whoever typed them."""
     from calibration.quality import BadDataError
-    from rig.errors import UsageError
 
     try:
         return make(**options)
@@ -258,8 +254,6 @@ def _made(make: "Callable[..., Procedure]", options: dict[str, Any]) -> "Procedu
 
 
 def _numbers(words: str, option: str) -> list[float]:
-    from rig.errors import UsageError
-
     try:
         return [float(word) for word in words.split(",")]
     except ValueError:
@@ -269,8 +263,6 @@ def _numbers(words: str, option: str) -> list[float]:
 
 
 def _three(words: str, option: str) -> list[float]:
-    from rig.errors import UsageError
-
     values = _numbers(words, option)
     if len(values) != 3:
         raise UsageError(f"{option} takes three numbers with commas between.", f"Given: {words}.")

@@ -1,15 +1,22 @@
-"""`rig calibrate check`: do recordings that exist agree with the calibrations of the sensors?"""
+"""`rig calibrate check`: may the active calibrations be used, and do recordings agree with them?"""
 
+from datetime import UTC, datetime
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.options import FormatOption
-from rig.cli.rig_options import ConfigOption, SimFlag
-from rig.cli.shipped import complete_recordings
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.calibrate_store import StoreOption, store_of
+from rig.cli.options import (
+    ConfigOption,
+    FormatOption,
+    SimFlag,
+    complete_recordings,
+    say_left_out,
+)
+from rig.output.console import JsonFlag, present
+from rig.output.table import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,27 +30,35 @@ if TYPE_CHECKING:
 
 def check(
     path: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
-            help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
+            help="Recordings to compare: a file, folder or archive. If none: the active records.",
+            autocompletion=complete_recordings,
         ),
-    ],
+    ] = None,
     format_: FormatOption = None,
     config: ConfigOption = None,
     sim: SimFlag = False,
+    log: Annotated[
+        Path | None,
+        typer.Option(help="Of the active records: also their ranges against this log's counts."),
+    ] = None,
+    store: StoreOption = None,
     json: JsonFlag = False,
 ) -> int:
-    """Verify the calibrations of sensors on recordings that exist; nothing moves.
+    """Check the active records, or verify the calibrations of sensors on recordings; nothing moves.
 
-    Compares the spindle's encoder with the motor's (scale and offset), the torque sensors at both
-    ends with each other, and motor current and spindle torque with the rig's calibrated constant,
-    the scatter over runs as uncertainty. Of every sensor that is tared: how far its zero moved.
-    Exit code 1 when one is off. Friction bounds how closely torques compare; for more, weights are
-    needed: rig calibrate torque.
+    The active records are checked against today's date, serial numbers and raw files. On recordings
+    the spindle's encoder is compared with the motor's (scale and offset), the torque sensors at
+    both ends with each other, and motor current and spindle torque with the rig's calibrated
+    constant, the scatter over runs as uncertainty. Of every sensor that is tared: how far its zero
+    moved. Exit code 1 when one is off, or must not be used. Friction bounds how closely torques
+    compare; for more, weights are needed: rig calibrate torque.
     """
+    if path is None:
+        return _check_records(config, sim, log, store, json)
     from calibration.agreement import NoPairError, agreements
     from rig.calibrate.zeros import zero_motions
-    from rig.cli.left_out import say_left_out
     from rig.importers.registry import open_campaign
     from rig.log.attempts import heads_of
 
@@ -61,16 +76,54 @@ def check(
     scales, unchecked = _scales(kept, _record(kept, config, sim))
     lines = [line for one in found for line in lines_of(one)]
     lines += [line for one in scales for line in scale_lines(one)]
-    lines += [*unchecked, *map(zero_line, zeros)]
-    screen = results(json)
-    for line in lines:
-        screen.print(line)
     wrong = [one.encoder for one in found if one.scale_is_wrong or one.offset_is_wrong]
     wrong += [one.channel for one in scales if one.is_wrong]
     wrong += [one.channel for one in zeros if one.is_wrong]
-    if json:
-        emit_json({"agreements": found, "scales": scales, "zeros": zeros, "wrong": wrong})
+    data = {"agreements": found, "scales": scales, "zeros": zeros, "wrong": wrong}
+    present(json, data, *lines, *unchecked, *map(zero_line, zeros))
     return 1 if wrong else 0
+
+
+def _check_records(
+    config: Path | None, sim: bool, log: Path | None, store: Path | None, json: bool
+) -> int:
+    """Check the active records of a rig."""
+    from calibration.rules import judge, judge_raw
+    from rig.configuration.chosen import choose_rig
+
+    settings = choose_rig(config, sim)
+    kept = store_of(store, settings)
+    now = datetime.now(UTC)
+    here = ("", settings.instrument.serial)
+    active = [record for record in kept.active().values() if record.instrument in here]
+    verdicts = [
+        v for record in active for v in (*judge(record, now, settings.serials), *judge_raw(record))
+    ]
+    if log is not None:
+        verdicts += _range_verdicts(log, active)
+    said = [
+        f"{'error' if v.is_error else 'warning'}: {v.channel} {v.record}: {v.message} ({v.rule})"
+        for v in verdicts
+    ]
+    fault = f"{len(verdicts)} objections, listed above" if verdicts else "nothing against them"
+    bad = any(v.is_error for v in verdicts)
+    data = {"store": kept.folder, "ok": not bad, "verdicts": verdicts}
+    present(json, data, *said, f"Active records: {len(active)}; {fault}.")
+    return int(bad)
+
+
+def _range_verdicts(log: Path, records: "list[CalibrationRecord]") -> list[Any]:
+    from calibration.rules import judge_range
+    from rig.log.reader import read_log
+    from rig.log.streams import COUNTS
+
+    topic = read_log(log, topics=(COUNTS,)).topics[COUNTS]
+    return [
+        verdict
+        for record in records
+        if record.input in topic.columns
+        for verdict in judge_range(record, topic.rows[record.input])
+    ]
 
 
 def _record(runs: "Sequence[Run]", config: Path | None, sim: bool) -> "CalibrationRecord | None":
@@ -132,7 +185,6 @@ def scale_lines(one: "Scale") -> list[str]:
 def zero_line(one: "ZeroMotion") -> str:
     """Return the motion of a zero in words."""
     from rig.calibrate.shown import with_unit
-    from rig.output.table import counted
 
     word = "ALARM" if one.is_wrong else "noted" if one.limit is None else "good"
     limit = "no limit" if one.limit is None else f"limit {with_unit(one.limit, one.unit)}"

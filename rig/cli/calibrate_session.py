@@ -1,40 +1,42 @@
 """A guided calibration as a person carries it out: asked, measured, shown, kept, gone on with."""
 
 import shlex
+import sys
+from datetime import UTC, datetime
+from os import W_OK, access
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rig.cli.rig_options import chosen_rig
-from rig.output.console import emit_json, remarks, results
-
-if TYPE_CHECKING:
-    from calibration.linear import CalibrationSet
-    from calibration.procedure import Answer, Operator, Procedure, Step
-    from calibration.store import CalibrationStore
-    from drivers.device import Device
-    from rig.calibrate.run import Kept
-    from rig.cli.calibrate import Keeping
-    from rig.configuration.config import Config
+from calibration.linear import CalibrationSet
+from calibration.procedure import AbortedError, Answer, Operator, Procedure, Step, carry_out
+from calibration.sessions.current import CurrentSession, DriveCurrentSession
+from calibration.store import CalibrationStore, default_folder
+from drivers.device import Device
+from drivers.registry import open_device
+from estimation.files import OutputError, write_text_atomic
+from rig.bench.logger import open_logger
+from rig.calibrate.bench import RigBench
+from rig.calibrate.raw import read_raw, require_absent, whole_folder, write_raw
+from rig.calibrate.run import Kept, Signature, keep
+from rig.calibrate.shown import announced, found_line, parameter_lines, reading
+from rig.cli.calibrate import Keeping
+from rig.cli.options import chosen_rig
+from rig.configuration.config import Config
+from rig.errors import UsageError
+from rig.output.console import present, remarks, results
+from rig.output.provenance import Provenance
+from rig.reports.calibration import alarms, page
 
 QUESTION = "Enter when done, b to measure the step before again, q to stop: "
 
 
-def conduct(procedure: "Procedure", how: "Keeping") -> None:
+def conduct(procedure: Procedure, how: Keeping) -> None:
     """Measure a calibration, or read its raw logs; conclude, keep and show it.
 
     Raises:
         UsageError: The options ask for something that cannot be.
         CalibrationError: The session was stopped, or its data cannot carry a calibration.
     """
-    from datetime import datetime
-
-    from calibration.sessions.current import CurrentSession, DriveCurrentSession
-    from calibration.store import CalibrationStore
-    from rig.calibrate.raw import read_raw
-    from rig.calibrate.run import Signature, keep
-    from rig.calibrate.shown import announced
-    from rig.errors import UsageError
-
     if not how.operator.strip():
         raise UsageError("Who calibrates is not known.", fix="Give --operator NAME.")
     settings = chosen_rig(how.config, how.sim)
@@ -61,7 +63,7 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
             )
     else:
         for line in announced(procedure):
-            remarks().print(line, markup=False)
+            remarks().print(line)
         lines = settings.calibration_set()
         _refuse_unkept(store, folder)
         measurements = _measure(procedure, settings, how)
@@ -81,30 +83,22 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
     if settings.store is None or settings.store.folder != store.folder:
         results(how.json).print(
             f"Sessions of {settings.name} take no record from this store. To change that, write"
-            f' calibration_store = "{_name_of(store)}" in its configuration.',
-            markup=False,
+            f' calibration_store = "{_name_of(store)}" in its configuration.'
         )
 
 
-def _name_of(store: "CalibrationStore") -> str:
+def _name_of(store: CalibrationStore) -> str:
     """Return the name of a store in a configuration."""
-    from calibration.store import default_folder
-
     return "default" if store.folder == default_folder() else str(store.folder.resolve())
 
 
-def _refuse_unkept(store: "CalibrationStore", folder: Path) -> None:
+def _refuse_unkept(store: CalibrationStore, folder: Path) -> None:
     """Refuse, before anything is measured, a result or raw logs that could not be written.
 
     Raises:
         UsageError: The folder of the raw logs is there already.
         OutputError: A folder cannot be written.
     """
-    from os import W_OK, access
-
-    from estimation.files import OutputError
-    from rig.calibrate.raw import require_absent
-
     require_absent(folder)
     for place in (store.folder.absolute(), folder.absolute()):
         there = next(above for above in (place, *place.parents) if above.exists())
@@ -114,10 +108,8 @@ def _refuse_unkept(store: "CalibrationStore", folder: Path) -> None:
             )
 
 
-def _refuse_idle_force_sensor(procedure: "Procedure", settings: "Config", how: "Keeping") -> None:
+def _refuse_idle_force_sensor(procedure: Procedure, settings: Config, how: Keeping) -> None:
     """Refuse a force sensor that the session would not read."""
-    from rig.errors import UsageError
-
     if how.force_sensor is None:
         return
     if how.raw is not None:
@@ -131,12 +123,7 @@ def _refuse_idle_force_sensor(procedure: "Procedure", settings: "Config", how: "
     raise UsageError(f"--force-sensor {how.force_sensor} would not be used.", why, "Leave it out.")
 
 
-def _measure(procedure: "Procedure", settings: "Config", how: "Keeping") -> list[Any]:
-    from calibration.procedure import AbortedError, carry_out
-    from rig.bench.logger import open_logger
-    from rig.calibrate.bench import RigBench
-    from rig.calibrate.shown import reading
-
+def _measure(procedure: Procedure, settings: Config, how: Keeping) -> list[Any]:
     screen = remarks()
     operator: Operator
     lines = settings.calibration_set()
@@ -152,25 +139,22 @@ def _measure(procedure: "Procedure", settings: "Config", how: "Keeping") -> list
         bench = RigBench(settings, procedure.devices, lambda: open_logger(settings), force)
         operator = Unasked() if how.yes else Asking(None)
 
-    def tell(step: "Step", number: int, total: int) -> None:
-        screen.print(f"{number + 1}/{total} {step.name}", markup=False)
+    def tell(step: Step, number: int, total: int) -> None:
+        screen.print(f"{number + 1}/{total} {step.name}")
 
-    def show(step: "Step", so_far: list[Any]) -> None:
-        screen.print(f"  {reading(procedure, so_far, lines)}", markup=False)
+    def show(step: Step, so_far: list[Any]) -> None:
+        screen.print(f"  {reading(procedure, so_far, lines)}")
 
     try:
         return carry_out(procedure, operator, bench, tell, show, measured)
     except (KeyboardInterrupt, AbortedError):
         kept = _kept_for_later(procedure, measured, lines, how)
-        screen.print(f"\nStopped; the rig is safe. {kept}", markup=False)
+        screen.print(f"\nStopped; the rig is safe. {kept}")
         raise
 
 
-def _begun(procedure: "Procedure", folder: Path | None) -> list[Any]:
+def _begun(procedure: Procedure, folder: Path | None) -> list[Any]:
     """Return the measurements of a session that was stopped; none for a new one."""
-    from rig.calibrate.raw import read_raw
-    from rig.errors import UsageError
-
     if folder is None:
         return []
     kind, measured, _ = read_raw(folder)
@@ -186,13 +170,9 @@ def _begun(procedure: "Procedure", folder: Path | None) -> list[Any]:
 
 
 def _kept_for_later(
-    procedure: "Procedure", measured: list[Any], lines: "CalibrationSet", how: "Keeping"
+    procedure: Procedure, measured: list[Any], lines: CalibrationSet, how: Keeping
 ) -> str:
     """Keep what a person set up before a session was stopped; return a message about it."""
-    from datetime import datetime
-
-    from rig.calibrate.raw import whole_folder, write_raw
-
     if how.yes or not measured:
         return "Nothing was kept."
     folder = Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-unfinished-{procedure.kind}"
@@ -208,25 +188,19 @@ def _kept_for_later(
 class Asking:
     """A person at the terminal; hands in the simulated world then do what the person confirms."""
 
-    def __init__(self, hands: "Operator | None") -> None:
-        from sys import stdin
-
-        from rig.errors import UsageError
-
-        if not stdin.isatty():
+    def __init__(self, hands: Operator | None) -> None:
+        if not sys.stdin.isatty():
             raise UsageError(
                 "A guided calibration asks questions, and stdin is not a terminal.",
                 fix="Run it in a terminal, or on the simulated rig with --yes.",
             )
         self._hands = hands
 
-    def prepare(self, step: "Step") -> "Answer":
+    def prepare(self, step: Step) -> Answer:
         """Show the instruction and wait for Enter; `b` goes back a step, `q` ends the session."""
-        from calibration.procedure import AbortedError, Answer
-
         if step.instruction:
             screen = remarks()
-            screen.print(step.instruction, markup=False)
+            screen.print(step.instruction)
             answer = self._asked()
             if answer == "q":
                 raise AbortedError("The calibration was stopped.")
@@ -252,10 +226,8 @@ class Asking:
 class Unasked:
     """Nobody: right for steps the rig does alone."""
 
-    def prepare(self, step: "Step") -> None:
+    def prepare(self, step: Step) -> None:
         """Refuse a step that needs hands."""
-        from rig.errors import UsageError
-
         if step.instruction:
             raise UsageError(
                 f"The step {step.name} needs hands: {step.instruction}",
@@ -265,9 +237,6 @@ class Unasked:
 
 
 def _force_sensor(words: str | None, devices: tuple[str, ...]) -> Any:
-    from drivers.registry import open_device
-    from rig.errors import UsageError
-
     if "force_sensor" not in devices:
         return None
     driver, _, url = (words or "").partition("=")
@@ -277,54 +246,39 @@ def _force_sensor(words: str | None, devices: tuple[str, ...]) -> Any:
             fix="Name it: --force-sensor ati-net=udp:192.168.1.1:49152",
         )
 
-    def opened() -> "Device":
+    def opened() -> Device:
         return open_device(driver, url)
 
     return opened
 
 
 def _now() -> str:
-    from datetime import UTC, datetime
-
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def _write_page(kept: "Kept", store: "CalibrationStore") -> Path:
-    from rig.output.provenance import Provenance
-    from rig.output.render import write_report
-    from rig.reports.calibration import page
-
+def _write_page(kept: Kept, store: CalibrationStore) -> Path:
+    place = kept.folder / "calibration.html"
     text = page(kept.records, kept.conclusion, store.records(), Provenance.now(0))
-    return write_report(kept.folder / "calibration.html", text)
+    write_text_atomic(place, text)
+    return place
 
 
-def _show(kept: "Kept", how: "Keeping", store: "CalibrationStore", page: Path) -> None:
-    from rig.calibrate.shown import found_line, parameter_lines
-    from rig.reports.calibration import alarms
-
-    screen = results(how.json)
+def _show(kept: Kept, how: Keeping, store: CalibrationStore, page: Path) -> None:
+    said = []
     for digest, record in kept.records.items():
-        screen.print(f"{digest}  {record.channel} from {record.input}", markup=False)
-        for line in parameter_lines(record):
-            screen.print(f"  {line}", markup=False)
-    for name, found in kept.conclusion.found.items():
-        screen.print(f"  {found_line(name, found)}", markup=False)
-    screen.print("Good: the data passed every check of this kind of calibration.")
+        said.append(f"{digest}  {record.channel} from {record.input}")
+        said += [f"  {line}" for line in parameter_lines(record)]
+    said += [f"  {found_line(name, found)}" for name, found in kept.conclusion.found.items()]
+    said.append("Good: the data passed every check of this kind of calibration.")
     drifted = alarms(kept.records.values(), store.records())
-    for line in drifted:
-        screen.print(f"ALARM: {line}", markup=False)
-    screen.print(f"Raw logs: {kept.folder}", markup=False)
-    screen.print(f"Page: {page}", markup=False)
+    said += [f"ALARM: {line}" for line in drifted]
+    said += [f"Raw logs: {kept.folder}", f"Page: {page}"]
     if not how.use:
-        for digest in kept.records:
-            by = shlex.quote(how.operator)
-            screen.print(
-                f"Use it: rig cal use {digest} --by {by} --store {store.folder}", markup=False
-            )
-    if how.json:
-        records = {
-            digest: {"channel": r.channel, "input": r.input, "fit": r.fit, "validity": r.validity}
-            for digest, r in kept.records.items()
-        }
-        whole = {"folder": kept.folder, "records": records, "found": kept.conclusion.found}
-        emit_json({**whole, "page": page, "drifted": drifted})
+        by = f"--by {shlex.quote(how.operator)} --store {store.folder}"
+        said += [f"Use it: rig calibrate use {digest} {by}" for digest in kept.records]
+    records = {
+        digest: {"channel": r.channel, "input": r.input, "fit": r.fit, "validity": r.validity}
+        for digest, r in kept.records.items()
+    }
+    whole = {"folder": kept.folder, "records": records, "found": kept.conclusion.found}
+    present(how.json, {**whole, "page": page, "drifted": drifted}, *said)

@@ -1,20 +1,19 @@
 """`rig campaigns`: find recordings again, open their diagnosis, compare them, diagnose again."""
 
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.diagnose_all import show_diagnoses
-from rig.cli.options import SchedulerOption, WorkersOption
-from rig.cli.refit import show_refit
-from rig.cli.shipped import complete_campaign, complete_model
-from rig.output.console import JsonFlag, emit_json, remarks, results, show_table
+from rig.cli.options import SchedulerOption, WorkersOption, complete_campaign, complete_model
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, present, remarks, results
+from rig.output.table import TextTable
 
 if TYPE_CHECKING:
     from rig.campaigns.index import IndexedCampaign, IndexedRun
-    from rig.output.table import TextTable
 
 LONGEST = 40
 """Letters of a note or a list of conditions that a row shows."""
@@ -66,34 +65,34 @@ def campaigns(
     whole = _indexed(root, rebuild)
     named = _named(whole, terms or [], root) if diagnose or open_ or compare else []
     found = named or search.search(whole, terms or [])
-    if refit is not None:
-        show_refit(
-            [campaign for campaign in found if campaign.runs], root, refit, workers, scheduler, json
-        )
-        return
-    if diagnose and len(recorded := [campaign for campaign in found if campaign.runs]) > 1:
-        show_diagnoses(recorded, root, workers, scheduler, json)
+    recorded = [campaign for campaign in found if campaign.runs]
+    if refit is not None or (diagnose and len(recorded) > 1):
+        from rig.cli.campaigns_each import show_diagnoses, show_refit
+
+        if refit is not None:
+            show_refit(recorded, root, refit, workers, scheduler, json)
+        else:
+            show_diagnoses(recorded, root, workers, scheduler, json)
         return
     if diagnose:
-        _diagnose(_only(found).folder)
+        from rig.cli.diagnose import diagnose as diagnose_one
+
+        diagnose_one(_only(found).folder)
         return
     if open_:
         _open(_only(found))
         return
-    if json:
-        emit_json({"campaigns": found})
-        return
     if compare and found:
-        show_table(results(json), _side_by_side(found, root))
-        return
-    _list(found, root, runs, most, len(whole))
+        shown: list[str | TextTable] = [_side_by_side(found, root)]
+    else:
+        shown = _listed(found, root, runs, most, len(whole))
+    present(json, {"campaigns": found}, *shown)
 
 
 def _indexed(root: Path, rebuild: bool) -> "Sequence[IndexedCampaign]":
     """Return all campaigns of a folder, from the index; what is new there is read."""
     from rig.campaigns.index import campaigns as all_campaigns
     from rig.campaigns.index import default_index
-    from rig.errors import UsageError
 
     if not root.is_dir():
         raise UsageError(
@@ -107,16 +106,18 @@ def _indexed(root: Path, rebuild: bool) -> "Sequence[IndexedCampaign]":
     )
 
 
-def _list(found: Sequence["IndexedCampaign"], root: Path, runs: bool, most: int, of: int) -> None:
-    """Print the campaigns found, of so many in all."""
-    screen = results(False)
+def _listed(
+    found: Sequence["IndexedCampaign"], root: Path, runs: bool, most: int, of: int
+) -> "list[str | TextTable]":
+    """Return the table of the campaigns found, of so many in all."""
     count = sum(len(campaign.runs) for campaign in found)
+    shown: list[str | TextTable] = []
     if found:
         table = _by_run(found, root, most) if runs else _by_campaign(found[:most], root)
-        show_table(screen, table)
+        shown.append(table)
         if len(table.rows) < (count if runs else len(found)):
-            screen.print(f"Older ones are not shown; --most shows more than {most} rows.")
-    screen.print(f"{len(found)} of {of} campaigns, {count} runs.")
+            shown.append(f"Older ones are not shown; --most shows more than {most} rows.")
+    return [*shown, f"{len(found)} of {of} campaigns, {count} runs."]
 
 
 def _named(
@@ -133,8 +134,6 @@ def _only(found: Sequence["IndexedCampaign"]) -> "IndexedCampaign":
     Raises:
         UsageError: There is none, or there are several.
     """
-    from rig.errors import UsageError
-
     if len(found) == 1:
         return found[0]
     names = ", ".join(str(campaign.folder) for campaign in found[:5])
@@ -145,17 +144,10 @@ def _only(found: Sequence["IndexedCampaign"]) -> "IndexedCampaign":
     )
 
 
-def _diagnose(folder: Path) -> None:
-    from rig.cli.diagnose import diagnose
-
-    diagnose(folder)
-
-
 def _open(campaign: "IndexedCampaign") -> None:
     import webbrowser
 
     from rig.campaigns.index import DIAGNOSIS
-    from rig.errors import UsageError
 
     page = (campaign.folder / DIAGNOSIS).with_suffix(".html")
     if not page.is_file():
@@ -168,8 +160,6 @@ def _open(campaign: "IndexedCampaign") -> None:
 
 
 def _by_campaign(found: Sequence["IndexedCampaign"], root: Path) -> "TextTable":
-    from rig.output.table import TextTable
-
     rows = []
     for campaign in found:
         facts = _facts(campaign)
@@ -222,10 +212,6 @@ def _conditions(runs: Sequence["IndexedRun"]) -> str:
 
 
 def _by_run(found: Sequence["IndexedCampaign"], root: Path, most: int) -> "TextTable":
-    from itertools import islice
-
-    from rig.output.table import TextTable
-
     pairs = ((campaign, run) for campaign in found for run in campaign.runs)
     rows = [
         [
@@ -245,8 +231,6 @@ def _by_run(found: Sequence["IndexedCampaign"], root: Path, most: int) -> "TextT
 
 def _side_by_side(found: Sequence["IndexedCampaign"], root: Path) -> "TextTable":
     """Return campaigns as columns, with the errors of their diagnoses."""
-    from rig.output.table import TextTable
-
     facts = [_facts(campaign) for campaign in found]
     rows = [[name, *(one[name] for one in facts)] for name in (facts[0] if facts else ())]
     diagnoses = [campaign.diagnosis or {} for campaign in found]

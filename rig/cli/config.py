@@ -1,23 +1,18 @@
 """`rig config`: is a configuration sound, and what does it come to."""
 
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rig.cli.help import GroupedHelp
-from rig.cli.new_file import require_new
-from rig.cli.rig_options import SimFlag
-from rig.cli.shipped import complete_config, config_names
-from rig.output.console import JsonFlag, emit_json, results
+from estimation.files import write_text_atomic
+from rig.cli.help import group
+from rig.cli.options import SimFlag, complete_config, config_names, require_new
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, emit_json, present
 
-config_app = typer.Typer(
-    name="config",
-    help="Begin, check and show a configuration.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+config_app = group("config", "Begin, check and show a configuration.")
 
 TEENSY = "16c0:0483"
 """USB vendor and product of the Teensy's serial port."""
@@ -45,12 +40,8 @@ def init(
     Comments and units stand in it; what was measured on another rig (gains, limits) is to be looked
     at before anything moves.
     """
-    from difflib import get_close_matches
-
-    from estimation.files import write_text_atomic
     from rig.configuration.config import SHIPPED, load_config
     from rig.doctor.ports import serial_ports
-    from rig.errors import UsageError
 
     if like not in config_names():
         near = get_close_matches(like, config_names(), n=1)
@@ -67,17 +58,15 @@ def init(
     if not load_config(Path(like)).is_simulated:
         line = 'calibration = "reference"\n'
         text = text.replace(
-            line, line + 'calibration_store = "default"  # what `rig cal use` chose\n'
+            line, line + 'calibration_store = "default"  # what `rig calibrate use` chose\n'
         )
     write_text_atomic(out, text)
-    screen = results(json)
     found = ", ".join(f"{board.path} (usb:{board.usb})" for board in boards)
-    screen.print(f"Wrote {out}. Boards plugged in: {found or 'none'}.")
+    said = [f"Wrote {out}. Boards plugged in: {found or 'none'}."]
     if len(boards) != 1:
-        screen.print(f"Write the board's address into `url` of {out}; `rig devices` shows it.")
-    screen.print("Then: rig config check, rig doctor. Check limits and gains before it moves.")
-    if json:
-        emit_json({"written": out, "boards": boards})
+        said.append(f"Write the board's address into `url` of {out}; `rig devices` shows it.")
+    said.append("Then: rig config check, rig doctor. Check limits and gains before it moves.")
+    present(json, {"written": out, "boards": boards}, *said)
 
 
 @config_app.command()
@@ -91,15 +80,10 @@ def check(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = Fa
 
     settings = choose_rig(path, sim)
     found = problems(settings)
-    screen = results(json)
-    for problem in found:
-        screen.print(f"{problem.key}: {problem.what}\n  fix: {problem.fix}", markup=False)
-    if not found:
-        screen.print(
-            f"{settings.name} is sound. The logger and further devices: {len(settings.devices)}."
-        )
-    if json:
-        emit_json({"name": settings.name, "sound": not found, "problems": found})
+    sound = f"{settings.name} is sound. The logger and further devices: {len(settings.devices)}."
+    said = [f"{problem.key}: {problem.what}\n  fix: {problem.fix}" for problem in found]
+    data = {"name": settings.name, "sound": not found, "problems": found}
+    present(json, data, *(said or [sound]))
     return 2 if found else 0
 
 
@@ -122,9 +106,6 @@ def list_(json: JsonFlag = False) -> None:
     from rig.configuration.config import SHIPPED, load_config, shipped_configs
 
     found = {name: load_config(Path(name)).name for name in shipped_configs()}
-    if json:
-        emit_json({"folder": SHIPPED, "configs": found})
-        return
     width = max(map(len, found))
-    for name, rig in found.items():
-        results(json).print(f"{name:{width}}  {rig}", markup=False)
+    lines = (f"{name:{width}}  {rig}" for name, rig in found.items())
+    present(json, {"folder": SHIPPED, "configs": found}, *lines)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.left_out import SkipBad, say_left_out
+from estimation.files import OutputError, check_output
 from rig.cli.options import (
     EquationOption,
     FormatOption,
@@ -14,21 +14,18 @@ from rig.cli.options import (
     MachineOption,
     ModelOption,
     QuickFlag,
+    RecordingsArgument,
     SchedulerOption,
     SeedOption,
+    SkipBad,
     WorkersOption,
+    say_left_out,
 )
-from rig.cli.shipped import complete_recordings
-from rig.output.console import JsonFlag, emit_json, results
+from rig.output.console import JsonFlag, present
 
 
 def diagnose(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
-        ),
-    ],
+    path: RecordingsArgument,
     model: ModelOption = None,
     machine: MachineOption = None,
     balance: EquationOption = None,
@@ -64,21 +61,16 @@ def diagnose(
         _plan(path, model, balance, machine, json_)
         return
 
-    import json
-
     from estimation import model_file
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
-    from estimation.files import check_output, write_text_atomic
     from rig.diagnosis.durations import timed_stages
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import subject
-    from rig.diagnosis.traces import traces, with_cost_of_causal_filters, written_models
+    from rig.diagnosis.traces import with_cost_of_causal_filters, written_models
     from rig.diagnosis.work import engine
-    from rig.output.provenance import Provenance
-    from rig.output.render import write_report
-    from rig.reports.diagnosis import page
+    from rig.reports.diagnosis import write
     from rig.reports.diagnosis_words import sentences
 
     kept = _kept_with(path)
@@ -108,28 +100,18 @@ def diagnose(
         done = with_cost_of_causal_filters(done)
         model_file.write_all(written_models(done), model_out)
         written += [f"Model: {model_out}", f"To estimate with it: rig model use {model_out}"]
-    if page_file is not None:
-        write_report(page_file, page(done.diagnosis, traces(done), Provenance.now(seed)))
-        written.append(f"Report: {page_file}")
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))
-    if json_out is not None:
-        text = json.dumps(done.diagnosis.to_json(), indent=2, allow_nan=False)
-        write_text_atomic(json_out, text + "\n")
-        written.append(f"Diagnosis: {json_out}")
+    written += write(done, seed, page_file, json_out)
     looks.enter(look)
-    screen = results(json_)
-    for line in (*sentences(done.diagnosis), *done.diagnosis.notes, *written):
-        screen.print(line, markup=False)
-    if json_:
-        emit_json(done.diagnosis.to_json())
+    said = (*sentences(done.diagnosis), *done.diagnosis.notes, *written)
+    present(json_, done.diagnosis.to_json(), *said)
 
 
 def _kept_with(path: Path) -> Path | None:
     """Return the file of a campaign's diagnosis in its folder; None where it cannot be kept."""
     from estimation.file_kinds import DIAGNOSIS as KIND
     from estimation.file_kinds import HTML
-    from estimation.files import OutputError, check_output
     from rig.campaigns.index import DIAGNOSIS
     from rig.output.console import remarks
 
@@ -140,7 +122,7 @@ def _kept_with(path: Path) -> Path | None:
         check_output(kept, KIND)
         check_output(kept.with_suffix(".html"), HTML)
     except OutputError as error:
-        remarks().print(f"The page is not kept with the recordings: {error}", markup=False)
+        remarks().print(f"The page is not kept with the recordings: {error}")
         return None
     return kept
 
@@ -159,8 +141,4 @@ def _plan(
             bar.update(task, completed=done, total=total)
 
         found = plan_of(path, model, balance, machine, count)
-    screen = results(json_)
-    for line in sentences(found):
-        screen.print(line, markup=False)
-    if json_:
-        emit_json(found.to_json())
+    present(json_, found.to_json(), *sentences(found))

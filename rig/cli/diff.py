@@ -1,16 +1,20 @@
 """`rig diff`: what changed between two campaigns of one machine?"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from rig.cli.left_out import say_left_out
-from rig.cli.options import EquationOption, FormatOption, MachineOption, ModelOption, SeedOption
-from rig.output.console import JsonFlag, emit_json, results
-
-if TYPE_CHECKING:
-    from estimation.changes.difference import Difference
+from rig.cli.options import (
+    EquationOption,
+    FormatOption,
+    MachineOption,
+    ModelOption,
+    SeedOption,
+    say_left_out,
+)
+from rig.output.console import JsonFlag, present
+from rig.output.table import TextTable
 
 
 def diff(
@@ -34,7 +38,6 @@ def diff(
     from estimation.changes.compare import compare
     from rig.diagnosis.subject import subject
     from rig.output.console import progress
-    from rig.output.table import to_rich
     from rig.reports.changes import change_table, lines, prediction_table
 
     first = subject(a, model, balance, format_, machine)
@@ -45,14 +48,9 @@ def diff(
     with progress() as bar:
         task = bar.add_task("changes", total=1)
         both = first.campaign.evidence, second.campaign.evidence
-        found: Difference = compare(*both, first.models, third, seed)
+        found = compare(*both, first.models, third, seed)
         bar.advance(task)
-    screen = results(json_)
-    for line in lines(found):
-        screen.print(line)
-    if found.changes:
-        screen.print(to_rich(change_table(found)))
-    if found.predicted:
-        screen.print(to_rich(prediction_table(found)))
-    if json_:
-        emit_json(found)
+    shown: list[str | TextTable] = [*lines(found)]
+    shown += [change_table(found)] if found.changes else []
+    shown += [prediction_table(found)] if found.predicted else []
+    present(json_, found, *shown)

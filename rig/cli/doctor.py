@@ -1,12 +1,16 @@
-"""`rig doctor | devices | udev | selftest`: what is there, and is it in order."""
+"""`rig doctor | devices | udev | selftest | commission`: what is there, and is it in order."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, emit_json, present, results
+
+YesFlag = Annotated[
+    bool, typer.Option("--yes", help="The jaw is empty and the emergency stop at hand; do not ask.")
+]
 
 
 def doctor(
@@ -32,11 +36,9 @@ def doctor(
     settings = chosen_rig(config, sim)
     for finding in examine(settings):
         found.append(finding)
-        screen.print(
-            f"{finding.level:8}{finding.subject}, {finding.check}: {finding.what}", markup=False
-        )
+        screen.print(f"{finding.level:8}{finding.subject}, {finding.check}: {finding.what}")
         if finding.fix:
-            screen.print(f"{'':8}fix: {finding.fix}", markup=False)
+            screen.print(f"{'':8}fix: {finding.fix}")
     grave = worst(found)
     if bundle is not None:
         from rig.doctor.bundle import write_bundle
@@ -61,25 +63,18 @@ def devices(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = 
         configured = {LOGGER: settings.logger, **settings.devices}
     ports, buses = serial_ports(), can_interfaces()
     texts = {name: driver.description for name, driver in drivers().items()}
-    if json:
-        named = {n: {"driver": s.driver, "url": s.url} for n, s in configured.items()}
-        emit_json(
-            {"serial_ports": ports, "can_interfaces": buses, "drivers": texts, "configured": named}
-        )
-        return
-    screen = results(json)
-    for port in ports:
-        where = f"usb:{port.usb}" if port.usb else "not on USB"
-        screen.print(f"port        {port.path}  {where}  {port.name}", markup=False)
-    for name in buses:
-        screen.print(f"CAN         {name}  can:socketcan:{name}", markup=False)
-    if not ports and not buses:
-        screen.print("No serial port and no CAN interface is present.")
-    for name, section in configured.items():
-        screen.print(f"configured  {name}: {section.driver} at {section.url}", markup=False)
+    named = {n: {"driver": s.driver, "url": s.url} for n, s in configured.items()}
+    said = [
+        f"port        {port.path}  {f'usb:{port.usb}' if port.usb else 'not on USB'}  {port.name}"
+        for port in ports
+    ]
+    said += [f"CAN         {name}  can:socketcan:{name}" for name in buses]
+    said = said or ["No serial port and no CAN interface is present."]
+    said += [f"configured  {name}: {s.driver} at {s.url}" for name, s in configured.items()]
     width = max(map(len, texts))
-    for name, text in texts.items():
-        screen.print(f"driver      {name:{width}}  {text}", markup=False)
+    said += [f"driver      {name:{width}}  {text}" for name, text in texts.items()]
+    data = {"serial_ports": ports, "can_interfaces": buses, "drivers": texts, "configured": named}
+    present(json, data, *said)
 
 
 def udev(json: JsonFlag = False) -> None:
@@ -115,13 +110,38 @@ def selftest(
     for check in checks(settings):
         done.append(check)
         word = "pass" if check.passed else "FAIL"
-        screen.print(f"{word}  {check.name}: {check.detail}", markup=False)
+        screen.print(f"{word}  {check.name}: {check.detail}")
     failed = [check.name for check in done if not check.passed]
-    screen.print(f"{len(done) - len(failed)} of {len(done)} checks passed on {settings.name}.")
+    said = [f"{len(done) - len(failed)} of {len(done)} checks passed on {settings.name}."]
     by_hand = bench_tests() if bench else []
     for number, test in enumerate(by_hand, 1):
-        screen.print(f"by hand {number}  {test.name}: {test.do}", markup=False)
-        screen.print(f"    must show: {test.shows}", markup=False)
-    if json:
-        emit_json({"passed": not failed, "checks": done, "by_hand": by_hand})
+        said += [f"by hand {number}  {test.name}: {test.do}", f"    must show: {test.shows}"]
+    present(json, {"passed": not failed, "checks": done, "by_hand": by_hand}, *said)
     return 1 if failed else 0
+
+
+def commission(
+    config: ConfigOption = None, sim: SimFlag = False, yes: YesFlag = False, json: JsonFlag = False
+) -> int:
+    """Turn a newly wired rig for the first time: small pulses of current, no position loop.
+
+    Each pulse is limited in size, time and travel. The measured current and every encoder must
+    answer in the right direction, closing and opening. Exit code 1 when a check fails.
+    """
+    from rig.doctor.commission import commission as checks
+
+    settings = chosen_rig(config, sim)
+    if not (yes or settings.is_simulated):
+        typer.confirm(
+            "The jaw is empty, the emergency stop works and is at hand?", abort=True, err=True
+        )
+    screen = results(json)
+    made = []
+    for check in checks(settings):
+        made.append(check)
+        said = "passed" if check.passed else "FAILED"
+        screen.print(f"{said:8}{check.name}: {check.detail}".rstrip(": "))
+    passed = all(check.passed for check in made)
+    if json:
+        emit_json({"passed": passed, "checks": made})
+    return 0 if passed else 1

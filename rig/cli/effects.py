@@ -1,12 +1,13 @@
 """`rig effects [NAME]`: the physical effects a diagnosis can name, from their own descriptions."""
 
 import inspect
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.shipped import complete_effect
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.options import complete_effect
+from rig.output.console import JsonFlag, present
 
 if TYPE_CHECKING:
     from estimation.effects import Effect
@@ -31,21 +32,13 @@ def effects(
     known = catalogue()
     listed = {key: one for key, one in known.items() if name is None or key.startswith(f"{name}.")}
     if name is not None and (name in known or not listed):
-        listed = {}
         one = effect(name)
-        if json:
-            emit_json(_described(one))
-        else:
-            _show(one)
+        present(json, _described(one), *_shown(one))
         return
-    if json:
-        emit_json({"effects": [_described(one) for one in listed.values()]})
-        return
-    screen = results(json)
     width = max(map(len, listed))
-    for key, one in listed.items():
-        screen.print(f"{key:{width}}  {_summary(one)}")
-    screen.print(f"{len(listed)} effects. More on one: rig effects NAME", style="dim")
+    rows = (f"{key:{width}}  {_summary(one)}" for key, one in listed.items())
+    data = {"effects": [_described(one) for one in listed.values()]}
+    present(json, data, *rows, f"{len(listed)} effects. More on one: rig effects NAME")
 
 
 def _summary(one: "Effect") -> str:
@@ -69,18 +62,13 @@ def _described(one: "Effect") -> dict[str, Any]:
     }
 
 
-def _show(one: "Effect") -> None:
-    screen = results(json=False)
-    screen.print(one.id, style="bold")
-    screen.print(_text(one))
-    screen.print("")
-    for parameter in (*one.amplitudes, *one.shape):
-        bounds = f"{parameter.lower:g} to {parameter.upper:g}"
-        screen.print(
-            f"parameter {parameter.name}: {parameter.description} ({parameter.unit}; {bounds})"
-        )
+def _shown(one: "Effect") -> Iterator[str]:
+    yield from (one.id, _text(one), "")
+    for p in (*one.amplitudes, *one.shape):
+        bounds = f"{p.lower:g} to {p.upper:g}"
+        yield f"parameter {p.name}: {p.description} ({p.unit}; {bounds})"
     channels = ", ".join(f"{role} = {channel}" for role, channel in one.roles.items())
-    screen.print(f"reads: {channels or 'nothing'}")
-    screen.print(f"searched in: {', '.join(one.balances) or 'no equation; it is declared only'}")
+    yield f"reads: {channels or 'nothing'}"
+    yield f"searched in: {', '.join(one.balances) or 'no equation; it is declared only'}"
     if one.told_apart_by:
-        screen.print(f"distinguished by: {one.told_apart_by}")
+        yield f"distinguished by: {one.told_apart_by}"

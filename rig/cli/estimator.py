@@ -1,20 +1,30 @@
-"""`rig estimator`: what a file holds, and which of two is better."""
+"""`rig adapt | export | estimator`: make an estimator fit elsewhere, write it as C, compare two."""
 
+from math import degrees
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.help import GroupedHelp
-from rig.cli.options import FormatOption, TablesFile
-from rig.output.console import JsonFlag, emit_json, progress, show_result
-
-estimator_app = typer.Typer(
-    help="Compare estimators.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
+from estimation.errors import nearest
+from estimation.files import write_text_atomic
+from rig.cli.help import group
+from rig.cli.options import (
+    FormatOption,
+    JsonFile,
+    SeedOption,
+    TablesFile,
+    require_new,
+    say_left_out,
 )
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, emit_json, present, progress, show_result, to_json
+from rig.output.table import TextTable, to_page
+
+if TYPE_CHECKING:
+    from rig.models.adapt import Adaptation
+
+estimator_app = group("estimator", "Compare estimators.")
 
 
 @estimator_app.callback()
@@ -36,7 +46,6 @@ def compare(
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
     from rig.models.compared import compare as compared
-    from rig.output.table import to_page
     from rig.reports import compared as shown
 
     files, estimators = (first, second), (load(first), load(second))
@@ -52,3 +61,120 @@ def compare(
     show_result(lines, tables, out, page, json)
     if json:
         emit_json(found)
+
+
+def adapt(
+    source: Annotated[Path, typer.Argument(help="Estimator of the source, from rig fit.")],
+    path: Annotated[Path, typer.Argument(help="Recordings of the other instrument.")],
+    runs: Annotated[str, typer.Option(help="Runs to adapt with, such as 00,11.")] = "",
+    choose: Annotated[
+        int, typer.Option(min=1, help="Without --runs: how many, those nearest to all others.")
+    ] = 1,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File of the adapted estimator.")
+    ] = None,
+    scratch: Annotated[
+        bool, typer.Option(help="Also fit on the other instrument's runs alone, in folds.")
+    ] = True,
+    seed: SeedOption = 0,
+    format_: FormatOption = None,
+    json: JsonFlag = False,
+    json_out: JsonFile = None,
+) -> None:
+    """Adapt an estimator with some runs and report its error on the runs not used."""
+    from estimation.estimator import load
+    from rig.importers.jaw_steps import sentence, with_one_zero
+    from rig.importers.registry import open_campaign
+    from rig.models.adapt import open_source, run_adaptation, runs_by_rule
+    from rig.models.origins import with_origin
+
+    require_new(out)
+    estimator = open_source(load(source))
+    campaign = open_campaign(path, format_)
+    say_left_out(path, campaign)
+    campaign, steps = with_one_zero(campaign, estimator.target)
+    named = [name.strip() for name in runs.split(",") if name.strip()]
+    with progress() as bar:
+        task = bar.add_task("runs", total=len(campaign))
+        named = named or runs_by_rule(estimator, campaign, choose)
+        result, new = run_adaptation(
+            estimator,
+            source,
+            campaign,
+            named,
+            from_scratch=scratch,
+            seed=seed,
+            on_run=lambda run: bar.advance(task),
+        )
+    said = [*sentence(steps)]
+    if out is not None:
+        figures = {"unused_runs_rmse": result.adapted.rmse, "unused_runs_p95": result.adapted.p95}
+        with_origin(new, campaign.select(result.used), figures, source).save(out)
+        said.append(f"Estimator: {out}")
+    if json_out is not None:
+        write_text_atomic(json_out, to_json(result))
+        said.append(f"Result: {json_out}")
+    present(json, result, _errors(result), *said)
+
+
+def _errors(result: "Adaptation") -> "TextTable":
+    """Return the errors on the runs not used."""
+    torque = result.target.endswith("_n_m")
+    unit, scale = ("mN m", 1e3) if torque else ("deg", degrees(1.0))
+    named = {
+        "as it is": result.as_it_is,
+        f"adapted with {', '.join(result.used)}": result.adapted,
+        "fitted on the other runs, in folds": result.scratch,
+    }
+    rows = [
+        [name, *(f"{scale * value:.2f}" for value in (found.mae, found.p95, found.rmse))]
+        for name, found in named.items()
+        if found is not None
+    ]
+    note = f"Closing samples of {len(result.unused)} runs not used."
+    if result.covered is not None:
+        note += f" The adapted interval of 95 % covers {result.covered:.1%} of them."
+    if result.left_out:
+        note += f" Flagged, left out: {', '.join(result.left_out)}."
+    columns = [f"{result.target}, {unit}", "MAE", "95th pct", "RMSE"]
+    return TextTable(f"{result.source} on another instrument", columns, rows, note)
+
+
+def export(
+    model: Annotated[
+        Path, typer.Argument(help="Model or estimator of rig fit or rig adapt, .toml or .npz.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="File of the header, such as grip.h.")],
+    equation: Annotated[
+        str | None, typer.Option(help="Equation of a file of several models; the first if none.")
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Call rate, Hz.")] = 1000.0,
+    json: JsonFlag = False,
+) -> None:
+    """Write an estimator as a self-contained C header, for firmware.
+
+    A model's file states its machine: units, ratios and derived channels follow from it.
+    """
+    from estimation import model_file
+    from estimation.estimator import load
+    from estimation.estimators.bank import BankEstimator
+    from estimation.estimators.c_header import header
+    from estimation.estimators.model import ModelEstimator
+    from estimation.estimators.network import NetworkEstimator
+
+    estimator = load(model)
+    if equation is not None and model.suffix == ".toml":
+        models = {one.balance: one for one in model_file.read_all(model)}
+        if equation not in models:
+            raise UsageError(
+                f"{model} has no equation {equation!r}.", nearest(equation, list(models))
+            )
+        estimator = ModelEstimator(models[equation])
+    if not isinstance(estimator, BankEstimator | NetworkEstimator | ModelEstimator):
+        raise UsageError(
+            f"{model} cannot be written as C.",
+            "Models, state estimators and networks can.",
+            "Fit one: rig fit PATH --out FILE.toml.",
+        )
+    write_text_atomic(out, header(estimator, out.stem.replace("-", "_").lower(), rate))
+    present(json, {"header": out}, f"Header: {out}")

@@ -4,17 +4,11 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.help import GroupedHelp
-from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.help import group
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, present
 
-firmware_app = typer.Typer(
-    name="firmware",
-    help="Show firmware versions, build the firmware, flash it.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+firmware_app = group("firmware", "Show firmware versions, build the firmware, flash it.")
 
 BoardOption = Annotated[
     str, typer.Option("--board", "-b", help="teensy35, teensy41 or teensy41-grasper.")
@@ -31,14 +25,14 @@ def version(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = 
 
     settings = chosen_rig(config, sim)
     versions = compare(settings)
-    screen = results(json)
-    screen.print(f"program   {versions.program}", markup=False)
-    screen.print(f"sources   {versions.sources}", markup=False)
-    screen.print(f"board     {versions.board}", markup=False)
-    for remark in versions.remarks:
-        screen.print(remark, markup=False)
-    if json:
-        emit_json(versions)
+    present(
+        json,
+        versions,
+        f"program   {versions.program}",
+        f"sources   {versions.sources}",
+        f"board     {versions.board}",
+        *versions.remarks,
+    )
     return 0 if versions.fits else 1
 
 
@@ -49,9 +43,7 @@ def build(board: BoardOption = "", json: JsonFlag = False) -> None:
     from rig.bench.firmware import build_for
 
     where = build_for(board) if board else make()
-    results(json).print(f"Built {where}.", markup=False)
-    if json:
-        emit_json({"built": where})
+    present(json, {"built": where}, f"Built {where}.")
 
 
 @firmware_app.command()
@@ -69,6 +61,4 @@ def flash(
 
     found = write(board, serial)
     text = f"Flashed {board} to the board {found.serial}. Next: rig firmware version"
-    results(json).print(text, markup=False)
-    if json:
-        emit_json({"flashed": board, "serial": found.serial, "port": found.port})
+    present(json, {"flashed": board, "serial": found.serial, "port": found.port}, text)

@@ -1,119 +1,123 @@
 """`rig fit`: fit a declared model on a campaign."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from rig.cli.left_out import SkipBad, say_left_out
-from rig.cli.new_file import require_new
-from rig.cli.options import FormatOption, MachineOption, SeedOption
-from rig.cli.shipped import complete_model, complete_recordings, model_names
-from rig.output.console import JsonFlag, emit_json, progress, results
+from estimation.channels import unit_of
+from rig.cli.options import (
+    FormatOption,
+    MachineOption,
+    RecordingsArgument,
+    SeedOption,
+    SkipBad,
+    complete_model,
+    model_names,
+    require_new,
+    say_left_out,
+)
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, present, progress
+from rig.output.table import TextTable
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
     from estimation.cross_validation import HeldOutError
+    from estimation.estimators.bank import BankRecipe
+    from estimation.estimators.network import NetworkRecipe
     from estimation.model import Model
+    from estimation.scores import Score
 
 
 STATE_NODES, THINNED = 12, 24
 """Hidden nodes of a network with physical states, and every how many-th sample it learns from."""
 
 
-def fit_states(
-    campaign: "Campaign",
-    target: str,
-    surrogate: str,
-    live: bool,
-    folds: int,
-    seed: int,
-    out: Path | None,
-    json_: bool,
-) -> None:
-    """Fit products of physical states, and report the error on runs left out."""
-    from estimation.bank.states import LOAD_SCALES, Bank
-    from estimation.cross_validation import held_out_score
-    from estimation.estimators.bank import BankRecipe
-    from rig.errors import UsageError
-    from rig.importers.jaw_steps import sentence, with_one_zero
-    from rig.models.origins import with_origin
+class Learner(NamedTuple):
+    """An estimator that is learnt, not declared.
 
+    Attributes:
+        recipe: What is fitted.
+        score: Returns its error on runs held out of a campaign, in folds, with a seed; calls the
+            last argument after each fold.
+        facts: What is fixed of it, for the JSON.
+    """
+
+    recipe: "BankRecipe | NetworkRecipe"
+    score: "Callable[[Any, Campaign, int, int, Callable[[], None]], Score]"
+    facts: dict[str, Any]
+
+
+def _learner(kind: str, target: str, surrogate: str, live: bool, seed: int) -> Learner:
+    """Return products of physical states, or a network with some of them as inputs.
+
+    Raises:
+        UsageError: The states have no scale for that channel as the load.
+    """
+    from estimation.bank.states import LOAD_SCALES, Bank
+    from estimation.cross_validation import closing_score, held_out_score
+    from estimation.estimators.bank import BankRecipe
+    from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
+    from estimation.networks.training import Settings
+
+    if kind == "network":
+        inputs, settings = (*STATE_INPUTS, surrogate), Settings(nodes=STATE_NODES, seed=seed)
+        recipe = NetworkRecipe(inputs, target, settings, every=THINNED)
+        facts = {"target": target, "inputs": inputs, "nodes": STATE_NODES}
+        return Learner(recipe, closing_score, facts)
     if surrogate not in LOAD_SCALES:
         raise UsageError(
             f"{surrogate} does not stand for the load.",
             fix=f"Choose one of: {', '.join(LOAD_SCALES)}.",
         )
-    recipe = BankRecipe(target, Bank(surrogate), causal=live)
-    campaign, steps = with_one_zero(campaign, target)
-    kept = campaign.evidence
-    estimator = recipe.fit(campaign)
-    error = held_out_score(recipe, kept, min(folds, len(kept)), seed) if len(kept) > 1 else None
-    screen = results(json_)
-    for line in sentence(steps):
-        screen.print(line)
-    if error is not None:
-        screen.print(_held_out_line(target, len(kept), error.rmse))
-    if out is not None:
-        figures = {} if error is None else {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
-        with_origin(estimator, campaign, figures).save(out)
-        screen.print(f"Estimator: {out}", markup=False)
-    if json_:
-        told = {"target": target, "surrogate": surrogate, "held_out": error, "jaw_steps": steps}
-        emit_json(told | {"out": out})
+    return Learner(
+        BankRecipe(target, Bank(surrogate), causal=live),
+        lambda recipe, runs, folds, seed, _: held_out_score(recipe, runs, folds, seed),
+        {"target": target, "surrogate": surrogate},
+    )
 
 
-def fit_network(
-    campaign: "Campaign",
-    target: str,
-    surrogate: str,
-    folds: int,
-    seed: int,
-    out: Path | None,
-    json_: bool,
+def _learn(
+    learner: Learner, campaign: "Campaign", folds: int, seed: int, out: Path | None, json_: bool
 ) -> None:
-    """Train a network with physical states as inputs, and report the error on runs left out."""
-    from estimation.cross_validation import closing_score
-    from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
-    from estimation.networks.training import Settings
+    """Fit an estimator, and report its error on runs left out."""
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.models.origins import with_origin
+    from rig.reports.diagnosis_words import display
 
-    inputs = (*STATE_INPUTS, surrogate)
-    recipe = NetworkRecipe(inputs, target, Settings(nodes=STATE_NODES, seed=seed), every=THINNED)
+    recipe, target = learner.recipe, learner.recipe.target
     campaign, steps = with_one_zero(campaign, target)
-    kept = campaign.evidence
+    kept, error = campaign.evidence, None
     folds = min(folds, len(kept))
-    error = None
     with progress() as bar:
-        task = bar.add_task("networks", total=1 + folds)
+        task = bar.add_task("fits", total=1 + folds)
         estimator = recipe.fit(campaign)
         bar.advance(task)
         if len(kept) > 1:
-            error = closing_score(recipe, kept, folds, seed, lambda: bar.advance(task))
-    screen = results(json_)
-    screen.print(f"{target} from {', '.join(inputs)}: {STATE_NODES} nodes.")
-    for line in sentence(steps):
-        screen.print(line)
+            error = learner.score(recipe, kept, folds, seed, lambda: bar.advance(task))
+    said, figures = [*sentence(steps)], {}
+    if "nodes" in learner.facts:
+        said.insert(0, f"{target} from {', '.join(learner.facts['inputs'])}: {STATE_NODES} nodes.")
     if error is not None:
-        screen.print(_held_out_line(target, len(kept), error.rmse))
+        figures = {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
+        scale, unit = display(unit_of(target))
+        said.append(
+            f"{target}, closing samples of {len(kept)} runs, each held out once:"
+            f" RMSE {scale * error.rmse:.3g} {unit}."
+        )
     if out is not None:
-        figures = {} if error is None else {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
         with_origin(estimator, campaign, figures).save(out)
-        screen.print(f"Estimator: {out}", markup=False)
-    if json_:
-        told = {"target": target, "inputs": inputs, "nodes": STATE_NODES}
-        emit_json(told | {"held_out": error, "jaw_steps": steps, "out": out})
+        said.append(f"Estimator: {out}")
+    found = {"held_out": error, "jaw_steps": steps, "out": out}
+    present(json_, learner.facts | found, *said)
 
 
 def fit(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
-        ),
-    ],
+    path: RecordingsArgument,
     model: Annotated[
         str | None,
         typer.Option(
@@ -150,30 +154,24 @@ def fit(
     """
     from estimation import model_file
     from rig.machines.recordings import open_recordings
-    from rig.output.table import to_rich
     from rig.reports.fit import held_out_sentence, parameter_table
 
     require_new(out)
-    screen = results(json_)
     campaign = open_recordings(path, machine, format_, skip_bad)
     say_left_out(path, campaign)
-    if model == "states":
-        fit_states(campaign, target, surrogate, live, folds, seed, out, json_)
-        return
-    if model == "network":
-        fit_network(campaign, target, surrogate, folds, seed, out, json_)
+    if model in ("states", "network"):
+        _learn(_learner(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)
         return
     done = _fitted(declared_models(model, machine), campaign, folds, seed)
+    said: list[str | TextTable] = []
+    one = "One run: there is no error on runs that it was not fitted on."
     for fitted, error in done:
-        screen.print(to_rich(parameter_table(fitted)))
-        one = "One run: there is no error on runs that it was not fitted on."
-        screen.print(held_out_sentence(fitted, error) if error else one)
+        said += [parameter_table(fitted), held_out_sentence(fitted, error) if error else one]
     if out is not None:
         model_file.write_all([fitted for fitted, _ in done], out)
-        screen.print(f"Model: {out}", markup=False)
-    if json_:
-        told = [_told(fitted, error, out) for fitted, error in done]
-        emit_json(told[0] if len(told) == 1 else {"models": told, "out": out})
+        said.append(f"Model: {out}")
+    told = [_told(fitted, error, out) for fitted, error in done]
+    present(json_, told[0] if len(told) == 1 else {"models": told, "out": out}, *said)
 
 
 def _fitted(
@@ -217,9 +215,6 @@ def declared_models(model: str | None, machine: Path | None) -> "list[Model]":
 
 def _dated(model: "Model") -> "Model":
     """Return a fitted model with the time of its fit."""
-    from dataclasses import replace
-    from datetime import UTC, datetime
-
     assert model.evidence is not None  # noqa: S101  a fit sets its evidence
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return replace(model, evidence=replace(model.evidence, made_at=now))
@@ -242,15 +237,3 @@ def _told(model: "Model", error: "HeldOutError | None", out: Path | None) -> dic
         "held_out": error,
         "out": out,
     }
-
-
-def _held_out_line(target: str, runs: int, rmse: float) -> str:
-    """Return the error of an estimator on runs that it was not fitted on, in words."""
-    from estimation.channels import unit_of
-    from rig.reports.diagnosis_words import display
-
-    scale, unit = display(unit_of(target))
-    return (
-        f"{target}, closing samples of {runs} runs, each held out once:"
-        f" RMSE {scale * rmse:.3g} {unit}."
-    )

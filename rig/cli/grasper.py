@@ -5,17 +5,13 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.help import GroupedHelp
-from rig.cli.options import SeedOption
-from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
-from rig.output.console import JsonFlag, emit_json, progress, remarks, results
+from rig.cli.help import group
+from rig.cli.options import ConfigOption, SeedOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, present, progress, remarks
+from rig.output.table import TextTable
 
-grasper_app = typer.Typer(
-    name="grasper",
-    help="The 3-DOF grasper: possible designs, its master, recordings of the simulated one.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
+grasper_app = group(
+    "grasper", "The 3-DOF grasper: possible designs, its master, recordings of the simulated one."
 )
 
 
@@ -24,7 +20,6 @@ def designs(json: JsonFlag = False) -> None:
     """List every combination of Table 1 of Zhao and Nelson 2016, the most compact one marked."""
     from rig.grasper.wrist import designs as every
     from rig.grasper.wrist import most_compact
-    from rig.output.table import TextTable, to_rich
 
     found = every()
     best = most_compact(found)
@@ -41,9 +36,8 @@ def designs(json: JsonFlag = False) -> None:
         for design in found
     ]
     columns = ["gears", "sun/carrier", "driven", "d2/d1", "area", "extra stages", "remark"]
-    results(json).print(to_rich(TextTable("Designs of the planetary wrist", columns, rows)))
-    if json:
-        emit_json({"designs": found, "most_compact": best})
+    table = TextTable("Designs of the planetary wrist", columns, rows)
+    present(json, {"designs": found, "most_compact": best}, table)
 
 
 @grasper_app.command()
@@ -71,9 +65,8 @@ def record(
         for recording in wrist_campaign(Wrist(pulley_ratio), seed, runs):
             logs.append(write_recording(out / f"{recording.name}.mcap", recording))
             bar.update(task, advance=1, description=recording.name)
-    results(json).print(f"{len(logs)} runs in {out}. Next: rig diagnose {out}", markup=False)
-    if json:
-        emit_json({"folder": out, "logs": logs})
+    data = {"folder": out, "logs": logs}
+    present(json, data, f"{len(logs)} runs in {out}. Next: rig diagnose {out}")
 
 
 @grasper_app.command()
@@ -102,7 +95,6 @@ def follow(
     # the simulated rig of this command is the simulated grasper
     settings = chosen_rig(Path("grasper") if sim and config is None else config, sim=False)
     refuse_problems(settings)
-    screen = results(json)
     with progress() as bar:
         task = bar.add_task("following", total=duration)
 
@@ -114,13 +106,10 @@ def follow(
         except KeyboardInterrupt:
             remarks().print("Stopped; the grasper is safe.")
             raise
-    for moved in axes:
-        screen.print(
-            f"{moved.axis:5}  from {moved.lowest_rad:+.3f} to {moved.highest_rad:+.3f} rad, "
-            f"{moved.largest_error_rad:.4f} rad off at most, "
-            f"force up to {moved.largest_force_n:.2f} N",
-            markup=False,
-        )
-    screen.print(f"Log: {log}", markup=False)
-    if json:
-        emit_json({"config": settings.name, "duration_s": duration, "axes": axes, "log": log})
+    said = [
+        f"{moved.axis:5}  from {moved.lowest_rad:+.3f} to {moved.highest_rad:+.3f} rad, "
+        f"{moved.largest_error_rad:.4f} rad off at most, force up to {moved.largest_force_n:.2f} N"
+        for moved in axes
+    ]
+    data = {"config": settings.name, "duration_s": duration, "axes": axes, "log": log}
+    present(json, data, *said, f"Log: {log}")

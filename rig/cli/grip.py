@@ -1,13 +1,13 @@
 """`rig grip`: hold a grip torque by the estimate from motor current."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.options import ConfigOption, LiveModel, SimFlag, chosen_rig
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, present, results
 
 if TYPE_CHECKING:
     from rig.live.grip import Held
@@ -21,9 +21,7 @@ def grip(
     duration: Annotated[float, typer.Option(min=8, help="Duration, s.")] = 40.0,
     config: ConfigOption = None,
     sim: SimFlag = False,
-    model: Annotated[
-        Path | None, typer.Option(help="Model file of the estimate; by default the configured one.")
-    ] = None,
+    model: LiveModel = None,
     json: JsonFlag = False,
 ) -> int:
     """Control a grip torque by the estimate from motor current alone; the sensor is for comparison.
@@ -34,7 +32,6 @@ def grip(
     """
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
-    from rig.errors import UsageError
     from rig.live.estimator import ModelEstimator
     from rig.live.grip import SHARE, hold_grip
     from rig.protocols.trajectory import SAMPLE_RATE_HZ
@@ -52,8 +49,7 @@ def grip(
             held.append(period)
             screen.print(
                 f"{period.time_s:6.1f} s  estimate {period.estimate_n_m * 1e3:6.1f} mN m  "
-                f"sensor {period.sensor_n_m * 1e3:6.1f} mN m  load {period.load_a:.3f} A",
-                markup=False,
+                f"sensor {period.sensor_n_m * 1e3:6.1f} mN m  load {period.load_a:.3f} A"
             )
     return _judge(held, torque, estimator.usual_half_width, most_a, json)
 
@@ -64,38 +60,33 @@ def _judge(
     """Print whether a torque was held and the sensor agrees; return the exit code."""
     import numpy as np
 
-    screen = results(json)
     if not held:
-        screen.print("The estimate was never within what it was fitted on: no load was asked for.")
-        if json:
-            emit_json({"torque_n_m": torque, "is_reached": False, "periods": []})
+        text = "The estimate was never within what it was fitted on: no load was asked for."
+        present(json, {"torque_n_m": torque, "is_reached": False, "periods": []}, text)
         return 1
     late = held[len(held) // 2 :]
     estimate_n_m = float(np.mean([period.estimate_n_m for period in late]))
     sensor_n_m = float(np.mean([period.sensor_n_m for period in late]))
     has_load = late[-1].load_a < most_a
     is_reached = has_load and abs(estimate_n_m - torque) <= REACHED_RATIO * torque
-    if not has_load:
-        screen.print(f"The load is at its most, {most_a:g} A: the torque was not reached.")
-    elif not is_reached:
-        screen.print("The torque was not reached; give it a longer --duration.")
     agrees = allowed is None or abs(sensor_n_m - torque) <= allowed
     shown = "unknown" if allowed is None else f"{allowed * 1e3:.1f} mN m"
-    screen.print(
+    said = [
         f"Second half: estimate {estimate_n_m * 1e3:.1f} mN m, sensor {sensor_n_m * 1e3:.1f} mN m "
-        f"for {torque * 1e3:.1f} mN m asked; interval of the estimate {shown}.",
-        markup=False,
-    )
-    if json:
-        emit_json(
-            {
-                "torque_n_m": torque,
-                "estimate_n_m": estimate_n_m,
-                "sensor_n_m": sensor_n_m,
-                "half_width95_n_m": allowed,
-                "sensor_agrees": agrees,
-                "is_reached": is_reached,
-                "periods": held,
-            }
-        )
+        f"for {torque * 1e3:.1f} mN m asked; interval of the estimate {shown}."
+    ]
+    if not has_load:
+        said.insert(0, f"The load is at its most, {most_a:g} A: the torque was not reached.")
+    elif not is_reached:
+        said.insert(0, "The torque was not reached; give it a longer --duration.")
+    data = {
+        "torque_n_m": torque,
+        "estimate_n_m": estimate_n_m,
+        "sensor_n_m": sensor_n_m,
+        "half_width95_n_m": allowed,
+        "sensor_agrees": agrees,
+        "is_reached": is_reached,
+        "periods": held,
+    }
+    present(json, data, *said)
     return 0 if agrees and is_reached else 1

@@ -2,66 +2,30 @@
 
 from typing import Any
 
+import typer
 from typer.core import TyperGroup
-
-GROUPS = {
-    "Begin": (
-        "demo",
-        "config",
-        "machine",
-        "doctor",
-        "devices",
-        "selftest",
-        "commission",
-        "udev",
-        "firmware",
-    ),
-    "At the rig": (
-        "live",
-        "record",
-        "grip",
-        "stop",
-        "clear",
-        "reference",
-        "calibrate",
-        "cal",
-        "grasper",
-    ),
-    "Recordings": ("campaigns", "import", "log", "replay", "view"),
-    "Models": (
-        "fit",
-        "diagnose",
-        "model",
-        "diff",
-        "loop",
-        "effects",
-        "adapt",
-        "estimator",
-        "export",
-    ),
-    "Papers": ("study",),
-}
-"""Headings of the top list and the commands under each; others stand under `Commands`."""
 
 
 class GroupedHelp(TyperGroup):
-    """A group of commands whose help shows them under headings, with whole sentences."""
+    """A group of commands whose help shows them under their headings, with whole sentences."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the commands of each heading, then those of none."""
+        """Write the commands of each heading, `Commands` for those of none."""
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
-        rows = {
-            name: (name, command.get_short_help_str(limit=1000))
-            for name, command in commands.items()
-            if command is not None and not command.hidden
-        }
-        grouped = {name for names in GROUPS.values() for name in names}
-        is_top = ctx.parent is None
-        rest = tuple(name for name in rows if not is_top or name not in grouped)
-        headings = {**(GROUPS if is_top else {}), "Commands": rest}
-        width = max((len(name) for name in rows), default=0)
-        for heading, names in headings.items():
-            shown = [rows[name] for name in names if name in rows]
-            if shown:
-                with formatter.section(heading):
-                    formatter.write_dl([(name.ljust(width), text) for name, text in shown])
+        width = max(map(len, commands), default=0)
+        headings: dict[str, list[tuple[str, str]]] = {}
+        for name, command in commands.items():
+            if command is not None and not command.hidden:
+                row = (name.ljust(width), command.get_short_help_str(limit=1000))
+                heading = getattr(command, "rich_help_panel", None)
+                known = heading if isinstance(heading, str) else "Commands"
+                headings.setdefault(known, []).append(row)
+        for heading, rows in headings.items():
+            with formatter.section(heading):
+                formatter.write_dl(rows)
+
+
+def group(name: str, help_: str, **options: Any) -> typer.Typer:
+    """Return a group of commands; without one of them it shows its help."""
+    options = {"no_args_is_help": True} | options
+    return typer.Typer(name=name, help=help_, cls=GroupedHelp, rich_markup_mode=None, **options)

@@ -5,8 +5,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.shipped import complete_machine, machine_names
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from estimation.files import write_text_atomic
+from rig.cli.options import complete_machine, machine_names
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, present, remarks
+from rig.output.table import TextTable, listed
 
 if TYPE_CHECKING:
     from estimation.recording import Recording
@@ -72,7 +75,6 @@ def import_(
     The mapping is `[data]` of a machine file or options of this command, which come first. Nothing
     is guessed: a column without a unit is in the SI unit that the channel's name ends in.
     """
-    from rig.errors import UsageError
     from rig.importers.table.mapping import read_mapping
     from rig.importers.table.open import read_runs
     from rig.importers.table.preview import preview as look
@@ -96,22 +98,20 @@ def import_(
     written = [] if preview or out is None else write_logs(recordings, out)
     if plots is not None:
         _draw(recordings, plots)
-    if json:
-        emit_json({"preview": found, "written": written, "plots": plots})
-    _show(found, recordings, mapping, json)
-    screen = results(json)
-    if plots is not None:
-        screen.print(f"Plots: {plots}")
-    if written:
-        screen.print(f"wrote {len(written)} recordings to {out}")
+    lines = [f"Note: {line}." for line in found.remarks]
+    lines += [] if found.questions else ["Nothing looks wrong."]
+    lines += [] if plots is None else [f"Plots: {plots}"]
+    lines += [f"wrote {len(written)} recordings to {out}"] if written else []
+    for line in found.questions:
+        remarks().print(f"Check: {line}")
+    data = {"preview": found, "written": written, "plots": plots}
+    present(json, data, *_tables(found, mapping), *lines)
 
 
 def _flags(
     columns: list[str], conditions: list[str], runs: list[str], others: list[str]
 ) -> list[tuple[tuple[str, ...], Any, str]]:
     """Return the options as entries of a mapping, each with the words that state it."""
-    from rig.errors import UsageError
-
     found: list[tuple[tuple[str, ...], Any, str]] = []
     for option, part, words in (
         ("--column", "columns", columns),
@@ -144,7 +144,6 @@ def _rule(name: str, value: str) -> Any:
 
 def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
     """Write the runs as logs, all or none."""
-    from rig.errors import UsageError
     from rig.importers.derivatives import checked
     from rig.log.convert import write_recording
 
@@ -163,16 +162,12 @@ def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
 def _draw(recordings: "list[Recording]", plots: Path) -> None:
     from estimation.campaign import Campaign
     from rig.output.provenance import Provenance
-    from rig.output.render import write_report
     from rig.reports.recordings import page
 
-    write_report(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
+    write_text_atomic(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
 
 
-def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", json: bool) -> None:
-    from rig.output.table import TextTable, listed, to_rich
-
-    screen = results(json)
+def _tables(found: "Preview", mapping: "Mapping") -> "list[TextTable]":
     runs = [
         (
             run.name,
@@ -185,23 +180,17 @@ def _show(found: "Preview", recordings: "list[Recording]", mapping: "Mapping", j
         for run in found.runs[:MOST_RUNS]
     ]
     note = f"{len(found.runs)} runs in all" if len(found.runs) > MOST_RUNS else ""
-    heads: tuple[str, ...] = ("run", "samples", "s", "Hz", "flagged", "conditions")
-    screen.print(to_rich(TextTable("Runs", heads, runs, note)))
     channels = [
         (c.name, _source(mapping, c.name), *(f"{v:.5g}" for v in (c.least, c.greatest, c.mean)))
         for c in found.channels
     ]
-    heads = ("channel", "from", "least", "greatest", "mean")
-    screen.print(to_rich(TextTable("Channels, SI units", heads, channels)))
     cells = [[name, *(f"{v:.6g}" for v in row)] for name, row in found.first.items()]
-    heads = ("channel", *(str(k + 1) for k in range(len(found.first["time_s"]))))
-    screen.print(to_rich(TextTable(f"First samples of {recordings[0].name}", heads, cells)))
-    for line in found.remarks:
-        screen.print(f"Note: {line}.")
-    for line in found.questions:
-        remarks().print(f"Check: {line}")
-    if not found.questions:
-        screen.print("Nothing looks wrong.")
+    numbers = map(str, range(1, len(found.first["time_s"]) + 1))
+    return [
+        TextTable("Runs", ("run", "samples", "s", "Hz", "flagged", "conditions"), runs, note),
+        TextTable("Channels, SI units", ("channel", "from", "least", "greatest", "mean"), channels),
+        TextTable(f"First samples of {found.runs[0].name}", ("channel", *numbers), cells),
+    ]
 
 
 def _source(mapping: "Mapping", name: str) -> str:

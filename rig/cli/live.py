@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import PlainFlag
-from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
+from rig.cli.options import ConfigOption, LiveModel, PlainFlag, SimFlag, chosen_rig
+from rig.errors import UsageError
 from rig.output.console import JsonFlag, remarks, results
 
 if TYPE_CHECKING:
@@ -16,9 +16,7 @@ if TYPE_CHECKING:
 def live(
     config: ConfigOption = None,
     sim: SimFlag = False,
-    model: Annotated[
-        Path | None, typer.Option(help="Model file of the estimate; by default the configured one.")
-    ] = None,
+    model: LiveModel = None,
     protocol: Annotated[
         str | None,
         typer.Option(
@@ -62,17 +60,17 @@ def live(
     object per line. In a terminal, keys: t tares a rig at rest, r starts and stops a recording, m
     marks it, s stops the rig, c shows the next channel, ? explains the keys, q quits.
     """
+    from contextlib import ExitStack, closing
+
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
-    from rig.errors import UsageError
-    from rig.live.estimator import HalfWidths, estimators_of, shown_channels
-    from rig.live.joint_forces import with_joint_forces
+    from rig.live.block import Sink, through
+    from rig.live.estimator import estimators_of, half_widths, shown_channels
     from rig.live.keys import OF_SESSION, display_keys, no_keys
     from rig.live.options import ShowOptions
-    from rig.live.run import show
     from rig.live.session_blocks import session_blocks
-    from rig.live.until import until
-    from rig.live.watching import with_status
+    from rig.live.show import show
+    from rig.live.status import model_steps
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
 
@@ -87,35 +85,39 @@ def live(
     plans = load_protocol(protocol).any_plans() if protocol else []
     model_path = model or settings.model_path
     estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
-    page = _page(host, web_port) if web else None
-    with display_keys() as keys:
+    options = ShowOptions(
+        title=f"rig live: {settings.name}",
+        channels=shown_channels(estimators, machine.shown),
+        lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
+        plain=plain,
+        json=json_,
+        half_widths=lambda: half_widths(estimators),
+    )
+    sinks: list[Sink] = []
+    with display_keys() as keys, ExitStack() as stack:
+        shown = options.with_keys(keys, OF_SESSION)
+        pressed = [keys or no_keys]
+        if foxglove:
+            from rig.live.foxglove import LAYOUT, FoxgloveServer
+
+            sinks.append(stack.enter_context(closing(FoxgloveServer(foxglove_port))).send)
+            remarks().print(f"Foxglove: ws://localhost:{foxglove_port}, layout {LAYOUT}")
+        if web:
+            from rig.live.web import WebView
+
+            page = stack.enter_context(closing(_page(host, web_port)))
+            sinks.append(WebView(page, shown).show)
+            pressed.append(page.pressed)
         blocks = session_blocks(
             settings,
             lambda: open_logger(settings, pace=pace or None),
             plans,
             estimators,
-            lambda: (keys or no_keys)() + (page.pressed() if page else ""),
+            lambda: "".join(read() for read in pressed),
             out,
         )
-        blocks = with_status(with_joint_forces(blocks), estimators)
-        if foxglove:
-            from rig.live.foxglove import LAYOUT, published
-
-            blocks = published(blocks, foxglove_port)
-            remarks().print(f"Foxglove: ws://localhost:{foxglove_port}, layout {LAYOUT}")
-        options = ShowOptions(
-            title=f"rig live: {settings.name}",
-            channels=shown_channels(estimators, machine.shown),
-            lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
-            plain=plain,
-            json=json_,
-            half_widths=HalfWidths(estimators),
-        ).with_keys(keys, OF_SESSION)
-        if page:
-            from rig.live.web import shown_on
-
-            blocks = shown_on(page, blocks, options)
-        summary = show(until(blocks, duration), options, results(json_))
+        blocks = through(blocks, model_steps(estimators), sinks, duration)
+        summary = show(blocks, shown, results(json_))
     return summary.exit_code
 
 
@@ -124,7 +126,7 @@ def _page(host: str | None, port: int) -> "PageServer":
     from rig.live.web import HOST, open_page
 
     page = open_page(host or HOST, port)
-    remarks().print(f"Page: {page.url}", soft_wrap=True)
+    remarks().print(f"Page: {page.url}")
     if host:
         remarks().print(
             "Whoever has this address can stop the rig, tare and record. It is not encrypted."

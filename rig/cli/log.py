@@ -1,26 +1,25 @@
 """`rig log`: what is in a log, is it whole, repair it, export it."""
 
+from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.help import GroupedHelp
+from rig.cli.help import group
 from rig.cli.log_export import export
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.cli.options import say_left_out
+from rig.errors import ExitCode, UsageError
+from rig.output.console import JsonFlag, present, remarks
+from rig.output.table import counted, listed
 
 if TYPE_CHECKING:
     from rig.log.check import LogReport
     from rig.log.reader import LogFile
     from rig.log.repair import RepairReport
 
-log_app = typer.Typer(
-    name="log",
-    help="Inspect, check, repair and export logs.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+log_app = group("log", "Inspect, check, repair and export logs.")
 
 LogOrFolder = Annotated[Path, typer.Argument(help="A log, or a folder of logs.")]
 AnyRecording = Annotated[
@@ -35,29 +34,21 @@ def info(path: AnyRecording, json: JsonFlag = False) -> None:
 
     Of recordings of another format: a line for each run.
     """
-    from rig.cli.log_runs import is_of_another_format, show_runs
     from rig.log.check import logs_in
     from rig.log.reader import read_log
 
-    if is_of_another_format(path) or (path.is_dir() and not logs_in(path)):
-        show_runs(path, json)
+    if _is_of_another_format(path) or (path.is_dir() and not logs_in(path)):
+        _show_runs(path, json)
         return
     heads, foreign = _heads(path)
     found = [_described(read_log(head.path, tolerant=True)) for head in heads]
     for said in foreign:
         remarks().print(said)
-    if json:
-        emit_json({"logs": found})
-        return
-    if len(found) > 1:
-        lossy = [log for log in found if log["problems"]]
-        results(json).print(
-            f"{len(found)} logs, {len(lossy)} of them not complete."
-            if lossy
-            else f"{len(found)} logs, nothing lost."
-        )
-    for log in found:
-        _show_info(log)
+    lossy = sum(bool(log["problems"]) for log in found)
+    state = f"{lossy} of them not complete" if lossy else "nothing lost"
+    total = [f"{len(found)} logs, {state}."] if len(found) > 1 else []
+    shown = (one for log in found for one in _info_of(log))
+    present(json, {"logs": found}, *total, *shown)
 
 
 @log_app.command()
@@ -68,7 +59,6 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     recorded again, and logs that were repaired, are listed and not counted. Exit code 0 if
     complete, 1 if samples or runs are missing, 5 if a file is damaged.
     """
-    from rig.errors import ExitCode
     from rig.log.attempts import standing
     from rig.log.check import check_log
 
@@ -80,21 +70,13 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     code = max((report.verdict.exit_code for report in reports), default=ExitCode.OK)
     code = max(code, ExitCode.FAILED if missing else ExitCode.OK)
     code = max(code, ExitCode.DATA if foreign else ExitCode.OK)
-    if json:
-        found = {"logs": reports, "superseded": superseded, "missing_runs": missing}
-        found["no_logs"] = foreign
-        emit_json(found | {"exit_code": int(code)})
-        return int(code)
-    for report in reports:
-        _show_report(report)
-    screen = results(json=False)
-    for said in foreign:
-        screen.print(f"no log      {said}")
-    for item in superseded:
-        screen.print(f"superseded  {item}: not counted")
-    for name in missing:
-        screen.print(f"missing     {name}. Record it: rig record --resume {path}")
-    screen.print(_summed_up(reports, len(superseded), len(missing)))
+    said = [line for report in reports for line in _report_lines(report)]
+    said += [f"no log      {words}" for words in foreign]
+    said += [f"superseded  {item}: not counted" for item in superseded]
+    said += [f"missing     {name}. Record it: rig record --resume {path}" for name in missing]
+    said.append(_summed_up(reports, len(superseded), len(missing)))
+    found = {"logs": reports, "superseded": superseded, "missing_runs": missing}
+    present(json, {**found, "no_logs": foreign, "exit_code": int(code)}, *said)
     return int(code)
 
 
@@ -149,10 +131,7 @@ def repair(
     from rig.log.repair import repair_log
 
     report = repair_log(path, out)
-    if json:
-        emit_json(report)
-    else:
-        _show_repair(report)
+    present(json, report, *_repair_lines(report))
 
 
 log_app.command()(export)
@@ -160,7 +139,6 @@ log_app.command()(export)
 
 def _logs(path: Path) -> list[Path]:
     """Return the logs at a path, at least one."""
-    from rig.errors import UsageError
     from rig.log.check import logs_in
 
     found = logs_in(path)
@@ -207,72 +185,106 @@ def _described(log: "LogFile") -> dict[str, Any]:
     }
 
 
-def _show_info(log: dict[str, Any]) -> None:
-    from rich.table import Table
-
-    from rig.output.table import listed
-
-    screen = results(json=False)
+def _info_of(log: dict[str, Any]) -> Iterator[str]:
+    """Yield the result of `info` for a log, for people."""
     run, end = log["run"], log["end"]
-    screen.print(f"{log['path']}: {'; '.join(log['problems']) or 'complete, nothing lost'}")
-    screen.print(f"  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}")
+    yield f"{log['path']}: {'; '.join(log['problems']) or 'complete, nothing lost'}"
+    yield f"  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}"
     if run is not None:
-        conditions = listed(run.conditions) or "-"
-        screen.print(f"  run {run.name} of {run.rig or 'an unnamed rig'}: {conditions}")
-        screen.print(f"  started {_date(run.started_at_ns)}; notes: {run.notes or '-'}")
+        yield f"  run {run.name} of {run.rig or 'an unnamed rig'}: {listed(run.conditions) or '-'}"
+        yield f"  started {_date(run.started_at_ns)}; notes: {run.notes or '-'}"
         excluded = log["excluded"]
-        screen.print(f"  excluded: {excluded}" if excluded else "  counts as evidence")
+        yield f"  excluded: {excluded}" if excluded else "  counts as evidence"
     state = "not closed" if end is None else "clean" if end.clean else f"not clean: {end.reason}"
-    screen.print(f"  end {state}{'; the file is damaged' if log['damaged'] else ''}")
-    table = Table(box=None, pad_edge=True)
-    for heading in ("topic", "messages", "s", "Hz", "fields"):
-        table.add_column(heading, justify="left" if heading in ("topic", "fields") else "right")
+    yield f"  end {state}{'; the file is damaged' if log['damaged'] else ''}"
     for topic in log["topics"]:
-        rate = f"{topic['rate_hz']:.2f}" if topic["rate_hz"] else "-"
-        fields = ", ".join(topic["fields"])
-        messages, duration = str(topic["messages"]), f"{topic['duration_s']:.3f}"
-        table.add_row(topic["topic"], messages, duration, rate, fields)
-    screen.print(table)
+        rate = f", {topic['rate_hz']:.2f} Hz" if topic["rate_hz"] else ""
+        length = f"{topic['messages']} messages in {topic['duration_s']:.3f} s{rate}"
+        yield f"  {topic['topic']}: {length}: {', '.join(topic['fields'])}"
     for mark in log["marks"]:
-        screen.print(f"  mark at {mark.time_s:.3f} s: {mark.text}")
+        yield f"  mark at {mark.time_s:.3f} s: {mark.text}"
     for name, size in log["attachments"].items():
-        screen.print(f"  attached {name}, {size} bytes")
+        yield f"  attached {name}, {size} bytes"
+
+
+def _is_of_another_format(path: Path) -> bool:
+    """Whether an importer other than that of the project's logs recognises a path."""
+    from rig.importers.registry import importers
+
+    known = importers()
+    return (
+        path.exists()
+        and not known.pop("log").recognises(path)
+        and any(one.recognises(path) for one in known.values())
+    )
+
+
+def _show_runs(path: Path, json: bool) -> None:
+    """Show each run's conditions, length, rate, flags and exclusion, and the channels."""
+    from rig.importers.registry import open_campaign
+
+    campaign = open_campaign(path)
+    say_left_out(path, campaign)
+    runs: list[dict[str, Any]] = []
+    channels: dict[str, None] = {}
+    for recording in campaign:
+        channels |= dict.fromkeys(recording.columns)
+        runs.append(_described_run(recording))
+    said = [f"{counted(len(runs), 'run')}. Channels: {', '.join(channels)}."]
+    width = max((len(run["name"]) for run in runs), default=0)
+    for run in runs:
+        flagged = f"; flagged samples: {run['flagged']}" if run["flagged"] else ""
+        excluded = f"; does not count: {run['excluded']}" if run["excluded"] else ""
+        said.append(
+            f"{run['name']:{width}}  {run['duration_s']:.3f} s, {run['rate_hz']:.4g} Hz"
+            f"  {listed(run['conditions'])}{flagged}{excluded}"
+        )
+    present(json, {"runs": runs, "channels": list(channels)}, *said)
+
+
+def _described_run(recording: Any) -> dict[str, Any]:
+    return {
+        "name": recording.name,
+        "samples": len(recording),
+        "duration_s": float(recording.time_s[-1] - recording.time_s[0]),
+        "rate_hz": recording.sample_rate_hz,
+        "conditions": dict(recording.conditions),
+        "instrument": recording.instrument,
+        "flagged": int((recording.flags != 0).sum()),
+        "excluded": recording.excluded,
+        "notes": recording.notes,
+    }
 
 
 def _date(started_at_ns: int | None) -> str:
-    from datetime import UTC, datetime
-
     if started_at_ns is None:
         return "at an unknown time"
     return datetime.fromtimestamp(started_at_ns * 1e-9, UTC).isoformat(timespec="seconds")
 
 
-def _show_report(report: "LogReport") -> None:
-    screen = results(json=False)
-    screen.print(f"{report.verdict.value:10}  {report.path}")
+def _report_lines(report: "LogReport") -> Iterator[str]:
+    yield f"{report.verdict.value:10}  {report.path}"
     for topic in report.topics:
-        screen.print(f"  {topic.topic}: {topic.received} of {topic.expected} samples")
+        yield f"  {topic.topic}: {topic.received} of {topic.expected} samples"
         for gap in topic.gaps:
-            screen.print(
+            yield (
                 f"    gap at {gap.start_s:.4f} s, {gap.length_s * 1e3:.1f} ms: {gap.samples}"
                 f" samples, {gap.first_sequence} to {gap.last_sequence}"
             )
     for problem in report.problems:
-        screen.print(f"  {problem}")
+        yield f"  {problem}"
     for damage in report.damage:
-        screen.print(f"    byte {damage.offset}, {damage.length} bytes: {damage.what}")
+        yield f"    byte {damage.offset}, {damage.length} bytes: {damage.what}"
 
 
-def _show_repair(report: "RepairReport") -> None:
-    screen = results(json=False)
+def _repair_lines(report: "RepairReport") -> Iterator[str]:
     if report.repaired is None:
-        screen.print(f"{report.original} is not damaged; nothing was written.")
+        yield f"{report.original} is not damaged; nothing was written."
         return
-    screen.print(f"wrote {report.repaired}, and read it back equal")
+    yield f"wrote {report.repaired}, and read it back equal"
     for topic, count in report.recovered.items():
         unproven = report.salvaged.get(topic, 0)
         note = f", {unproven} of them from the torn end, without a checksum" if unproven else ""
-        screen.print(
-            f"  {topic}: {count} samples recovered{note}; {report.lost.get(topic, 0)} known lost"
-        )
-    screen.print(f"{report.original} is unchanged.")
+        lost = report.lost.get(topic, 0)
+        yield f"  {topic}: {count} samples recovered{note}; {lost} known lost"
+    yield f"{report.original} is unchanged."

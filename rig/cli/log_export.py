@@ -1,15 +1,20 @@
 """`rig log export`: a log, or a campaign as one table, in other formats."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from rig.cli.options import say_left_out
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, present, remarks
+from rig.output.table import counted
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
     from estimation.campaign import Campaign
+    from rig.log.export import ExportFormat
 
 
 def export(
@@ -51,7 +56,6 @@ def export(
     the estimate next to the sensor are written into a folder, for Foxglove and PlotJuggler.
     """
     from rig.cli.import_ import write_logs
-    from rig.errors import UsageError
     from rig.log.export import ExportFormat, export_log
 
     if model or path.is_dir() or not path.name.endswith((".mcap", ".part")):
@@ -64,26 +68,16 @@ def export(
             return
         _export_campaign(path, campaign, format_name, out, force, json)
         return
-    known = [item.value for item in ExportFormat]
-    if format_name not in known:
-        raise UsageError(
-            f"The format {format_name!r} is not known.", fix=f"Choose one of {', '.join(known)}."
-        )
+    known = _known(format_name, "A log", ExportFormat)
     applied = _other_calibrations(path, calibration, record or [], store)
-    written = export_log(
-        path, ExportFormat(format_name), out, topic, force=force, calibrations=applied
-    )
-    if json:
-        names = None if applied is None else {applied.name: applied.content_hash}
-        emit_json({"written": written, "calibrations": names})
-    else:
-        for target in written:
-            results(json).print(f"wrote {target}")
+    written = export_log(path, known, out, topic, force=force, calibrations=applied)
+    names = None if applied is None else {applied.name: applied.content_hash}
+    data = {"written": written, "calibrations": names}
+    present(json, data, *(f"wrote {target}" for target in written))
 
 
 def _campaign(path: Path, model: Path | None) -> "Campaign":
     """Return the runs at a path that count, with the estimate of a model."""
-    from rig.cli.left_out import say_left_out
     from rig.cli.view import with_model
     from rig.importers.registry import open_campaign
 
@@ -93,33 +87,37 @@ def _campaign(path: Path, model: Path | None) -> "Campaign":
 
 
 def _said(written: list[Path], campaign: "Campaign", json: bool) -> None:
-    from rig.output.table import counted
-
-    if json:
-        emit_json({"written": written, "runs": campaign.names})
-    else:
-        where = written[0] if len(written) == 1 else written[0].parent
-        results(json).print(f"wrote {where}: {counted(len(campaign), 'run')}")
+    where = written[0] if len(written) == 1 else written[0].parent
+    data = {"written": written, "runs": campaign.names}
+    present(json, data, f"wrote {where}: {counted(len(campaign), 'run')}")
 
 
 def _export_campaign(
     path: Path, campaign: "Campaign", format_name: str, out: Path | None, force: bool, json: bool
 ) -> None:
     """Write all runs as one table."""
-    from rig.errors import UsageError
     from rig.importers.tidy import write_tidy
     from rig.log.export import ExportFormat
 
-    known = [ExportFormat.CSV.value, ExportFormat.PARQUET.value]
-    if format_name not in known:
-        raise UsageError(
-            f"A campaign is not exported as {format_name!r}.",
-            fix=f"Choose one of {', '.join(known)}.",
-        )
-    if out is not None and out.is_dir():
-        out = out / f"{path.resolve().name}.{format_name}"
-    target = out or path.resolve().with_name(f"{path.resolve().name}.{format_name}")
-    _said([write_tidy(campaign, target, ExportFormat(format_name), force)], campaign, json)
+    known = _known(format_name, "A campaign", (ExportFormat.CSV, ExportFormat.PARQUET))
+    name = f"{path.resolve().name}.{format_name}"
+    target = out or path.resolve().with_name(name)
+    if target.is_dir():
+        target /= name
+    _said([write_tidy(campaign, target, known, force)], campaign, json)
+
+
+def _known(name: str, what: str, formats: "Iterable[ExportFormat]") -> "ExportFormat":
+    """Return the format of a name.
+
+    Raises:
+        UsageError: There is none.
+    """
+    known = {one.value: one for one in formats}
+    if name not in known:
+        fix = f"Choose one of {', '.join(known)}."
+        raise UsageError(f"{what} is not exported as {name!r}.", fix=fix)
+    return known[name]
 
 
 def _other_calibrations(
@@ -152,5 +150,5 @@ def _other_calibrations(
         rows = log.topics[COUNTS].rows
         verdicts = [v for r in found for v in judge_range(r, rows[r.input])]
         for verdict in refuse_errors(verdicts):
-            remarks().print(f"{verdict.channel}: {verdict.message}", markup=False)
+            remarks().print(f"{verdict.channel}: {verdict.message}")
     return made

@@ -10,11 +10,12 @@ from rig.cli.options import (
     EquationOption,
     QuickFlag,
     SchedulerOption,
+    SimFlag,
     SimulationSeed,
     WorkersOption,
 )
-from rig.cli.rig_options import SimFlag
-from rig.output.console import JsonFlag, emit_json, progress, remarks, results
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, present, progress, remarks, results
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,7 +52,6 @@ def loop(
     from rig.diagnosis.loop import Budget, Round, run_loop
     from rig.diagnosis.subject import declared_models
     from rig.diagnosis.work import engine
-    from rig.errors import UsageError
     from rig.protocols.protocol import load_protocol
     from rig.simulation.hidden import chosen
 
@@ -64,7 +64,7 @@ def loop(
         simulation={"seed": number, "hidden": hidden, "plant": "declared"}
     )
     folder = out or Path("logs") / f"loop-{now:%Y-%m-%d-%H%M%S}"
-    remarks().print(f"rig loop, seed {number}: everything goes to {folder}", markup=False)
+    remarks().print(f"rig loop, seed {number}: everything goes to {folder}")
     made: list[Round] = []
     with engine(workers, scheduler) as executor, progress() as bar:
         task = bar.add_task("samples", total=None)
@@ -81,7 +81,7 @@ def loop(
             seed=number,
             executor=executor,
             quick=quick,
-            on_stage=lambda text: bar.console.print(f"- {text}", markup=False),
+            on_stage=lambda text: bar.console.print(f"- {text}"),
             on_progress=count,
         ):
             made.append(one)
@@ -89,23 +89,17 @@ def loop(
             _report(one, folder, number, screen)
             bar.start()
     drawn = ", ".join(f"{name} ({strength:g})" for name, strength in hidden.items())
-    screen.print(f"Hidden effects: {drawn or 'none'}.", markup=False)
-    if json:
-        last = {"stopped": made[-1].stopped, "rounds": [one.to_json() for one in made]}
-        emit_json({"folder": folder, "hidden": hidden, **last})
+    last = {"stopped": made[-1].stopped, "rounds": [one.to_json() for one in made]}
+    data = {"folder": folder, "hidden": hidden, **last}
+    present(json, data, f"Hidden effects: {drawn or 'none'}.")
 
 
 def _report(one: "Round", folder: Path, seed: int, screen: "Console") -> None:
     """Print the sentences of a round, and write its page."""
-    from rig.diagnosis.traces import traces
-    from rig.output.provenance import Provenance
-    from rig.output.render import write_report
-    from rig.reports.diagnosis import page
+    from rig.reports.diagnosis import write
     from rig.reports.diagnosis_words import next_sentence, sentences
 
     found = one.done.diagnosis
-    text = page(found, traces(one.done), Provenance.now(seed))
-    where = write_report(folder / f"round-{one.number}" / "diagnosis.html", text)
-    last = one.stopped or next_sentence(found)
-    for line in (*sentences(found), f"Report: {where}", last):
-        screen.print(line, markup=False)
+    written = write(one.done, seed, folder / f"round-{one.number}" / "diagnosis.html")
+    for line in (*sentences(found), *written, one.stopped or next_sentence(found)):
+        screen.print(line)

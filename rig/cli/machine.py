@@ -1,22 +1,21 @@
 """`rig machine`: what a machine is, in one file, and what can be identified of it."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.new_file import require_new
-from rig.cli.options import FormatOption
-from rig.cli.shipped import complete_machine, machine_names
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.help import group
+from rig.cli.options import FormatOption, complete_machine, machine_names, require_new
+from rig.errors import ExitCode
+from rig.output.console import JsonFlag, present
 
 if TYPE_CHECKING:
     from estimation.plant import Plant
     from estimation.plant_check import CheckedEquation, CheckedPlant
 
-machine_app = typer.Typer(
-    help="Describe a machine of one's own in a file, and check what can be identified of it.",
-    no_args_is_help=True,
+machine_app = group(
+    "machine", "Describe a machine of one's own in a file, and check what can be identified of it."
 )
 
 FileArgument = Annotated[
@@ -39,12 +38,9 @@ def show(file: FileArgument, json_: JsonFlag = False) -> None:
 
     plant = read_machine(file)
     models = declared(plant)
-    screen = results(json_)
-    screen.print(to_toml(plant))
-    for model in models:
-        screen.print(f"{model.balance}: {model.description}")
-    if json_:
-        emit_json({"machine": plant, "signals": signals(plant), "equations": models})
+    data = {"machine": plant, "signals": signals(plant), "equations": models}
+    lines = (f"{model.balance}: {model.description}" for model in models)
+    present(json_, data, to_toml(plant), *lines)
 
 
 @machine_app.command()
@@ -60,18 +56,14 @@ def check(
     contradict the file, or where nothing can be identified.
     """
     from estimation.plant_check import check as check_plant
-    from rig.errors import ExitCode
     from rig.machines.recordings import open_recordings
     from rig.machines.shipped import read_machine
 
     plant = read_machine(file)
     campaign = None if data is None else open_recordings(data, file, format_)
     found = check_plant(plant, campaign, file)
-    screen = results(json_)
-    for line in check_lines(plant, found):
-        screen.print(line)
-    if json_:
-        emit_json({"machine": plant.name, "check": found, "sound": found.is_sound})
+    result = {"machine": plant.name, "check": found, "sound": found.is_sound}
+    present(json_, result, *check_lines(plant, found))
     return ExitCode.OK if found.is_sound else ExitCode.FAILED
 
 
@@ -141,16 +133,11 @@ def new(
     Without a terminal nothing is asked: what is not stated is not in the file.
     """
     from estimation.plant_file import write
-    from rig.cli.machine_new import Answers, asked, data_text, plant_of
+    from rig.cli.machine_new import asked, data_text, plant_of
 
     require_new(out)
-    answers = Answers(axis or [], transmission or [], actuator or [], sensor or [])
-    if answers.is_empty:
-        answers = asked()
-    plant = plant_of(name or out.stem, answers)
+    words = {"axis": axis, "transmission": transmission, "actuator": actuator, "sensor": sensor}
+    stated = {kind: given or [] for kind, given in words.items()}
+    plant = plant_of(name or out.stem, stated if any(stated.values()) else asked())
     write(plant, out, data_text(from_, plant) if from_ else "")
-    screen = results(json_)
-    screen.print(f"Machine: {out}. Next: rig machine check {out} DATA")
-    told: dict[str, Any] = {"machine": out}
-    if json_:
-        emit_json(told)
+    present(json_, {"machine": out}, f"Machine: {out}. Next: rig machine check {out} DATA")

@@ -1,8 +1,7 @@
 """A machine file from a few words, typed as options or answered on a terminal."""
 
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import typer
@@ -12,31 +11,28 @@ from estimation.plant import Actuator, Axis, Plant, PlantError, Reads, Sensor, T
 from estimation.toml_table import value_text
 from rig.errors import UsageError
 
+PARTS = {
+    "axis": ("NAME:rad or NAME:m", ""),
+    "transmission": ("INPUT:OUTPUT:RATIO", ""),
+    "actuator": ("AXIS:CHANNEL", ", such as motor:motor_current_a"),
+    "sensor": ("AXIS:CHANNEL", ", such as motor:motor_angle_rad"),
+}
+"""Kind of a part of a machine to the form of the words that state one, and an example."""
 
-@dataclass(frozen=True)
-class Answers:
-    """A machine in words, parts separated by colons.
-
-    Attributes:
-        axes: NAME:UNIT.
-        transmissions: INPUT:OUTPUT or INPUT:OUTPUT:RATIO.
-        actuators: AXIS:CHANNEL.
-        sensors: AXIS:CHANNEL.
-    """
-
-    axes: Sequence[str]
-    transmissions: Sequence[str]
-    actuators: Sequence[str]
-    sensors: Sequence[str]
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether nothing was stated."""
-        return not (self.axes or self.transmissions or self.actuators or self.sensors)
+READS: Mapping[str, Reads] = {
+    "rad": "position",
+    "m": "position",
+    "rad/s": "speed",
+    "m/s": "speed",
+    "N m": "effort",
+    "N": "effort",
+    "K": "temperature",
+}
+"""Unit of a channel to the quantity that its sensor reads."""
 
 
-def asked() -> Answers:
-    """Ask for a machine on a terminal.
+def asked() -> dict[str, list[str]]:
+    """Ask for the parts of a machine on a terminal.
 
     Raises:
         UsageError: Standard input is not a terminal.
@@ -47,52 +43,45 @@ def asked() -> Answers:
             "There is no terminal to ask on.",
             "Give --axis NAME:rad, --actuator AXIS:CHANNEL and --sensor AXIS:CHANNEL.",
         )
-    axes = _each("Axis, NAME:rad or NAME:m (empty: no more)")
-    transmissions = _each("Transmission, INPUT:OUTPUT:RATIO (empty: no more)") if axes[1:] else []
-    return Answers(
-        axes,
-        transmissions,
-        _each("Actuator, AXIS:CHANNEL, such as motor:motor_current_a (empty: no more)"),
-        _each("Sensor, AXIS:CHANNEL, such as motor:motor_angle_rad (empty: no more)"),
-    )
-
-
-def _each(question: str) -> list[str]:
-    found = []
-    while answer := typer.prompt(question, default="", show_default=False, err=True).strip():
-        found.append(answer)
+    found: dict[str, list[str]] = {kind: [] for kind in PARTS}
+    for kind, (form, example) in PARTS.items():
+        if kind == "transmission" and len(found["axis"]) < 2:
+            continue
+        question = f"{kind.capitalize()}, {form}{example} (empty: no more)"
+        while word := typer.prompt(question, default="", show_default=False, err=True).strip():
+            found[kind].append(word)
     return found
 
 
-def plant_of(name: str, answers: Answers) -> Plant:
+def plant_of(name: str, words: Mapping[str, Sequence[str]]) -> Plant:
     """Return the machine that is stated.
+
+    Args:
+        name: Its name.
+        words: Kind of part to the words of each, parts of a word separated by colons.
 
     Raises:
         UsageError: A word is not of its form, or the parts do not fit together.
     """
-    axes = [_parts(word, "--axis", "NAME:rad or NAME:m", (2,)) for word in answers.axes]
-    joints = [
-        _parts(word, "--transmission", "INPUT:OUTPUT:RATIO", (2, 3))
-        for word in answers.transmissions
-    ]
-    actuators = [_parts(word, "--actuator", "AXIS:CHANNEL", (2,)) for word in answers.actuators]
-    sensors = [_parts(word, "--sensor", "AXIS:CHANNEL", (2,)) for word in answers.sensors]
+    parts = {kind: [_parts(kind, word) for word in words[kind]] for kind in PARTS}
     try:
         return Plant(
             name=name,
-            axes=tuple(Axis(axis, unit) for axis, unit in axes),
-            transmissions=tuple(_transmission(parts) for parts in joints),
-            actuators=tuple(Actuator(channel, axis) for axis, channel in actuators),
-            sensors=tuple(Sensor(c, axis, reads_of(c)) for axis, c in sensors),
+            axes=tuple(Axis(axis, unit) for axis, unit in parts["axis"]),
+            transmissions=tuple(_transmission(one) for one in parts["transmission"]),
+            actuators=tuple(Actuator(channel, axis) for axis, channel in parts["actuator"]),
+            sensors=tuple(Sensor(c, axis, reads_of(c)) for axis, c in parts["sensor"]),
         )
     except PlantError as error:
         raise UsageError(error.what, error.why, error.fix) from error
 
 
-def _parts(word: str, option: str, form: str, counts: tuple[int, ...]) -> list[str]:
-    parts = word.split(":")
-    if len(parts) not in counts or not all(parts[:2]):
-        raise UsageError(f"{option} {word!r} is not {form}.", fix=f"Write {option} {form}.")
+def _parts(kind: str, word: str) -> list[str]:
+    parts, (form, _) = word.split(":"), PARTS[kind]
+    most = 3 if kind == "transmission" else 2
+    if not 2 <= len(parts) <= most or not all(parts[:2]):
+        fix = f"Write --{kind} {form}."
+        raise UsageError(f"--{kind} {word!r} is not {form}.", fix=fix)
     return parts
 
 
@@ -111,19 +100,7 @@ def _transmission(parts: Sequence[str]) -> Transmission:
 
 def reads_of(channel: str) -> Reads:
     """Return the quantity a sensor reads, by the unit and the name of its channel."""
-    unit = unit_of(channel)
-    if channel.startswith("target_"):
-        return "reference"
-    kinds: dict[str, Reads] = {
-        "rad": "position",
-        "m": "position",
-        "rad/s": "speed",
-        "m/s": "speed",
-        "N m": "effort",
-        "N": "effort",
-        "K": "temperature",
-    }
-    return kinds.get(unit, "other")
+    return "reference" if channel.startswith("target_") else READS.get(unit_of(channel), "other")
 
 
 def data_text(table: Path, plant: Plant) -> str:

@@ -2,27 +2,23 @@
 
 import os
 import sys
+from collections.abc import Callable
 from io import TextIOWrapper
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.exceptions import TyperException
 
 from rig import __version__
-from rig.cli.adapt import adapt
-from rig.cli.cal import cal_app
 from rig.cli.calibrate import calibrate_app
 from rig.cli.campaigns import campaigns
-from rig.cli.clear import clear
-from rig.cli.commission import commission
 from rig.cli.config import config_app
 from rig.cli.demo import demo
 from rig.cli.diagnose import diagnose
 from rig.cli.diff import diff
-from rig.cli.doctor import devices, doctor, selftest, udev
+from rig.cli.doctor import commission, devices, doctor, selftest, udev
 from rig.cli.effects import effects
-from rig.cli.estimator import estimator_app
-from rig.cli.export import export
+from rig.cli.estimator import adapt, estimator_app, export
 from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
 from rig.cli.grasper import grasper_app
@@ -37,17 +33,42 @@ from rig.cli.model import model_app
 from rig.cli.record import record
 from rig.cli.reference import reference
 from rig.cli.replay import replay
-from rig.cli.stop import stop
+from rig.cli.stop import clear, stop
 from rig.cli.study import study_app
 from rig.cli.view import view
 
 # before numpy is loaded: the matrices are small, and threads of a BLAS wait for one another
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+COMMANDS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
+    "Begin": (
+        *(demo, config_app, machine_app),
+        *(doctor, devices, selftest, commission, udev, firmware_app),
+    ),
+    "At the rig": (live, record, grip, stop, clear, reference, calibrate_app, grasper_app),
+    "Recordings": (campaigns, import_, log_app, replay, view),
+    "Models": (fit, diagnose, model_app, diff, loop, effects, adapt, estimator_app, export),
+    "Papers": (study_app,),
+}
+"""Headings of the list of commands, and the commands under each, in order."""
+
+
+def _name(member: Callable[..., Any] | typer.Typer) -> str:
+    return str(member.info.name) if isinstance(member, typer.Typer) else member.__name__.rstrip("_")
+
+
+class OrderedHelp(GroupedHelp):
+    """The commands in the order of the list above."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands."""
+        return [_name(member) for members in COMMANDS.values() for member in members]
+
+
 app = typer.Typer(
     name="rig",
     help="Record, estimate and explain the torque at the jaw of a surgical-grasper rig.",
-    cls=GroupedHelp,
+    cls=OrderedHelp,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
@@ -56,40 +77,12 @@ app = typer.Typer(
     "70 bug, 130 interrupted.",
 )
 
-
-app.command()(demo)
-app.command()(record)
-app.command()(live)
-app.command()(replay)
-app.command()(view)
-app.command()(grip)
-app.command()(fit)
-app.command()(adapt)
-app.add_typer(model_app, name="model")
-app.command()(export)
-app.add_typer(estimator_app, name="estimator")
-app.add_typer(calibrate_app, name="calibrate")
-app.add_typer(cal_app, name="cal")
-app.command()(diagnose)
-app.command()(diff)
-app.command()(loop)
-app.command()(effects)
-app.command("import")(import_)
-app.command()(campaigns)
-app.add_typer(log_app, name="log")
-app.add_typer(machine_app, name="machine")
-app.add_typer(grasper_app, name="grasper")
-app.add_typer(study_app, name="study")
-app.add_typer(config_app, name="config")
-app.command()(doctor)
-app.command()(devices)
-app.command()(selftest)
-app.command()(commission)
-app.command()(reference)
-app.command()(stop)
-app.command()(clear)
-app.command()(udev)
-app.add_typer(firmware_app, name="firmware")
+for heading, members in COMMANDS.items():
+    for member in members:
+        if isinstance(member, typer.Typer):
+            app.add_typer(member, rich_help_panel=heading)
+        else:
+            app.command(_name(member), rich_help_panel=heading)(member)
 
 
 def _version(wanted: bool) -> None:
@@ -119,7 +112,7 @@ def main(arguments: list[str] | None = None) -> int:
     Args:
         arguments: Words after `rig`; the process' own when None.
     """
-    words = sys.argv[1:] if arguments is None else arguments
+    words = _present_words(sys.argv[1:] if arguments is None else arguments)
     try:
         result = app(args=words, standalone_mode=False, prog_name="rig")
     except typer.Exit as stop:
@@ -134,6 +127,14 @@ def main(arguments: list[str] | None = None) -> int:
     if result == 130:  # what typer makes of Ctrl-C
         sys.stderr.write("Interrupted.\n")
     return int(result) if isinstance(result, int) else 0
+
+
+def _present_words(words: list[str]) -> list[str]:
+    """Return the words of a command line, `cal` by its present name."""
+    verb = next((k for k, word in enumerate(words) if not word.startswith("-")), None)
+    if verb is None or words[verb] != "cal":
+        return words
+    return [*words[:verb], "calibrate", *words[verb + 1 :]]
 
 
 def _of_the_computer(error: OSError) -> Exception:

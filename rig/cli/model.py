@@ -1,24 +1,25 @@
 """`rig model`: which model estimates for a rig, and the choice of another one."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.help import GroupedHelp
-from rig.cli.rig_options import ConfigOption, SimFlag
-from rig.cli.shipped import complete_fitted
-from rig.output.console import JsonFlag, emit_json, results
+from estimation.channels import unit_of
+from rig.cli.help import group
+from rig.cli.options import ConfigOption, SimFlag, complete_fitted
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, present
 
 if TYPE_CHECKING:
     from rig.configuration.config import Config
 
-model_app = typer.Typer(
-    name="model",
-    help="Show and choose the model that estimates for a rig.",
-    cls=GroupedHelp,
+model_app = group(
+    "model",
+    "Show and choose the model that estimates for a rig.",
+    no_args_is_help=False,
     invoke_without_command=True,
-    rich_markup_mode=None,
 )
 
 
@@ -38,17 +39,13 @@ def show(
     settings = choose_rig(config, sim)
     chosen = model_in_use(settings.name)
     past = [choice for choice in choices() if choice.rig == settings.name]
-    if json:
-        emit_json({"rig": settings.name, "model": settings.model_path, "known": fitted_models()})
-        return
-    screen = results(json)
     how = f"chosen {past[-1].at[:16]} from {past[-1].source}" if chosen else "as configured"
-    screen.print(f"{settings.name}: {_name(settings)} ({how})", soft_wrap=True)
+    said = [f"{settings.name}: {_name(settings)} ({how})"]
     if settings.model_path is not None:
-        screen.print(f"  {_described(settings.model_path)}")
-    screen.print(
-        f"By name: {', '.join(fitted_models())}. Any other by its file: rig model use FILE."
-    )
+        said.append(f"  {_described(settings.model_path)}")
+    known = fitted_models()
+    said.append(f"By name: {', '.join(known)}. Any other by its file: rig model use FILE.")
+    present(json, {"rig": settings.name, "model": settings.model_path, "known": known}, *said)
 
 
 @model_app.command()
@@ -69,7 +66,6 @@ def use(
     of this rig. --model of a command goes before it.
     """
     from rig.configuration.chosen import choose_rig
-    from rig.errors import UsageError
 
     settings = choose_rig(config, sim)
     file = Path(model)
@@ -94,37 +90,22 @@ def reset(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fa
 
 def _choose(settings: "Config", source: Path | None, json: bool) -> None:
     """Choose, and print what is in use now and what it replaced."""
-    from datetime import UTC, datetime
-
     from rig.configuration.model_in_use import choose
+    from rig.live.estimator import estimators_of
 
-    estimates = [] if source is None else _estimates(source)
+    # refuses what is no fitted model
+    estimates = [] if source is None else [e.target_channel for e in estimators_of(source, 1000.0)]
     replaced, was = settings.model_path, _name(settings)
     choose(settings.name, source, datetime.now(UTC).isoformat(timespec="seconds"))
     now = settings.model_path
-    if json:
-        emit_json({"model": now, "replaced": replaced, "estimates": estimates})
-        return
-    screen = results(json)
-    screen.print(f"{settings.name}: {_name(settings)} in place of {was}.", soft_wrap=True)
+    said = [f"{settings.name}: {_name(settings)} in place of {was}."]
     if now is not None:
-        screen.print(f"  {_described(now)}")
-
-
-def _estimates(path: Path) -> list[str]:
-    """Return the channels that a fitted model estimates.
-
-    Raises:
-        EstimationError: The file is not a model, or the model is not fitted.
-    """
-    from rig.live.estimator import estimators_of
-
-    return [one.target_channel for one in estimators_of(path, 1000.0)]
+        said.append(f"  {_described(now)}")
+    present(json, {"model": now, "replaced": replaced, "estimates": estimates}, *said)
 
 
 def _described(path: Path) -> str:
     """Return the channels of a model and their intervals, in a sentence."""
-    from estimation.channels import unit_of
     from rig.live.estimator import estimators_of
 
     parts = []

@@ -1,81 +1,63 @@
 """`rig` alone: the state of rig, calibrations and recordings here, and what to type next."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
-if TYPE_CHECKING:
-    from rig.campaigns.index import IndexedCampaign
+from calibration.errors import CalibrationError
+from calibration.store import CalibrationStore, default_folder
+from rig.campaigns.index import IndexedCampaign, campaigns, default_index
+from rig.campaigns.search import families, verdict
+from rig.configuration.chosen import default_config
+from rig.configuration.config import load_config
+from rig.errors import KNOWN_ERRORS
 
 RECORDINGS = Path("logs")
 
-
-@dataclass(frozen=True)
-class Step:
-    """One line of advice.
-
-    Attributes:
-        state: What is here, or missing.
-        command: What to type next; empty if nothing is needed.
-    """
-
-    state: str
-    command: str = ""
+Step = tuple[str, str]
+"""What is here, or missing, and what to type next; empty if nothing is needed."""
 
 
 def show_next_steps() -> None:
-    """Print the steps, and where all commands are listed."""
-    from rig.configuration.chosen import default_config
-
+    """Print the state of what is here, what to type next, and where all commands are listed."""
     sim = " --sim" if default_config() is None else ""
-    steps = [*of_the_rig(), *of_recordings(RECORDINGS, f"rig record{sim} --protocol diagnosis")]
-    for step in steps:
-        typer.echo(step.state)
-        if step.command:
-            typer.echo(f"  {step.command}")
+    record = f"rig record{sim} --protocol diagnosis"
+    for state, command in (*of_the_rig(), *of_recordings(RECORDINGS, record)):
+        typer.echo(f"{state}\n  {command}" if command else state)
     typer.echo("\nAll commands: rig -h. By task: docs/how-to.md.")
 
 
 def of_the_rig() -> Iterator[Step]:
     """Yield the state of the configured rig and of its calibrations."""
-    from rig.configuration.chosen import default_config
-
     config = default_config()
     if config is None:
-        yield Step("No rig is configured. Without hardware:", "rig demo")
-        yield Step("With a board plugged in:", "rig config init")
+        yield "No rig is configured. Without hardware:", "rig demo"
+        yield "With a board plugged in:", "rig config init"
         return
-    from rig.configuration.config import load_config
-    from rig.errors import KNOWN_ERRORS
 
     try:
         settings = load_config(config)
     except KNOWN_ERRORS:
-        yield Step(f"The configuration {config} cannot be used.", f"rig config check {config}")
+        yield f"The configuration {config} cannot be used.", f"rig config check {config}"
         return
     if settings.is_simulated:
-        yield Step(f"Rig: {settings.name} ({config}), simulated.")
+        yield f"Rig: {settings.name} ({config}), simulated.", ""
         return
-    yield Step(f"Rig: {settings.name} ({config}).", "rig doctor")
+    yield f"Rig: {settings.name} ({config}).", "rig doctor"
     yield from _of_calibrations()
 
 
 def _of_calibrations() -> Iterator[Step]:
-    from calibration.errors import CalibrationError
-    from calibration.store import CalibrationStore, default_folder
-
     try:
         active = CalibrationStore(default_folder()).active()
     except (CalibrationError, OSError):
-        yield Step("The calibration store cannot be read.", "rig cal check")
+        yield "The calibration store cannot be read.", "rig calibrate check"
         return
     if active:
-        yield Step(f"Calibrations in use: {len(active)}.", "rig cal check")
+        yield f"Calibrations in use: {len(active)}.", "rig calibrate check"
     else:
-        yield Step("No calibration of this rig is stored.", "rig calibrate torque")
+        yield "No calibration of this rig is stored.", "rig calibrate torque"
 
 
 def of_recordings(root: Path, record: str) -> Iterator[Step]:
@@ -85,30 +67,26 @@ def of_recordings(root: Path, record: str) -> Iterator[Step]:
         root: Folder of the campaigns.
         record: Command that records one.
     """
-    from rig.campaigns.index import campaigns, default_index
-
     try:
         found = campaigns(root, default_index(root)) if root.is_dir() else []
     except OSError as error:
-        yield Step(f"The recordings in {root} cannot be listed: {error}.")
+        yield f"The recordings in {root} cannot be listed: {error}.", ""
         return
     if not found:
-        yield Step(f"There is no recording in {root}.", record)
+        yield f"There is no recording in {root}.", record
         return
-    yield Step(f"{len(found)} recorded campaigns in {root}.", "rig campaigns")
+    yield f"{len(found)} recorded campaigns in {root}.", "rig campaigns"
     recorded = [one for one in found if not one.is_calibration]
-    yield _of_campaign(recorded[0]) if recorded else Step("They are all calibrations.", record)
+    yield _of_campaign(recorded[0]) if recorded else ("They are all calibrations.", record)
 
 
-def _of_campaign(newest: "IndexedCampaign") -> Step:
-    from rig.campaigns.search import families, verdict
-
+def _of_campaign(newest: IndexedCampaign) -> Step:
     folder = newest.folder
     broken = [run for run in newest.runs if run.state != "complete" or run.lost]
     if broken:
         state = f"The newest, {folder}: {len(broken)} of {len(newest.runs)} runs not complete."
-        return Step(state, f"rig log check {folder}")
+        return state, f"rig log check {folder}"
     if newest.diagnosis is None:
-        return Step(f"The newest, {folder}, is not diagnosed.", f"rig diagnose {folder}")
+        return f"The newest, {folder}, is not diagnosed.", f"rig diagnose {folder}"
     said = ", ".join([verdict(newest).replace("_", " "), *families(newest)])
-    return Step(f"The newest, {folder}: {said}.", f"rig campaigns --open --root {folder}")
+    return f"The newest, {folder}: {said}.", f"rig campaigns --open --root {folder}"

@@ -1,12 +1,109 @@
-"""Options that several commands share."""
+"""Options that several commands share, the names they complete, and the rig that they choose."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.shipped import complete_machine, complete_model, machine_names, model_names
+import estimation
+import rig
+from rig.errors import UsageError
+from rig.output.console import remarks
 
+if TYPE_CHECKING:
+    from estimation.campaign import Campaign
+    from rig.configuration.config import Config
+
+SHIPPED, DECLARED = Path(rig.__file__).parent, Path(estimation.__file__).parent
+
+
+def _names(*folders: Path) -> list[str]:
+    return sorted(path.stem for folder in folders for path in folder.glob("*.toml"))
+
+
+def config_names() -> list[str]:
+    """Return the names of the shipped configurations."""
+    names = _names(SHIPPED / "configuration" / "shipped")
+    return [name for name in names if not name.endswith(".model")]
+
+
+def protocol_names() -> list[str]:
+    """Return the names of the shipped protocols."""
+    return _names(SHIPPED / "protocols")
+
+
+def model_names() -> list[str]:
+    """Return the names of the shipped declared models."""
+    from estimation.plant_equations import equations
+    from estimation.plant_file import shipped_plant
+
+    own = [equation.name for equation in equations(shipped_plant("reference"))]
+    return sorted([*_names(DECLARED / "models"), *own])
+
+
+def machine_names() -> list[str]:
+    """Return the names of the shipped machines."""
+    return _names(DECLARED / "machines", SHIPPED / "machines" / "examples")
+
+
+def _fitted_names() -> list[str]:
+    from rig.cli.model import fitted_models
+
+    return list(fitted_models())
+
+
+def _effect_names() -> list[str]:
+    from estimation.effects import catalogue
+
+    return list(catalogue())
+
+
+def _campaigns() -> list[Path]:
+    """Return the folders of logs in `logs/`, the latest name first."""
+    logs = Path("logs")
+    folders = {path.parent for depth in ("*", "*/*") for path in logs.glob(f"{depth}/*.mcap")}
+    return sorted(folders, reverse=True)
+
+
+def _paths(start: str, pattern: str) -> list[str]:
+    """Return the paths in the folder that was typed so far."""
+    typed = Path(start or ".")
+    folder = typed if start.endswith("/") or not start else typed.parent
+    return sorted(map(str, folder.glob(pattern))) if folder.is_dir() else []
+
+
+def _completed(names: Callable[[], list[str]], pattern: str = "") -> Callable[[str], list[str]]:
+    """Return a completion of names, and with a pattern of paths."""
+
+    def complete(incomplete: str) -> list[str]:
+        files = _paths(incomplete, pattern) if pattern else []
+        found = dict.fromkeys([*names(), *files])
+        return [name for name in found if name.startswith(incomplete)]
+
+    return complete
+
+
+complete_config = _completed(config_names, "*.toml")
+complete_protocol = _completed(protocol_names, "*.toml")
+complete_machine = _completed(machine_names, "*.toml")
+complete_model = _completed(model_names, "*.toml")
+complete_fitted = _completed(_fitted_names, "*.toml")
+complete_effect = _completed(_effect_names)
+complete_recordings = _completed(lambda: list(map(str, _campaigns())), "*")
+complete_campaign = _completed(lambda: [str(f.relative_to("logs")) for f in _campaigns()])
+
+ConfigOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        "-c",
+        help=f"Configuration: a file, or one of {', '.join(config_names())}. If none: RIG_CONFIG,"
+        " ./rig.toml, ~/.config/rig/rig.toml.",
+        autocompletion=complete_config,
+    ),
+]
+SimFlag = Annotated[bool, typer.Option("--sim", help="Use the simulated rig; nothing real moves.")]
 MachineOption = Annotated[
     Path | None,
     typer.Option(
@@ -16,7 +113,6 @@ MachineOption = Annotated[
         autocompletion=complete_machine,
     ),
 ]
-
 ModelOption = Annotated[
     Path | None,
     typer.Option(
@@ -26,9 +122,17 @@ ModelOption = Annotated[
         autocompletion=complete_model,
     ),
 ]
-
+RecordingsArgument = Annotated[
+    Path,
+    typer.Argument(
+        help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
+    ),
+]
 FormatOption = Annotated[
     str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
+]
+SkipBad = Annotated[
+    bool, typer.Option("--skip-bad", help="Leave out runs that cannot be read, and name them.")
 ]
 EquationOption = Annotated[
     str | None, typer.Option("--equation", help="Only this equation, such as motor.")
@@ -37,6 +141,14 @@ LedgerOption = Annotated[Path | None, typer.Option(help="Path of the held-out-da
 JsonFile = Annotated[Path | None, typer.Option("--json-out", help="File for the result as JSON.")]
 QuickFlag = Annotated[bool, typer.Option("--quick", help="Propose no next experiment.")]
 PlainFlag = Annotated[bool, typer.Option("--plain", help="Lines instead of the display.")]
+OutFolder = Annotated[Path | None, typer.Option("--out", "-o", help="Folder of all output.")]
+LiveModel = Annotated[
+    Path | None, typer.Option(help="Model file of the estimate; by default the configured one.")
+]
+ReplayModel = Annotated[
+    Path | None,
+    typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
+]
 WorkersOption = Annotated[
     int, typer.Option("--workers", min=1, help="Number of processes; 1 is this one.")
 ]
@@ -47,3 +159,39 @@ SimulationSeed = Annotated[
 ]
 TablesFile = Annotated[Path | None, typer.Option("--out", help="File for the tables, in Markdown.")]
 FiguresFolder = Annotated[Path | None, typer.Option(help="Folder for the figures, as SVG.")]
+
+
+def chosen_rig(config: Path | None, sim: bool) -> "Config":
+    """Return the chosen configuration, and say on stderr if it is a simulated rig's.
+
+    Raises:
+        UsageError: No rig is configured, or the configuration is wrong.
+    """
+    from rig.configuration.chosen import choose_rig
+
+    return announced(choose_rig(config, sim))
+
+
+def announced(settings: "Config") -> "Config":
+    """Return a configuration; the session on it begins with a line if it is simulated."""
+    if settings.is_simulated:
+        remarks().print(f"Simulated rig ({settings.name}): nothing real moves or is measured.")
+    return settings
+
+
+def require_new(path: Path | None) -> None:
+    """Refuse to write over a file that is there, None for no file.
+
+    Raises:
+        UsageError: Something is there.
+    """
+    if path is not None and path.exists():
+        raise UsageError(f"{path} is there already.", fix="Name another file.")
+
+
+def say_left_out(path: Path, campaign: "Campaign") -> None:
+    """Print on stderr the files and runs at a path that a campaign excludes, with the reason."""
+    from rig.importers.registry import left_out
+
+    for line in left_out(path, campaign):
+        remarks().print(line)

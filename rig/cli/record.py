@@ -6,10 +6,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import SimulationSeed
-from rig.cli.rig_options import ConfigOption, SimFlag, announced, chosen_rig
-from rig.cli.shipped import complete_protocol, protocol_names
-from rig.output.console import JsonFlag, emit_json, progress, remarks, results
+from rig.cli.options import (
+    ConfigOption,
+    SimFlag,
+    SimulationSeed,
+    announced,
+    chosen_rig,
+    complete_protocol,
+    protocol_names,
+)
+from rig.errors import KNOWN_ERRORS, UsageError
+from rig.output.console import JsonFlag, present, progress, remarks
+from rig.output.table import counted
 
 if TYPE_CHECKING:
     from rig.configuration.config import Config
@@ -50,9 +58,7 @@ def record(
     """
     from calibration.rules import refuse_errors
     from rig.configuration.check import refuse_problems
-    from rig.errors import UsageError
     from rig.machines.choose import machine_of
-    from rig.output.table import counted
     from rig.protocols.protocol import load_protocol
     from rig.recording.campaign import open_campaign_folder, read_manifest
     from rig.recording.watch import watch_runs
@@ -76,19 +82,17 @@ def record(
         folder = out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
     refuse_problems(settings)
     for verdict in refuse_errors(settings.calibration_verdicts()):
-        screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})", markup=False)
+        screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})")
     watch = watch_runs(model) if model else None
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {counted(len(todo), 'run')} on {settings.name} into {folder}")
     recorded = _recorded(settings, todo, folder, notes, watch)
     bad = [result.name for result in recorded if result.drifted or not result.complete]
     wrong = f"drifted or not complete: {', '.join(bad)}" if bad else "all complete"
-    results(json).print(
-        f"{counted(len(recorded), 'run')} recorded, {wrong}. Next: rig log check {folder}"
-    )
-    if json:
-        found = {"folder": folder, "runs": recorded, "look_at": bad}
-        emit_json(found if watch is None else {**found, "models": watch.to_json()})
+    found = {"folder": folder, "runs": recorded, "look_at": bad}
+    models = {} if watch is None else {"models": watch.to_json()}
+    said = f"{counted(len(recorded), 'run')} recorded, {wrong}. Next: rig log check {folder}"
+    present(json, found | models, said)
     return 1 if bad else 0
 
 
@@ -102,7 +106,6 @@ def _recorded(
     """Record the runs and show how they go; state how to go on if not all are."""
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
-    from rig.errors import KNOWN_ERRORS
     from rig.recording.campaign import record_campaign
 
     screen = remarks()
@@ -121,10 +124,10 @@ def _recorded(
                 if bar.disable:  # no terminal: a line a run in place of the bar
                     screen.print(f"{len(recorded)}/{len(todo)} {result.name}")
                 if watch is not None and (news := watch.after(result.path)):
-                    bar.console.print(news, style="yellow", markup=False)
+                    bar.console.print(news, style="yellow")
                 if result.drifted or not result.complete:
                     text = f"{result.name}: {result.remark}"
-                    bar.console.print(text, style="yellow", markup=False)
+                    bar.console.print(text, style="yellow")
     except KeyboardInterrupt:
         screen.print(f"Stopped; the rig is safe. Go on with: rig record --resume {folder}")
         raise

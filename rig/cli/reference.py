@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rig.cli.rig_options import ConfigOption, SimFlag, chosen_rig
-from rig.output.console import JsonFlag, emit_json, results
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig
+from rig.output.console import JsonFlag, present, results
 
 AtOption = Annotated[
     list[float] | None,
@@ -60,23 +60,16 @@ def reference(
         if not yes:
             typer.confirm("The motor will turn. Is the jaw empty and clear?", abort=True, err=True)
         turned_rad = drive_to_stop(settings, hard_stop is Stop.CLOSED)
-        results(json).print(
-            f"It turned {turned_rad:+.3f} rad to the {hard_stop} stop.", markup=False
-        )
+        results(json).print(f"It turned {turned_rad:+.3f} rad to the {hard_stop} stop.")
     if index:
         typer.echo("Turn the spindle through its index and let go.", err=True)
     elif not yes:
         how = "The motor is off" if hard_stop else "Turn the rig by hand to it and let go"
-        typer.confirm(
-            f"The place is {place}. {how}. Does it stand there?",
-            abort=True,
-            err=True,
-        )
+        typer.confirm(f"The place is {place}. {how}. Does it stand there?", abort=True, err=True)
     identity = reference_board(settings, here_rad, index)
-    results(json).print(
+    present(
+        json,
+        {"referenced": identity.referenced, "boot": identity.boot, "at_rad": here_rad},
         f"{settings.name}: referenced at {place}; board {identity.serial}, start {identity.boot}.",
-        markup=False,
     )
-    if json:
-        emit_json({"referenced": identity.referenced, "boot": identity.boot, "at_rad": here_rad})
     return 0

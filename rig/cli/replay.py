@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import FormatOption, MachineOption, PlainFlag
-from rig.output.console import JsonFlag, remarks, results
+from rig.cli.options import FormatOption, MachineOption, PlainFlag, ReplayModel
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, present, remarks, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -24,10 +25,7 @@ def replay(
     run: Annotated[
         str | None, typer.Option(help="Name of the run; by default the first valid one.")
     ] = None,
-    model: Annotated[
-        Path | None,
-        typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
-    ] = None,
+    model: ReplayModel = None,
     speed: Annotated[
         float, typer.Option(help="Speed relative to real time; 0 is as fast as possible.")
     ] = 1.0,
@@ -59,14 +57,13 @@ def replay(
     """
     if core:
         return _core(log, config, json_)
-    from rig.errors import UsageError
-    from rig.live.estimator import HalfWidths, shown_channels
-    from rig.live.joint_forces import with_joint_forces
+    from rig.live.block import through
+    from rig.live.estimator import half_widths, shown_channels
     from rig.live.keys import display_keys
     from rig.live.options import ShowOptions
     from rig.live.replay import OF_REPLAY, Pace, replay_blocks
-    from rig.live.run import show
-    from rig.live.watching import with_status
+    from rig.live.show import show
+    from rig.live.status import model_steps
     from rig.machines.recordings import open_recordings
 
     if not 0 <= speed < math.inf:
@@ -79,7 +76,7 @@ def replay(
     options = ShowOptions(
         title=f"rig replay {recording.name}",
         channels=shown_channels(estimators, _usual(recording)),
-        half_widths=HalfWidths(estimators),
+        half_widths=lambda: half_widths(estimators),
         lever_m=lever_mm / 1e3,
         plain=plain,
         json=json_,
@@ -87,7 +84,7 @@ def replay(
     with display_keys() as keys:
         pace = Pace(speed or None, keys) if keys else None
         blocks = replay_blocks(recording, estimators, speed or None, pace=pace)
-        blocks = with_status(with_joint_forces(blocks), estimators)
+        blocks = through(blocks, model_steps(estimators))
         summary = show(blocks, options.with_keys(keys, OF_REPLAY), results(json_))
     return summary.exit_code
 
@@ -105,52 +102,38 @@ def _usual(recording: "Recording") -> tuple[str, ...]:
 def _core(log: Path, config: Path | None, json: bool) -> int:
     """Run the core again with a log's commands."""
     from rig.configuration.config import load_config
-    from rig.output.console import emit_json
     from rig.recording.core_replay import replay_core
 
     found = replay_core(log, load_config(config) if config else None)
-    screen = results(json)
     if not found.is_same_core:
         remarks().print(f"The log is of core {found.core}; the one in use is another build.")
-    screen.print(
+    said = [
         f"{found.same} of {found.samples} samples are the same, bit for bit,"
-        f" from {found.commands} bytes of commands.",
-        markup=False,
-    )
-    if found.trips:
-        screen.print(f"The board tripped: {', '.join(found.trips)}.", markup=False)
+        f" from {found.commands} bytes of commands."
+    ]
+    said += [f"The board tripped: {', '.join(found.trips)}."] if found.trips else []
     if found.first_difference:
-        screen.print(f"First difference: {found.first_difference}.", markup=False)
-    if json:
-        emit_json({"passed": found.passed, **asdict(found)})
+        said.append(f"First difference: {found.first_difference}.")
+    present(json, {"passed": found.passed, **asdict(found)}, *said)
     return 0 if found.passed else 1
 
 
 def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
-    """Return the named run, or the first valid one, and print its name."""
+    """Return the named run, or the first valid one, and print which it is and objections to it."""
     from rig.cli.view import chosen_runs
 
     chosen = chosen_runs(campaign, [name] if name else [])
     runs = chosen.runs if name else (chosen.evidence.runs or chosen.runs)
     recording = runs[0].recording()
-    if not quiet:
-        _tell(campaign, recording, chosen=name is not None)
-    return recording
-
-
-def _tell(campaign: "Campaign", recording: "Recording", chosen: bool) -> None:
-    """Print which run is shown, if there are more, and the objections to it."""
-    people = remarks()
-    if len(campaign) > 1 and not chosen:
-        place = campaign.names.index(recording.name) + 1
-        people.print(
-            f"Run {recording.name}, {place} of {len(campaign)}; --run NAME shows another.",
-            markup=False,
-        )
+    said = []
+    if len(campaign) > 1 and name is None:
+        place = f"{campaign.names.index(recording.name) + 1} of {len(campaign)}"
+        said.append(f"Run {recording.name}, {place}; --run NAME shows another.")
     if recording.excluded:
-        people.print(
-            f"Run {recording.name} is left out of evidence: {recording.excluded}", markup=False
-        )
+        said.append(f"Run {recording.name} is left out of evidence: {recording.excluded}")
+    for line in () if quiet else said:
+        remarks().print(line)
+    return recording
 
 
 def _estimators(
@@ -168,13 +151,12 @@ def _estimators(
     if path is None:
         return []
     if model is None and not quiet:
-        remarks().print(f"Estimate of the model in use, {path.name}.", soft_wrap=True)
+        remarks().print(f"Estimate of the model in use, {path.name}.")
     estimators = estimators_of(path, recording.sample_rate_hz, recording.conditions)
     for name, level in estimators[0].other_levels.items() if not quiet else ():
         remarks().print(
             f"No interval: {path.name} was fitted at one level of {name}, and this run is at"
-            f" {level:g}. `rig fit` on runs at several levels gives one.",
-            markup=False,
+            f" {level:g}. `rig fit` on runs at several levels gives one."
         )
     if not any_instrument:
         require_own(estimators[0].instrument, recording)

@@ -1,11 +1,12 @@
-"""`rig stop`: disarm the motors, and report it only after the board has confirmed it."""
+"""`rig stop | clear`: disarm the motors, confirmed by the board; clear a latched fault or trip."""
 
 from pathlib import Path
 from typing import Any
 
 from rig.bench.holding import Ending
-from rig.cli.rig_options import ConfigOption, SimFlag, announced
-from rig.output.console import JsonFlag, emit_json, plain, remarks, results
+from rig.cli.options import ConfigOption, SimFlag, announced, chosen_rig
+from rig.errors import ExitCode, RigError, UsageError
+from rig.output.console import JsonFlag, present, remarks, results
 
 
 def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
@@ -19,7 +20,6 @@ def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fal
     """
     from rig.configuration.chosen import ONE_OF, choose_config, configured_rigs
     from rig.configuration.config import load_config
-    from rig.errors import ExitCode, UsageError
 
     if config is not None:
         load_config(config)  # a slip in what was typed is said before anything is tried
@@ -32,9 +32,7 @@ def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fal
         )
     stopped = [_stopped(path, json) for path in meant]
     unknown = [rig for rig in stopped if rig["state"] == "unknown"]
-    if json:
-        state = "unknown" if unknown else "disarmed"
-        emit_json({"state": state, "rigs": stopped})
+    present(json, {"state": "unknown" if unknown else "disarmed", "rigs": stopped})
     return int(ExitCode.SAFETY) if unknown else 0
 
 
@@ -44,7 +42,6 @@ def _stopped(path: Path, json: bool) -> dict[str, Any]:
     from drivers.teensy.driver import TeensyLogger
     from rig.bench.logger import open_logger
     from rig.configuration.config import load_config
-    from rig.errors import RigError
     from rig.machines.choose import machine_of
 
     name, ending = str(path), None
@@ -58,18 +55,12 @@ def _stopped(path: Path, json: bool) -> dict[str, Any]:
         screen = remarks()
         screen.print(f"{name}: UNKNOWN. Treat the motors as live. Cut the motor supply by hand.")
         why = f"{_ended(ending)} {error.what} {error.why}".strip()
-        for word, text in (("why", why), ("fix", error.fix)):
-            screen.print(f"  {word}: {text}", markup=False)
-        return {
-            "name": name,
-            "config": path,
-            "state": "unknown",
-            "why": str(error),
-            "holder": plain(ending),
-        }
+        screen.print(f"  why: {why}\n  fix: {error.fix}")
+        unknown = {"name": name, "config": path, "state": "unknown", "why": str(error)}
+        return unknown | {"holder": ending}
     said = f"{name}: disarmed, confirmed by the rig. {_ended(ending)}"
-    results(json).print(said.strip(), markup=False)
-    return {"name": name, "config": path, "state": "disarmed", "holder": plain(ending)}
+    results(json).print(said.strip())
+    return {"name": name, "config": path, "state": "disarmed", "holder": ending}
 
 
 def _released(url: str) -> Ending | None:
@@ -96,3 +87,23 @@ def _ended(ending: Ending | None) -> str:
         return ""
     how = "did not end when asked and was killed" if ending.was_killed else "was asked to end"
     return f"The session that had the rig (PID {ending.pid}) {how}."
+
+
+def clear(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
+    """Clear the rig's latched fault or trip; the motors stay out of force.
+
+    Find the cause first. An EPOS4 drive is taken out of force, its communication is reset and set
+    up again, and its fault is cleared. A logger board is disarmed, and the trip it reports is
+    cleared by its code.
+    """
+    from rig.bench.clearing import clear_latch
+
+    settings = chosen_rig(config, sim)
+    latch = clear_latch(settings)
+    text = "nothing is latched."
+    if latch.code:
+        text = f"cleared: {latch.what} (code {latch.code:#06x}) {latch.then}".rstrip()
+    latched = {"what": latch.what, "code": latch.code} if latch.code else None
+    data = {"state": "disarmed", "latched": latched, "cleared": True}
+    present(json, data, f"{settings.name}: out of force; {text}")
+    return 0

@@ -1,15 +1,25 @@
 """`rig view`: recordings as one page in a browser."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.left_out import SkipBad, say_left_out
-from rig.cli.options import FormatOption, MachineOption
-from rig.cli.shipped import complete_recordings
-from rig.output.console import JsonFlag, emit_json, remarks, results
+from estimation.errors import EstimationError
+from estimation.files import write_text_atomic
+from rig.cli.options import (
+    FormatOption,
+    MachineOption,
+    ReplayModel,
+    SkipBad,
+    complete_recordings,
+    say_left_out,
+)
+from rig.errors import DataError, UsageError
+from rig.output.console import JsonFlag, present, remarks
+from rig.output.table import counted
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -26,10 +36,7 @@ def view(
     run: Annotated[
         list[str] | None, typer.Option(help="Only this run, in more points; may be repeated.")
     ] = None,
-    model: Annotated[
-        Path | None,
-        typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
-    ] = None,
+    model: ReplayModel = None,
     machine: MachineOption = None,
     format_: FormatOption = None,
     skip_bad: SkipBad = False,
@@ -50,8 +57,6 @@ def view(
 
     from rig.machines.recordings import open_recordings
     from rig.output.provenance import Provenance
-    from rig.output.render import write_report
-    from rig.output.table import counted
     from rig.reports.recordings import page
 
     whole = open_recordings(path, machine, format_, skip_bad)
@@ -60,14 +65,12 @@ def view(
     campaign = with_model(chosen_runs(shown, run or []), model)
     name = path.resolve().name
     target = out or Path(f"{name}.view.html")
-    write_report(target, page(campaign, f"Recordings: {name}", Provenance.now(0)))
+    write_text_atomic(target, page(campaign, f"Recordings: {name}", Provenance.now(0)))
     opened = open_ and not json and webbrowser.open(target.resolve().as_uri())
-    if json:
-        emit_json({"page": target, "runs": campaign.names})
-        return
-    results(json).print(f"{counted(len(campaign), 'run')}: {target}", soft_wrap=True)
+    said = [f"{counted(len(campaign), 'run')}: {target}"]
     if not opened:
-        results(json).print(f"Open it: {target.resolve().as_uri()}", soft_wrap=True)
+        said.append(f"Open it: {target.resolve().as_uri()}")
+    present(json, {"page": target, "runs": campaign.names}, *said)
 
 
 def chosen_runs(campaign: "Campaign", names: list[str]) -> "Campaign":
@@ -77,8 +80,6 @@ def chosen_runs(campaign: "Campaign", names: list[str]) -> "Campaign":
         DataError: The campaign has no runs.
         UsageError: It has no run of that name.
     """
-    from rig.errors import DataError, UsageError
-
     if not len(campaign):
         raise DataError("The recordings hold no runs.", "There is nothing to show.")
     for name in names:
@@ -102,10 +103,7 @@ def with_model(campaign: "Campaign", model: Path | None) -> "Campaign":
     Raises:
         EstimationError: The named model cannot estimate a recording.
     """
-    from dataclasses import replace
-
     from estimation.campaign import Campaign, Run
-    from estimation.errors import EstimationError
     from estimation.recording import Recording
     from rig.configuration.model_in_use import model_in_use
     from rig.live.estimator import with_estimates

@@ -61,7 +61,7 @@ class Config(Section):
             before it.
         calibration: Calibration set: a TOML file, or a shipped one by name.
         calibration_store: Folder of the store whose active records go before that set's lines, or
-            `default` for the store that `rig cal` uses; no store if none.
+            `default` for the store that `rig calibrate` uses; no store if none.
         machine: What else the machine is configured by; which keys there are depends on
             `[logger] profile`, as those of limits and drift do.
         devices: Further devices by the name their recorded channels go under.

@@ -1,7 +1,8 @@
-"""Input of the display: a block of samples and the state at its arrival."""
+"""Input of the display: blocks of samples with the state at their arrival, and a stream of them."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -94,3 +95,48 @@ class SampleBlock:
 
     def __len__(self) -> int:
         return int(self.time_s.size)
+
+
+def joined(parts: Sequence[Mapping[str, FloatArray]]) -> dict[str, FloatArray]:
+    """Return the columns that every part has, one part after the other."""
+    shared = [name for name in parts[0] if all(name in part for part in parts)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in shared}
+
+
+Step = Callable[[SampleBlock], SampleBlock]
+"""Returns a block with something added to it."""
+
+Sink = Callable[[SampleBlock], None]
+"""Shows a block somewhere else than on the terminal."""
+
+
+def through(
+    blocks: Iterator[SampleBlock],
+    steps: Iterable[Step] = (),
+    sinks: Iterable[Sink] = (),
+    duration_s: float | None = None,
+) -> Iterator[SampleBlock]:
+    """Yield blocks as they come, each after every step and shown on every sink.
+
+    Args:
+        blocks: The stream. It is closed when this one is.
+        steps: Applied one after the other.
+        sinks: What else the blocks are shown on.
+        duration_s: Device time after which the stream ends, s; None for no end.
+    """
+    steps, sinks = tuple(steps), tuple(sinks)
+    first_s: float | None = None
+    try:
+        for raw in blocks:
+            block = reduce(lambda so_far, step: step(so_far), steps, raw)
+            for sink in sinks:
+                sink(block)
+            yield block
+            if duration_s is not None and len(block):
+                first_s = float(block.time_s[0]) if first_s is None else first_s
+                if float(block.time_s[-1]) - first_s >= duration_s:
+                    return
+    finally:
+        close = getattr(blocks, "close", None)
+        if close is not None:
+            close()

@@ -1,6 +1,6 @@
 """A fitted estimator as the stream of estimates the display shows."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from estimation.channels import ESTIMATED
 from estimation.estimator import Stepper, load
 from estimation.estimators.bank import BankEstimator, BankStepper
 from estimation.estimators.instrument import require_own
+from estimation.estimators.model import ModelEstimator as PhysicalEstimator
 from estimation.estimators.model import Stream
 from estimation.estimators.network import NetworkEstimator, NetworkStepper
 from estimation.model import Model
@@ -20,13 +21,12 @@ from estimation.recording import MissingChannelError, Recording
 from estimation.signals import reference
 from rig.live.block import FloatArray
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints
-from rig.live.replay import within_range
 
 NOT_STATED: Mapping[str, float | str] = {}
 
 
 class ModelEstimator:
-    """Feeds blocks to an estimator's causal stream. Satisfies `rig.live.replay.EstimateStream`."""
+    """Feeds blocks to an estimator's causal stream."""
 
     def __init__(
         self,
@@ -51,26 +51,24 @@ class ModelEstimator:
         self.usual_half_width: float | None = None
         self.instrument = ""  # a physical model has none
         self.other_levels: Mapping[str, float] = {}  # conditions of the run that no run fitted had
-        self._stream: Stepper
         if path.suffix == ".npz":
             estimator = load(path)
             if isinstance(estimator, BankEstimator):
                 self.other_levels = other_levels(estimator.only, conditions)
                 estimator = estimator.at(conditions)
-            self._stream, self.target_channel = estimator.stepper(sample_rate_hz), estimator.target
+                interval = estimator.interval
+                self.usual_half_width = interval.typical if interval is not None else None
             if isinstance(estimator, BankEstimator | NetworkEstimator):
                 self.instrument = estimator.instrument
-            if isinstance(estimator, BankEstimator) and estimator.interval is not None:
-                self.usual_half_width = estimator.interval.typical
-            return
-        models = model_file.read_all(path)
-        model = next((m for m in models if m.balance == balance), models[0])
-        self._stream = Stream(model, sample_rate_hz)
-        self.target_channel = model.target
-        self.model = model
-        # two standard errors of the runs it was fitted on, their means left in: what a person at
-        # the bench has to reckon with, in motion, on a rig that is as it was then
-        self.usual_half_width = 2 * model.evidence.rmse_with_means if model.evidence else None
+        else:
+            models = model_file.read_all(path)
+            self.model = next((m for m in models if m.balance == balance), models[0])
+            estimator, evidence = PhysicalEstimator(self.model), self.model.evidence
+            # two standard errors of the runs it was fitted on, their means left in: what a person
+            # at the bench has to reckon with, in motion, on a rig that is as it was then
+            self.usual_half_width = 2 * evidence.rmse_with_means if evidence else None
+        self.target_channel = estimator.target
+        self._stream: Stepper = estimator.stepper(sample_rate_hz)
 
     @property
     def half_width(self) -> float | None:
@@ -116,6 +114,11 @@ class ModelEstimator:
                 "Choose a model that needs less.",
             )
         return self._stream.step(time_s, columns)
+
+
+def within_range(estimator: ModelEstimator, estimate: FloatArray) -> FloatArray:
+    """Return the estimate of the last samples, NaN outside the estimator's range, shape (n,)."""
+    return estimate if estimator.inside is None else np.where(estimator.inside, estimate, np.nan)
 
 
 def estimators_of(
@@ -169,24 +172,10 @@ def models_in_use(path: Path) -> list[Model]:
     return of_axes or models[:1]
 
 
-class HalfWidths(Mapping[str, float]):
-    """Half of the 95 % interval of each channel that is estimated, as of the newest sample."""
-
-    def __init__(self, estimators: Sequence[ModelEstimator]) -> None:
-        self._estimators = estimators
-
-    def _known(self) -> dict[str, float]:
-        found = {e.target_channel: e.half_width for e in self._estimators}
-        return interval_of_joints({k: width for k, width in found.items() if width is not None})
-
-    def __getitem__(self, channel: str) -> float:
-        return self._known()[channel]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._known())
-
-    def __len__(self) -> int:
-        return len(self._known())
+def half_widths(estimators: Sequence[ModelEstimator]) -> dict[str, float]:
+    """Return half of the 95 % interval of each channel, SI, as of the newest sample."""
+    found = {estimator.target_channel: estimator.half_width for estimator in estimators}
+    return interval_of_joints({k: width for k, width in found.items() if width is not None})
 
 
 def shown_channels(estimators: Sequence[ModelEstimator], usual: tuple[str, ...]) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ Needs the extra `viz`. The server listens on the loopback address only, and only
 """
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,30 +20,6 @@ RATE_HZ = 100.0
 
 SAMPLE, STATUS = "/rig/sample", "/rig/status"
 _NUMBER = {"type": ["number", "null"]}
-
-
-def published(blocks: Iterator[SampleBlock], port: int = PORT) -> Iterator[SampleBlock]:
-    """Yield blocks as they come, and send them to whoever is connected.
-
-    The server starts with the first block asked for and stops when the stream is closed.
-
-    Args:
-        blocks: The stream; closed on the way out.
-        port: TCP port; 0 takes any that is free.
-
-    Raises:
-        UsageError: The extra is not installed, or the port is taken.
-    """
-    server = FoxgloveServer(port)
-    try:
-        for block in blocks:
-            server.send(block)
-            yield block
-    finally:
-        server.close()
-        close = getattr(blocks, "close", None)
-        if close is not None:
-            close()
 
 
 class FoxgloveServer:

@@ -4,7 +4,7 @@ Zhao and Nelson 2016, equations 12 to 14: the grasp is that of both jaws, their 
 of the jaw that touches, the one that presses harder; the yaw is its own motor's.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -34,20 +34,10 @@ def interval_of_joints(half_widths: Mapping[str, float]) -> dict[str, float]:
     return {**half_widths, "grasp_force_n": sum(jaws) / 2, "pitch_force_n": max(jaws)}
 
 
-def with_joint_forces(blocks: Iterator[SampleBlock]) -> Iterator[SampleBlock]:
-    """Yield blocks as they come, each with grasp and pitch force in addition to the jaws'.
-
-    Args:
-        blocks: The stream. It is closed when this one is.
-    """
-    try:
-        for block in blocks:
-            yield replace(
-                block,
-                columns={**block.columns, **of_joints(block.columns)},
-                estimates={**block.estimates, **of_joints(block.estimates)},
-            )
-    finally:
-        close = getattr(blocks, "close", None)
-        if close is not None:
-            close()
+def with_joint_forces(block: SampleBlock) -> SampleBlock:
+    """Return a block with grasp and pitch force in addition to the jaws'."""
+    return replace(
+        block,
+        columns={**block.columns, **of_joints(block.columns)},
+        estimates={**block.estimates, **of_joints(block.estimates)},
+    )

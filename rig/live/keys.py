@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 TARE, MARK, RECORD, STOP, LEAVE = "t", "m", "r", "s", "q"
@@ -30,16 +30,6 @@ def no_keys() -> str:
     return ""
 
 
-def in_a_line(keys: Mapping[str, tuple[str, str]]) -> str:
-    """Return keys with their words."""
-    return "  ".join(f"{key} {word}" for key, (word, _) in keys.items())
-
-
-def in_a_list(keys: Mapping[str, tuple[str, str]]) -> str:
-    """Return keys with what they do, a line each."""
-    return "\n".join(f"{key:>5}  {does}" for key, (_, does) in keys.items())
-
-
 class DisplayKeys:
     """Keys, of which those of the display alone are kept back: the channel shown, and the help.
 
@@ -64,13 +54,6 @@ class DisplayKeys:
 
 @contextmanager
 def display_keys() -> Iterator[DisplayKeys | None]:
-    """Yield the keys of a display; None where `pressed_keys` has none."""
-    with pressed_keys() as pressed:
-        yield DisplayKeys(pressed) if pressed else None
-
-
-@contextmanager
-def pressed_keys() -> Iterator[Keys | None]:
     """Yield the keys of the terminal, and give the terminal back on the way out.
 
     Yields None where stdin is not a terminal, or the system has none of this kind: then nothing is
@@ -103,7 +86,7 @@ def pressed_keys() -> Iterator[Keys | None]:
 
     try:
         tty.setcbreak(handle)
-        yield pressed
+        yield DisplayKeys(pressed)
     finally:
         with suppress(termios.error):  # a terminal that is gone needs nothing back
             termios.tcsetattr(handle, termios.TCSADRAIN, before)

@@ -1,11 +1,11 @@
 """Options of the display of a stream."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 from rig.errors import UsageError
-from rig.live.keys import DisplayKeys, in_a_line, in_a_list
+from rig.live.keys import DisplayKeys
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +18,7 @@ class ShowOptions:
         lever_m: Lever arm from the jaw's axis to its tip, m; 12 mm in O'Neill et al. 2018.
         plain: Lines for people, also in a terminal that could draw.
         json: One JSON object a line on stdout, nothing for people.
-        half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
+        half_widths: Returns half of the 95 % interval of each channel's newest estimate, SI.
         footer: Available keys.
         help: What the keys do, a line each.
         keys: Keys of the display; None without.
@@ -29,7 +29,7 @@ class ShowOptions:
     lever_m: float = 0.012
     plain: bool = False
     json: bool = False
-    half_widths: Mapping[str, float] = field(default_factory=dict)
+    half_widths: Callable[[], Mapping[str, float]] = dict
     footer: str = "Ctrl-C quits"
     help: str = ""
     keys: DisplayKeys | None = None
@@ -53,4 +53,10 @@ class ShowOptions:
         """Return the options of a display with keys, each with its word and what it does."""
         if keys is None:
             return self
-        return replace(self, footer=in_a_line(words), help=in_a_list(words), keys=keys)
+        does = (f"{key:>5}  {what}" for key, (_, what) in words.items())
+        return replace(self, footer=in_a_line(words), help="\n".join(does), keys=keys)
+
+
+def in_a_line(keys: Mapping[str, tuple[str, str]]) -> str:
+    """Return keys with their words."""
+    return "  ".join(f"{key} {word}" for key, (word, _) in keys.items())

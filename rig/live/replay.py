@@ -2,16 +2,15 @@
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.channels import ESTIMATED
 from estimation.recording import Flag, Recording
 from rig.errors import DataError, UsageError
 from rig.live.block import DeviceStatus, FloatArray, SampleBlock
+from rig.live.estimator import ModelEstimator
 from rig.live.keys import LEAVE, OF_DISPLAY, Keys, no_keys
 
 OF_REPLAY = {
@@ -28,24 +27,9 @@ SHORTEST_WAIT_S, LONGEST_WAIT_S = 1e-4, 0.1
 """A shorter wait is none; keys are read at least as often as the longer one."""
 
 
-class EstimateStream(Protocol):
-    """A causal estimator in the middle of a stream."""
-
-    @property
-    def target_channel(self) -> str:
-        """The channel it estimates."""
-
-    @property
-    def inside(self) -> NDArray[np.bool_] | None:
-        """Which of the last samples lay in the fitted range, shape (n,); None if none is known."""
-
-    def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
-        """Return the estimate of the next samples, shape (n,), and keep the final state."""
-
-
 def replay_blocks(
     recording: Recording,
-    estimators: Sequence[EstimateStream],
+    estimators: Sequence[ModelEstimator],
     speed: float | None,
     block_s: float = 0.05,
     pace: "Pace | None" = None,
@@ -75,7 +59,7 @@ def replay_blocks(
 
 def _blocks(
     recording: Recording,
-    estimators: Sequence[EstimateStream],
+    estimators: Sequence[ModelEstimator],
     pace: "Pace",
     block_s: float,
 ) -> Iterator[SampleBlock]:
@@ -161,13 +145,6 @@ class Pace:
                 self._skip_to_s = time_s + SKIP_S
             elif key in "+-" and self._speed is not None:
                 self._speed *= 2.0 if key == "+" else 0.5
-
-
-def within_range(estimator: EstimateStream, estimate: FloatArray) -> FloatArray:
-    """Return the estimate of the last samples, NaN outside the estimator's range, shape (n,)."""
-    if estimator.inside is None:
-        return estimate
-    return np.where(estimator.inside, estimate, np.nan)
 
 
 def lost_samples(recording: Recording) -> FloatArray:

@@ -12,9 +12,9 @@ from estimation.channels import ESTIMATED, unit_of
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
-from rig.live.calibration_status import CalibrationStatus
+from rig.live.estimator import ModelEstimator, within_range
 from rig.live.keys import LEAVE, MARK, RECORD, STOP, TARE, Keys, no_keys
-from rig.live.replay import EstimateStream, within_range
+from rig.live.status import CalibrationStatus
 from rig.machines.reading import Reading
 from rig.protocols.protocol import Plan
 from rig.recording.recorder import LiveRecorder
@@ -26,7 +26,7 @@ def session_blocks(
     config: Config,
     open_transport: Callable[[], Transport],
     plans: Sequence[Plan],
-    estimators: Sequence[EstimateStream],
+    estimators: Sequence[ModelEstimator],
     keys: Keys = no_keys,
     folder: Path = Path("logs"),
 ) -> Iterator[SampleBlock]:
@@ -51,18 +51,25 @@ def session_blocks(
         named = dict.fromkeys(f"{ESTIMATED}{one.target_channel}" for one in estimators)
         with closing(_Hand(session, keys, LiveRecorder(session, folder, further=[*named]))) as hand:
             for reading in _readings(session, plans, hand):
-                block = _block(session, reading, estimators)
-                estimated = {
-                    f"{ESTIMATED}{e.target_channel}": within_range(
-                        e, block.estimates[e.target_channel]
-                    )
-                    for e in estimators
-                }
-                hand.obey(replace(reading, columns={**reading.columns, **estimated}))
+                estimates, recorded = {}, {**reading.columns}
+                for one in estimators:
+                    estimate = one.push(reading.columns, reading.time_s)
+                    estimates[one.target_channel] = estimate
+                    recorded[f"{ESTIMATED}{one.target_channel}"] = within_range(one, estimate)
+                logger = _logger_status(session, reading)
+                limits = _limits(session, reading)
+                hand.obey(replace(reading, columns=recorded))
                 if hand.leaves:
                     return
-                said = (*block.devices, calibrations.of(reading), *hand.status())
-                yield replace(block, devices=said)
+                yield SampleBlock(
+                    reading.time_s,
+                    reading.columns,
+                    reading.flags,
+                    estimates,
+                    reading.lost,
+                    (logger, calibrations.of(reading), *hand.status()),
+                    limits,
+                )
 
 
 class _Hand:
@@ -128,21 +135,6 @@ def _readings(session: Session, plans: Sequence[Plan], hand: _Hand) -> Iterator[
                 yield from session.watch()
     if not plans:
         yield from session.watch()
-
-
-def _block(session: Session, reading: Reading, estimators: Sequence[EstimateStream]) -> SampleBlock:
-    estimates = {}
-    for estimator in estimators:
-        estimates[estimator.target_channel] = estimator.push(reading.columns, reading.time_s)
-    return SampleBlock(
-        reading.time_s,
-        reading.columns,
-        reading.flags,
-        estimates,
-        reading.lost,
-        (_logger_status(session, reading),),
-        _limits(session, reading),
-    )
 
 
 def _logger_status(session: Session, reading: Reading) -> DeviceStatus:

@@ -4,6 +4,7 @@ No input or output and no clock but the device's, so every number here is tested
 """
 
 import math
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -14,7 +15,6 @@ from estimation.channels import unit_of
 from estimation.recording import Flag
 from rig.errors import ExitCode
 from rig.live.block import DeviceStatus, FloatArray, LimitStatus, SampleBlock
-from rig.live.window import Window
 
 BIN_S = 0.02
 VALUE_S = 0.1
@@ -22,11 +22,12 @@ VALUE_S = 0.1
 RATE_S = 2.0
 ERROR_S = 5.0
 TRACE_S = 10.0
+BINS = round(TRACE_S / BIN_S)
 SILENT_BLOCKS = 2
 """After this many consecutive blocks without samples, the last value is out of date."""
 
 FLAGS = tuple(flag for flag in Flag if flag)
-RECEIVED, ROWS, FIRST_FLAG = 0, 1, 2
+RECEIVED, FIRST_FLAG = 0, 1
 FIRST_CHANNEL = FIRST_FLAG + len(FLAGS)
 ESTIMATE, SENSOR, SQUARED_ERROR = range(3)
 
@@ -68,6 +69,16 @@ class Reading:
     error_rms: float | None
     estimate_trace: FloatArray
     sensor_trace: FloatArray
+
+    @property
+    def source(self) -> str:
+        """Where the main value is from: the estimate, or the sensor where nothing estimates it."""
+        return "estimate" if self.has_estimator else "sensor"
+
+    @property
+    def main(self) -> Value:
+        """The main value."""
+        return self.estimate if self.has_estimator else self.sensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +152,7 @@ class LiveState:
         """
         self.channels = channels
         self._takes_all = all_columns
-        self._window = Window(FIRST_CHANNEL + 3 * len(channels), TRACE_S, BIN_S)
+        self._held: deque[tuple[FloatArray, FloatArray]] = deque()
         self._time_s: float | None = None
         self._last: SampleBlock | None = None
         self._estimated: frozenset[str] = frozenset()
@@ -155,11 +166,6 @@ class LiveState:
         self._inside_squared = 0.0
         self._inside_samples = 0
 
-    @property
-    def time_s(self) -> float | None:
-        """Device time of the newest sample, or None before the first."""
-        return self._time_s
-
     def feed(self, block: SampleBlock) -> None:
         """Take in one block; where time runs backwards, a device restarted and so do the traces."""
         self._last = block
@@ -169,16 +175,17 @@ class LiveState:
         if self._takes_all:
             self._takes_all = False
             self.channels = tuple(dict.fromkeys((*self.channels, *block.columns)))
-            self._window = Window(FIRST_CHANNEL + 3 * len(self.channels), TRACE_S, BIN_S)
         self._estimated, self._sensed = frozenset(block.estimates), frozenset(block.columns)
         first_s, last_s = float(block.time_s[0]), float(block.time_s[-1])
         if self._time_s is not None and first_s <= self._time_s:
-            self._window.clear()
+            self._held.clear()
             self._time_s = None
         self._duration_s += last_s - (first_s if self._time_s is None else self._time_s)
         self._time_s = last_s
         signals = self._signals(block)
-        self._window.add(block.time_s, signals)
+        self._held.append((block.time_s, signals))
+        while last_s - self._held[0][0][-1] > TRACE_S:
+            self._held.popleft()
         self._samples += int(np.isfinite(signals[RECEIVED]).sum())
         self._flagged += np.isfinite(signals[FIRST_FLAG:FIRST_CHANNEL]).sum(axis=1)
         squared = self._squared_error_of(block)
@@ -190,11 +197,11 @@ class LiveState:
             self._inside_samples += int(np.isfinite(squared[inside]).sum())
 
     def _signals(self, block: SampleBlock) -> FloatArray:
-        """Return the values of a block for the window, shape (signals, n), NaN where missing."""
+        """Return the signals of a block, shape (signals, n), NaN where missing."""
         nan = np.full(len(block), np.nan)
         valid = block.flags == 0
         received = (block.flags & Flag.MISSING) == 0
-        rows = [np.where(received, block.time_s, nan), np.ones(len(block))]
+        rows = [np.where(received, block.time_s, nan)]
         rows += [np.where(block.flags & flag, 1.0, nan) for flag in FLAGS]
         for channel in self.channels:
             estimate = np.where(valid, block.estimates.get(channel, nan), nan)
@@ -211,16 +218,25 @@ class LiveState:
 
     def snapshot(self) -> Snapshot:
         """Return the picture of now."""
-        last = self._last
+        last, seen = self._last, self._recent()
         return Snapshot(
             time_s=self._time_s,
             samples=self._samples,
             lost=last.lost if last is not None else 0,
-            sample_rate_hz=self._sample_rate_hz(),
-            flagged=_named(self._window.count[FIRST_FLAG:FIRST_CHANNEL].sum(axis=1)),
-            readings=tuple(self._reading(index) for index in range(len(self.channels))),
+            sample_rate_hz=seen.rate_hz(),
+            flagged=_named(seen.flags(TRACE_S)),
+            readings=tuple(self._reading(index, seen) for index in range(len(self.channels))),
             devices=last.devices if last is not None else (),
             limits=last.limits if last is not None else (),
+        )
+
+    def _recent(self) -> "Recent":
+        if not self._held:
+            rows = FIRST_CHANNEL + 3 * len(self.channels)
+            return Recent(np.empty(0), np.empty((rows, 0)))
+        return Recent(
+            np.concatenate([time_s for time_s, _ in self._held]),
+            np.concatenate([signals for _, signals in self._held], axis=1),
         )
 
     def summary(self, ended: str) -> Summary:
@@ -239,38 +255,27 @@ class LiveState:
             inside_samples=known,
         )
 
-    def _sample_rate_hz(self) -> float | None:
-        part = self._window.recent(RATE_S)
-        received = int(self._window.count[RECEIVED, part].sum())
-        if received < 2:
-            return None
-        first_s = np.nanmin(self._window.low[RECEIVED, part])
-        last_s = np.nanmax(self._window.high[RECEIVED, part])
-        return float((received - 1) / (last_s - first_s))
-
-    def _reading(self, index: int) -> Reading:
+    def _reading(self, index: int, seen: "Recent") -> Reading:
         channel = self.channels[index]
         row = FIRST_CHANNEL + 3 * index
-        window = self._window
-        part = window.recent(ERROR_S)
         has_range = self._last is not None and channel in self._last.inside
         beyond = "outside what it was fitted on" if has_range else "not a number"
-        errors = int(window.count[row + SQUARED_ERROR, part].sum())
-        squared = float(window.total[row + SQUARED_ERROR, part].sum())
+        squared = seen.last(ERROR_S, row + SQUARED_ERROR)
+        squared = squared[np.isfinite(squared)]
+        no_estimate = "" if channel in self._estimated else "no estimator"
+        no_sensor = "" if channel in self._sensed else "no sensor"
         return Reading(
             channel=channel,
             unit=unit_of(channel),
             has_estimator=channel in self._estimated,
-            estimate=self._value(
-                row + ESTIMATE, "" if channel in self._estimated else "no estimator", beyond
-            ),
-            sensor=self._value(row + SENSOR, "" if channel in self._sensed else "no sensor"),
-            error_rms=math.sqrt(squared / errors) if errors else None,
-            estimate_trace=np.stack([window.low[row + ESTIMATE], window.high[row + ESTIMATE]]),
-            sensor_trace=np.stack([window.low[row + SENSOR], window.high[row + SENSOR]]),
+            estimate=self._value(seen, row + ESTIMATE, no_estimate, beyond),
+            sensor=self._value(seen, row + SENSOR, no_sensor, "not a number"),
+            error_rms=math.sqrt(squared.mean()) if squared.size else None,
+            estimate_trace=seen.trace(row + ESTIMATE),
+            sensor_trace=seen.trace(row + SENSOR),
         )
 
-    def _value(self, row: int, absent: str, otherwise: str = "not a number") -> Value:
+    def _value(self, seen: "Recent", row: int, absent: str, otherwise: str) -> Value:
         """Return the mean of the last 0.1 s, or why there is none.
 
         A mean over less than half of the samples would stand for the time when all was well, not
@@ -280,13 +285,59 @@ class LiveState:
             return Value(None, "no samples arriving")
         if absent:
             return Value(None, absent)
-        part = self._window.recent(VALUE_S)
-        rows = int(self._window.count[ROWS, part].sum())
-        usable = int(self._window.count[row, part].sum())
-        if 2 * usable >= rows:
-            return Value(float(self._window.total[row, part].sum()) / usable)
-        seen = _named(self._window.count[FIRST_FLAG:FIRST_CHANNEL, part].sum(axis=1))
-        return Value(None, ", ".join(seen) or otherwise)
+        values = seen.last(VALUE_S, row)
+        usable = values[np.isfinite(values)]
+        if 2 * usable.size >= values.size:
+            return Value(float(usable.mean()))
+        return Value(None, ", ".join(_named(seen.flags(VALUE_S))) or otherwise)
+
+
+class Recent:
+    """The samples of the last 10 s.
+
+    Args:
+        time_s: Device time, shape (n,).
+        signals: Time where received, 1 where flagged, values; shape (signals, n), NaN elsewhere.
+    """
+
+    def __init__(self, time_s: FloatArray, signals: FloatArray) -> None:
+        self._time_s, self._signals = time_s, signals
+        bins = np.floor(time_s / BIN_S).astype(np.int64)
+        bins = bins - bins[-1:] + BINS - 1
+        self._first = np.flatnonzero(np.diff(bins, prepend=-1))
+        self._bins = bins[self._first]
+
+    def last(self, span_s: float, row: int | slice) -> FloatArray:
+        """Return the last samples of a signal, or of several."""
+        if not self._time_s.size:
+            return self._signals[row]
+        since_s = self._time_s[-1] - span_s + 1e-9
+        return self._signals[row, np.searchsorted(self._time_s, since_s) :]
+
+    def flags(self, span_s: float) -> NDArray[np.int64]:
+        """Return on how many of the last samples each flag was seen."""
+        seen = np.isfinite(self.last(span_s, slice(FIRST_FLAG, FIRST_CHANNEL)))
+        counts: NDArray[np.int64] = seen.sum(axis=1)
+        return counts
+
+    def rate_hz(self) -> float | None:
+        """Return the rate of the samples received in the last 2 s."""
+        received = self.last(RATE_S, RECEIVED)
+        received = received[np.isfinite(received)]
+        if received.size < 2:
+            return None
+        return float((received.size - 1) / (received[-1] - received[0]))
+
+    def trace(self, row: int) -> FloatArray:
+        """Return the least and the greatest value of each bin, shape (2, bins)."""
+        shown = np.full((2, BINS), np.nan)
+        inside = self._bins >= 0
+        if inside.any():
+            for side, extreme in enumerate((np.fmin, np.fmax)):
+                shown[side, self._bins[inside]] = extreme.reduceat(self._signals[row], self._first)[
+                    inside
+                ]
+        return shown
 
 
 def _named(counts: NDArray[np.int64]) -> dict[str, int]:

@@ -4,10 +4,12 @@ SI ends here: torque is shown in mN m and angles in degrees, to people only.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from estimation.channels import describe
 from rig.live.block import LimitStatus
+from rig.live.options import ShowOptions
 from rig.live.state import Reading, Snapshot, Summary, Value
 
 SHOWN = {"N m": (1e3, "mN m", 1), "rad": (180 / math.pi, "deg", 2), "N": (1.0, "N", 2)}
@@ -66,28 +68,27 @@ def with_unit(value: Value, unit: str) -> str:
     return f"{number} {in_shown_unit(unit)[1]}"
 
 
-def main_value(reading: Reading) -> tuple[str, Value]:
-    """Return the main value of the display: the estimate, or the sensor without an estimate."""
-    if reading.has_estimator:
-        return "estimate", reading.estimate
-    return "sensor", reading.sensor
-
-
-def tip_force_n(reading: Reading, value: Value, lever_m: float) -> float | None:
+def tip_force_n(reading: Reading, lever_m: float) -> float | None:
     """Return the force at the jaw tip, N, or None without a value or a lever.
 
     Grip force is jaw torque over the lever arm (O'Neill et al. 2018 measured 12 mm).
     """
-    if reading.channel != TIP_CHANNEL or value.number is None:
+    if reading.channel != TIP_CHANNEL or reading.main.number is None:
         return None
-    return value.number / lever_m
+    return reading.main.number / lever_m
 
 
-def interval(half_width: float | None, unit: str) -> str:
+def main_words(reading: Reading, options: ShowOptions) -> str:
+    """Return the main value with its unit, an estimate with its 95 % interval where it is known."""
+    return f"{with_unit(reading.main, reading.unit)}{interval(reading, options, ' ±')}"
+
+
+def interval(reading: Reading, options: ShowOptions, sign: str = "±") -> str:
     """Return the 95 % interval of an estimate in words; empty where it is not known."""
-    if half_width is None:
+    half_width = options.half_widths().get(reading.channel)
+    if not reading.has_estimator or reading.main.number is None or half_width is None:
         return ""
-    return f" ±{with_unit(Value(half_width), unit)}"
+    return f"{sign}{with_unit(Value(half_width), reading.unit)}"
 
 
 def error_rms(reading: Reading) -> str:
@@ -95,6 +96,21 @@ def error_rms(reading: Reading) -> str:
     if reading.error_rms is None:
         return "error unknown"
     return f"error rms {with_unit(Value(reading.error_rms), reading.unit)} in 5 s"
+
+
+def notes(reading: Reading, options: ShowOptions) -> Iterator[str]:
+    """Yield three notes on the main number: the force at the tip, the sensor, the error."""
+    force_n = tip_force_n(reading, options.lever_m)
+    lever = f"at the jaw tip (lever {options.lever_m * 1e3:g} mm)"
+    if reading.channel != TIP_CHANNEL:
+        yield ""
+    else:
+        yield f"no force {lever}" if force_n is None else f"{force_n:.2f} N {lever}"
+    if not reading.has_estimator:
+        yield from ("no estimator", "")
+        return
+    yield f"sensor {with_unit(reading.sensor, reading.unit)}"
+    yield error_rms(reading)
 
 
 def rate(snapshot: Snapshot) -> str:
@@ -122,19 +138,16 @@ def limit_share(limit: LimitStatus) -> float | None:
     return share if math.isfinite(share) else None
 
 
-def limit_style(share: float | None) -> str:
-    """Return the style of a limit by the share of it that is used."""
-    return "bad" if share is None or share >= 1 else "warning" if share >= 0.8 else "good"
-
-
-def limit_words(limit: LimitStatus) -> str:
-    """Return a limit in numbers, with a word when it is near or reached."""
+def limit_words(limit: LimitStatus) -> tuple[str, str]:
+    """Return a limit in numbers, with a word when it is near or reached, and its style."""
     share = limit_share(limit)
     most = with_unit(Value(limit.limit), limit.unit)
     if share is None:
-        return f"no value, limit {most}"
-    word = " AT LIMIT" if share >= 1 else " near" if share >= 0.8 else ""
-    return f"{digits(Value(limit.value), limit.unit)} of {most}, {100 * share:.0f} %{word}"
+        return f"no value, limit {most}", "bad"
+    text = f"{digits(Value(limit.value), limit.unit)} of {most}, {100 * share:.0f} %"
+    if share >= 1:
+        return f"{text} AT LIMIT", "bad"
+    return (f"{text} near", "warning") if share >= 0.8 else (text, "good")
 
 
 def summary_lines(summary: Summary, unit: str) -> list[str]:
@@ -158,3 +171,59 @@ def summary_lines(summary: Summary, unit: str) -> list[str]:
             f"{summary.inside_samples} of these samples."
         )
     return lines
+
+
+def plain_line(snapshot: Snapshot, options: ShowOptions) -> str:
+    """Return one line on a snapshot, for logs and for terminals that cannot draw."""
+    parts = ["no samples yet" if snapshot.time_s is None else f"{snapshot.time_s:8.1f} s"]
+    for reading in snapshot.readings:
+        shown = main_words(reading, options)
+        parts.append(f"{name_of(reading.channel)}, {reading.source} {shown}")
+        force_n = tip_force_n(reading, options.lever_m)
+        if force_n is not None:
+            parts.append(f"{force_n:.2f} N at {options.lever_m * 1e3:g} mm")
+        if reading.has_estimator:
+            parts.append(f"sensor {with_unit(reading.sensor, reading.unit)}")
+            parts.append(error_rms(reading))
+    parts += [rate(snapshot), lost(snapshot.lost, snapshot.samples)]
+    parts += [f"{device.name} {device.state}" for device in snapshot.devices]
+    limits = {limit.name: limit_words(limit) for limit in snapshot.limits}
+    parts += [f"{name} {text}" for name, (text, style) in limits.items() if style != "good"]
+    parts += [f"flagged: {flagged(snapshot.flagged)}"] if snapshot.flagged else []
+    return " | ".join(parts)
+
+
+def json_frame(snapshot: Snapshot, options: ShowOptions) -> dict[str, Any]:
+    """Return a snapshot as plain types, SI units.
+
+    `channels` maps each watched channel to its values; a value that is null has its reason next
+    to it. Traces are left out: the reader has every frame.
+    """
+    return {
+        "kind": "frame",
+        "time_s": snapshot.time_s,
+        "samples": snapshot.samples,
+        "lost": snapshot.lost,
+        "sample_rate_hz": snapshot.sample_rate_hz,
+        "flagged": snapshot.flagged,
+        "lever_m": options.lever_m,
+        "estimate_half_width95": options.half_widths().get(snapshot.readings[0].channel),
+        "channels": {r.channel: _json_reading(r, options) for r in snapshot.readings},
+        "devices": snapshot.devices,
+        "limits": snapshot.limits,
+    }
+
+
+def _json_reading(reading: Reading, options: ShowOptions) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "unit": reading.unit,
+        "estimate": reading.estimate.number,
+        "estimate_missing": reading.estimate.missing or None,
+        "sensor": reading.sensor.number,
+        "sensor_missing": reading.sensor.missing or None,
+        "error_rms": reading.error_rms,
+    }
+    if reading.channel == TIP_CHANNEL:
+        force_n = tip_force_n(reading, options.lever_m)
+        found |= {"tip_force_n": force_n, "tip_force_from": reading.source}
+    return found | {"half_width95": options.half_widths().get(reading.channel)}

@@ -1,7 +1,7 @@
 """The text of the display: lines made from one snapshot, for any terminal size."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console, ConsoleOptions, RenderResult
@@ -9,9 +9,9 @@ from rich.text import Text
 
 from rig.live import text as words
 from rig.live.block import DeviceStatus, FloatArray, LimitStatus
-from rig.live.digits import big
+from rig.live.options import ShowOptions
 from rig.live.sparkline import round_scale, sparkline
-from rig.live.state import TRACE_S, Reading, Snapshot, Value
+from rig.live.state import TRACE_S, Reading, Snapshot
 
 # The palette of Okabe and Ito (2008), distinguishable by every kind of colour vision; each
 # style also has a word or a symbol.
@@ -23,6 +23,22 @@ STYLES = {
     "good": "#009E73",
     "warning": "bold #E69F00",
     "bad": "bold #D55E00",
+}
+
+# digits three lines high, to be read from the other side of the bench
+GLYPHS = {
+    "0": ("█▀█", "█ █", "▀▀▀"),
+    "1": ("▀█ ", " █ ", "▀▀▀"),
+    "2": ("▀▀█", "█▀▀", "▀▀▀"),
+    "3": ("▀▀█", " ▀█", "▀▀▀"),
+    "4": ("█ █", "▀▀█", "  ▀"),
+    "5": ("█▀▀", "▀▀█", "▀▀▀"),
+    "6": ("█▀▀", "█▀█", "▀▀▀"),
+    "7": ("▀▀█", "  █", "  ▀"),
+    "8": ("█▀█", "█▀█", "▀▀▀"),
+    "9": ("█▀█", "▀▀█", "▀▀▀"),
+    "-": ("  ", "▀▀", "  "),
+    ".": (" ", " ", "▀"),
 }
 
 WIDE = 64
@@ -41,17 +57,11 @@ class View:
 
     Attributes:
         snapshot: Content of the display.
-        title: Title: a session's or a recording's name.
-        lever_m: Lever arm from the jaw's axis to its tip, m.
-        footer: Available keys, in one line or more.
-        half_widths: Half of the 95 % interval of each channel's estimate, SI, where it is known.
+        options: How it is shown.
     """
 
     snapshot: Snapshot
-    title: str
-    lever_m: float
-    footer: str = "Ctrl-C quits"
-    half_widths: Mapping[str, float] = field(default_factory=dict)
+    options: ShowOptions
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield one line of text after the other, none wider than the terminal."""
@@ -65,15 +75,15 @@ class View:
         """Return the display's lines, at most `height` of them if the terminal is not tiny."""
         snapshot, main = self.snapshot, self.snapshot.readings[0]
         above = [
-            _header(snapshot, self.title, width),
-            *_headline(main, self.lever_m, width, self.half_widths.get(main.channel)),
+            _header(snapshot, self.options.title, width),
+            *_headline(main, self.options, width),
         ]
-        above += [_other(r, self.half_widths.get(r.channel)) for r in snapshot.readings[1:]]
+        above += [_other(reading, self.options) for reading in snapshot.readings[1:]]
         if snapshot.flagged:
             seen = words.flagged(snapshot.flagged)
             above.append(_styled(f"▲ flagged in {TRACE_S:g} s: {seen}", "warning"))
         below = [_device(device) for device in snapshot.devices]
-        footer = [_styled(line, "quiet") for line in self.footer.splitlines()]
+        footer = [_styled(line, "quiet") for line in self.options.footer.splitlines()]
         room = max(height - len(above) - len(below) - len(footer) - LEAST_TRACES, 1)
         below += list(_limits(snapshot.limits, width, room))
         below += footer
@@ -98,24 +108,17 @@ def _header(snapshot: Snapshot, title: str, width: int) -> Text:
     return line
 
 
-def _headline(
-    reading: Reading, lever_m: float, width: int, half_width: float | None = None
-) -> Iterator[Text]:
+def _headline(reading: Reading, options: ShowOptions, width: int) -> Iterator[Text]:
     """Yield the main number in large digits, and what belongs to it."""
-    source, value = words.main_value(reading)
+    source, digits = reading.source, words.digits(reading.main, reading.unit)
     name = _styled(f"{words.name_of(reading.channel)}, {source}  ", "title")
-    style = STYLES["warning"] if value.number is None else STYLES[source]
-    shown = words.with_unit(value, reading.unit)
-    if source == "estimate" and value.number is not None:
-        shown += words.interval(half_width, reading.unit)
-    number = Text(shown, style=style, no_wrap=True)
+    number = _styled(words.main_words(reading, options), "warning" if digits is None else source)
     if name.cell_len + number.cell_len <= width:
         yield name.append_text(number)
     else:
         yield from (name, number)
-    digits = words.digits(value, reading.unit)
-    large = big(digits) if digits is not None else ["", "  ▀▀▀ ▀▀▀ ▀▀▀", ""]
-    notes = list(beside(reading, source, value, lever_m))
+    large = ["", "  ▀▀▀ ▀▀▀ ▀▀▀", ""] if digits is None else big(digits)
+    notes = list(words.notes(reading, options))
     if width < WIDE:
         yield from (_styled(line, source) for line in large)
         yield from (_styled(line) for line in notes if line)
@@ -125,30 +128,17 @@ def _headline(
         yield _styled(f"{line:<24}", source).append(note, style="default")
 
 
-def beside(reading: Reading, source: str, value: Value, lever_m: float) -> Iterator[str]:
-    """Yield three notes on the main number: the force at the tip, the sensor, the error."""
-    force_n = words.tip_force_n(reading, value, lever_m)
-    if reading.channel != words.TIP_CHANNEL:
-        yield ""
-    elif force_n is None:
-        yield f"no force at the jaw tip (lever {lever_m * 1e3:g} mm)"
-    else:
-        yield f"{force_n:.2f} N at the jaw tip (lever {lever_m * 1e3:g} mm)"
-    if source == "sensor":
-        yield from ("no estimator", "")
-        return
-    yield f"sensor {words.with_unit(reading.sensor, reading.unit)}"
-    yield words.error_rms(reading)
+def big(number: str) -> list[str]:
+    """Return three lines that spell a number of digits, a minus and a point."""
+    glyphs = [GLYPHS[character] for character in number]
+    return [" ".join(glyph[line] for glyph in glyphs) for line in range(3)]
 
 
-def _other(reading: Reading, half_width: float | None) -> Text:
+def _other(reading: Reading, options: ShowOptions) -> Text:
     """Return one line on a quantity that is not the main one."""
-    source, value = words.main_value(reading)
-    line = _styled(f"{words.name_of(reading.channel)}, {source} ")
-    line.append(words.with_unit(value, reading.unit), style=STYLES[source])
-    if source == "estimate" and value.number is not None:
-        line.append(words.interval(half_width, reading.unit), style=STYLES[source])
-    if source == "estimate":
+    line = _styled(f"{words.name_of(reading.channel)}, {reading.source} ")
+    line.append(words.main_words(reading, options), style=STYLES[reading.source])
+    if reading.has_estimator:
         line.append(f", sensor {words.with_unit(reading.sensor, reading.unit)}")
     return line
 
@@ -194,23 +184,23 @@ def _limits(limits: Sequence[LimitStatus], width: int, room: int) -> Iterator[Te
     if len(limits) <= room:
         yield from (_limit(limit, width) for limit in limits)
         return
-    nearest = sorted(limits, key=lambda limit: -_urgency(words.limit_share(limit)))[: room - 1]
+    nearest = sorted(limits, key=_share, reverse=True)[: room - 1]
     yield from (_limit(limit, width) for limit in limits if limit in nearest)
     yield _styled(f"{len(limits) - len(nearest)} more limits, none nearer", "quiet")
 
 
-def _urgency(share: float | None) -> float:
+def _share(limit: LimitStatus) -> float:
     """Return a rank: a limit with an unknown share comes first."""
+    share = words.limit_share(limit)
     return np.inf if share is None else share
 
 
 def _limit(limit: LimitStatus, width: int) -> Text:
     """Return a limit as a bar and in numbers; the bar gives way in a narrow terminal."""
-    share = words.limit_share(limit)
-    style = words.limit_style(share)
+    text, style = words.limit_words(limit)
     line = _styled(f"{limit.name} ")
     if width >= WIDE:
-        filled = round(20 * min(share or 0.0, 1.0))
+        filled = round(20 * min(words.limit_share(limit) or 0.0, 1.0))
         line.truncate(20, overflow="ellipsis", pad=True)
         line.append("█" * filled + "░" * (20 - filled), style=STYLES[style]).append(" ")
-    return line.append(words.limit_words(limit), style=STYLES[style] if style != "good" else "")
+    return line.append(text, style=STYLES[style] if style != "good" else "")

@@ -1,6 +1,5 @@
 """The live stream as frames of a page in a browser."""
 
-from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +8,9 @@ import numpy as np
 from estimation.channels import UnknownUnitError, unit_of
 from rig.errors import MissingExtraError
 from rig.live import text as words
-from rig.live.block import FloatArray, LimitStatus, SampleBlock
+from rig.live.block import FloatArray, LimitStatus, SampleBlock, joined
 from rig.live.options import ShowOptions
 from rig.live.state import LiveState, Snapshot
-from rig.live.view import beside
 
 if TYPE_CHECKING:
     from rig.live.web_server import PageServer
@@ -42,51 +40,44 @@ def open_page(host: str, port: int) -> "PageServer":
     return PageServer(host, port)
 
 
-def shown_on(
-    page: "PageServer", blocks: Iterator[SampleBlock], options: ShowOptions
-) -> Iterator[SampleBlock]:
-    """Yield blocks as they come, and send ten frames a second of device time to the page.
+class WebView:
+    """Sends a stream to the page: ten frames a second of device time.
 
     The page answers from the first block on, so that its stop button never does nothing.
 
     Args:
-        page: The server; closed on the way out.
-        blocks: The stream; closed on the way out.
+        page: The server.
         options: What the display shows.
     """
-    state = LiveState(options.channels)
-    held: list[SampleBlock] = []
-    try:
-        for block in blocks:
-            page.start()
-            state.feed(block)
-            if len(block):
-                held.append(block)
-            if _span_s(held) >= FRAME_S:
-                page.send(frame(state.snapshot(), options) | {"traces": traces(held)})
-                held = []
-            yield block
-    finally:
-        close = getattr(blocks, "close", None)
-        if close is not None:
-            close()
-        page.close()
+
+    def __init__(self, page: "PageServer", options: ShowOptions) -> None:
+        self._page, self._options = page, options
+        self._state = LiveState(options.channels)
+        self._held: list[SampleBlock] = []
+
+    def show(self, block: SampleBlock) -> None:
+        """Take a block, and send a frame whenever there is enough for one."""
+        self._page.start()
+        self._state.feed(block)
+        if len(block):
+            self._held.append(block)
+        if _span_s(self._held) >= FRAME_S:
+            shown = frame(self._state.snapshot(), self._options)
+            self._page.send(shown | {"traces": traces(self._held)})
+            self._held = []
 
 
 def frame(snapshot: Snapshot, options: ShowOptions) -> dict[str, Any]:
     """Return the content of the page, in the words of the terminal's display."""
     main = snapshot.readings[0]
-    source, value = words.main_value(main)
-    estimated = source == "estimate" and value.number is not None
-    half_width = options.half_widths.get(main.channel) if estimated else None
     return {
         "title": options.title,
-        "name": f"{words.name_of(main.channel)}, {source}",
-        "number": words.digits(value, main.unit),
-        "missing": value.missing,
+        "name": f"{words.name_of(main.channel)}, {main.source}",
+        "number": words.digits(main.main, main.unit),
+        "missing": main.main.missing,
         "unit": words.in_shown_unit(main.unit)[1],
-        "interval": words.interval(half_width, main.unit).strip(),
-        "beside": [note for note in beside(main, source, value, options.lever_m) if note],
+        "interval": words.interval(main, options),
+        "beside": [note for note in words.notes(main, options) if note],
         "main": main.channel,
         "time": "" if snapshot.time_s is None else f"{snapshot.time_s:.1f} s",
         "rate": words.rate(snapshot),
@@ -109,16 +100,9 @@ def traces(blocks: list[SampleBlock]) -> dict[str, Any]:
     """
     valid = np.concatenate([block.flags for block in blocks]) == 0
     time_s = np.concatenate([block.time_s for block in blocks])
-    columns = {
-        name: np.concatenate([block.columns[name] for block in blocks])
-        for name in blocks[0].columns
-        if all(name in block.columns for block in blocks)
-    }
-    columns |= {
-        f"{name}, estimate": np.concatenate([block.estimates[name] for block in blocks])
-        for name in blocks[0].estimates
-        if all(name in block.estimates for block in blocks)
-    }
+    columns = joined([block.columns for block in blocks])
+    estimates = joined([block.estimates for block in blocks])
+    columns |= {f"{name}, estimate": values for name, values in estimates.items()}
     units = {name: _unit(name.removesuffix(", estimate")) for name in columns}
     pieces = np.array_split(time_s, PIECES)
     return {
@@ -156,10 +140,6 @@ def _unit(channel: str) -> tuple[float, str]:
 
 
 def _limit(limit: LimitStatus) -> dict[str, Any]:
-    share = words.limit_share(limit)
-    return {
-        "name": limit.name,
-        "text": words.limit_words(limit),
-        "share": min(share or 0.0, 1.0),
-        "style": words.limit_style(share),
-    }
+    text, style = words.limit_words(limit)
+    share = min(words.limit_share(limit) or 0.0, 1.0)
+    return {"name": limit.name, "text": text, "share": share, "style": style}

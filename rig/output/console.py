@@ -42,6 +42,18 @@ def results(json: bool) -> "Console":
     return screen
 
 
+def present(json: bool, data: Any, *shown: "str | TextTable") -> None:
+    """Show a result: text and tables to people, and with `json` its data on stdout."""
+    screen = results(json)
+    for one in shown:
+        if isinstance(one, str):
+            screen.print(one)
+        else:
+            show_table(screen, one)
+    if json:
+        emit_json(data)
+
+
 def show_table(screen: "Console", table: "TextTable") -> None:
     """Print a table; where the terminal is too narrow for it, a paragraph for each row."""
     from rig.output.table import to_rich
@@ -51,9 +63,12 @@ def show_table(screen: "Console", table: "TextTable") -> None:
     if not screen.is_terminal or screen.measure(whole, options=unlimited).maximum <= screen.width:
         screen.print(whole)
         return
+    rows = []
     for name, *cells in table.rows:
         said = (f"{c} {cell}" for c, cell in zip(table.columns[1:], cells, strict=True) if cell)
-        screen.print(f"{name}: {', '.join(said)}", style="default", soft_wrap=False)
+        rows.append(f"{name}: {', '.join(said)}")
+    for line in filter(None, (table.title, *rows, table.note)):
+        screen.print(line, style="default", soft_wrap=False)
 
 
 def remarks() -> "Console":
@@ -159,7 +174,7 @@ def show_result(
     markdown: Callable[[], str],
     json: bool,
 ) -> None:
-    """Show a result to people, and write it where they asked for a file.
+    """Show lines and tables to people, and write them as Markdown where they asked for a file.
 
     Args:
         lines: Lines printed first.
@@ -172,13 +187,12 @@ def show_result(
         OSError: The file cannot be written.
     """
     from estimation.files import write_text_atomic
-    from rig.output.table import to_rich
 
     screen = results(json)
     for line in lines:
         screen.print(line)
     for table in tables:
-        screen.print(to_rich(table))
+        show_table(screen, table)
     if out is not None:
         write_text_atomic(out, markdown())
         screen.print(f"Markdown: {out}")

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from estimation.files import write_text_atomic
 from estimation.recording import FloatArray
-from rig.output.binning import binned
+from rig.output.charts import binned, thinned
 
 COLOURS = ("#3b7dd8", "#d9822b", "#2e9e6b", "#b04fc4")
 """Told apart in light and in dark, and by eyes that mix up red and green."""
@@ -76,16 +76,11 @@ def _legend_above(ax: Axes) -> None:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=4)
 
 
-def _thin(values: FloatArray) -> FloatArray:
-    return values[:: max(1, -(-len(values) // POINTS))]
-
-
 def over_time(
     time_s: FloatArray,
     series: Mapping[str, FloatArray],
     unit: str,
     caption: str,
-    shaded: np.ndarray | None = None,
 ) -> Markup:
     """Draw signals over time.
 
@@ -94,23 +89,12 @@ def over_time(
         series: Name to values, each of shape (n,); NaN makes a gap.
         unit: Unit of the values.
         caption: Description of the figure, also for readers who cannot see it.
-        shaded: Samples to shade, shape (n,), or None.
     """
     figure, (ax,) = _axes(7.2, 2.6)
     with mpl.rc_context(_STYLE):
-        time = _thin(time_s)
+        time = thinned(time_s, POINTS)
         for colour, (name, values) in zip(COLOURS, series.items(), strict=False):
-            ax.plot(time, _thin(values), color=colour, linewidth=1.1, label=name)
-        if shaded is not None:
-            ax.fill_between(
-                time,
-                0,
-                1,
-                where=_thin(shaded),
-                transform=ax.get_xaxis_transform(),
-                color="#8883",
-                linewidth=0,
-            )
+            ax.plot(time, thinned(values, POINTS), color=colour, linewidth=1.1, label=name)
         ax.set_xlabel("time, s")
         ax.set_ylabel(unit)
         ax.margins(x=0)
@@ -126,49 +110,44 @@ class Panel:
         label: Name and unit of the variable.
         x: The variable, shape (n,).
         y: The values, shape (n,).
-        before: Values to compare with, shape (n,), or None.
+        before: Values to compare with, shape (n,).
     """
 
     label: str
     x: FloatArray
     y: FloatArray
-    before: FloatArray | None = None
+    before: FloatArray
 
 
-def against(panels: Sequence[Panel], y_label: str, caption: str, bins: int = 24) -> Markup:
-    """Draw values against several variables: mean and the middle 90 % in each bin.
+def against(panels: Sequence[Panel], y_label: str, caption: str) -> Markup:
+    """Draw values against several variables: mean and the middle 90 % in each of 24 bins.
+
+    The bins cover the middle 98 % of each variable; those with under ten samples are left out.
 
     Args:
         panels: The panels, side by side, on one scale.
         y_label: Name and unit of the values.
         caption: Description of the figure.
-        bins: Bins over the middle 98 % of each variable; bins with under ten samples are left out.
     """
     figure, axes = _axes(7.2, 2.5, len(panels))
     with mpl.rc_context(_STYLE):
         for ax, panel in zip(axes, panels, strict=True):
             series = [("before", panel.before, COLOURS[1]), ("after", panel.y, COLOURS[0])]
             for name, values, colour in series:
-                if values is not None:
-                    x, mean, low, high = binned(panel.x, values, bins)
-                    ax.fill_between(x, low, high, color=colour, alpha=0.25, linewidth=0)
-                    ax.plot(x, mean, color=colour, linewidth=1.4, label=name)
+                x, mean, low, high = binned(panel.x, values, 24)
+                ax.fill_between(x, low, high, color=colour, alpha=0.25, linewidth=0)
+                ax.plot(x, mean, color=colour, linewidth=1.4, label=name)
             ax.axhline(0, color=_INK, linewidth=0.6)
             ax.set_xlabel(panel.label)
         axes[0].set_ylabel(y_label)
-        if any(panel.before is not None for panel in panels):
-            _legend_above(axes[0])
+        _legend_above(axes[0])
         limits = [ax.get_ylim() for ax in axes]
         for ax in axes:
             ax.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
     return _drawn(figure, caption)
 
 
-def bars(
-    values: Mapping[str, float],
-    unit: str,
-    caption: str,
-) -> Markup:
+def bars(values: Mapping[str, float], unit: str, caption: str) -> Markup:
     """Draw one bar a name.
 
     Args:
@@ -176,40 +155,34 @@ def bars(
         unit: Name and unit of the values.
         caption: Description of the figure.
     """
-    figure, (ax,) = _axes(7.2, 2.2)
-    with mpl.rc_context(_STYLE):
-        ax.bar(range(len(values)), list(values.values()), color=COLOURS[0], width=0.7)
-        many = len(values) > 12
-        names = [name.replace("_", " ") for name in values]
-        ax.set_xticks(range(len(values)), names, rotation=90 if many else 0, fontsize=7)
-        ax.grid(visible=False, axis="x")
-        ax.set_ylabel(unit)
-        ax.margins(x=0.01)
-    return _drawn(figure, caption)
+    named = {name.replace("_", " "): (value,) for name, value in values.items()}
+    return paired_bars(named, ("",), unit, caption)
 
 
 def paired_bars(
-    values: Mapping[str, tuple[float, float]], sides: tuple[str, str], unit: str, caption: str
+    values: Mapping[str, Sequence[float]], sides: Sequence[str], unit: str, caption: str
 ) -> Markup:
-    """Draw two bars a name, side by side.
+    """Draw the bars of each name, side by side.
 
     Args:
-        values: Name to the two values.
-        sides: What the first and the second of them are.
+        values: Name to its values, one a side.
+        sides: What each of the values is.
         unit: Name and unit of the values.
         caption: Description of the figure.
     """
     figure, (ax,) = _axes(7.2, 2.2)
     with mpl.rc_context(_STYLE):
-        place = np.arange(len(values))
+        place, step = np.arange(len(values)), 0.72 / len(sides)
         for k, (side, colour) in enumerate(zip(sides, COLOURS, strict=False)):
-            heights = [pair[k] for pair in values.values()]
-            ax.bar(place + 0.36 * (k - 0.5), heights, color=colour, width=0.34, label=side)
+            at = place + step * (k - (len(sides) - 1) / 2)
+            heights = [own[k] for own in values.values()]
+            ax.bar(at, heights, color=colour, width=0.94 * step, label=side)
         crowded = sum(map(len, values)) > LETTERS
         ax.set_xticks(place, list(values), rotation=90 if crowded else 0, fontsize=7)
         ax.grid(visible=False, axis="x")
         ax.set_ylabel(unit)
-        _legend_above(ax)
+        if len(sides) > 1:
+            _legend_above(ax)
     return _drawn(figure, caption)
 
 

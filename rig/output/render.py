@@ -2,12 +2,9 @@
 
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-
-from estimation.files import write_text_atomic
 
 
 @cache
@@ -33,13 +30,3 @@ def render(template: str, context: Mapping[str, Any]) -> str:
         jinja2.UndefinedError: The template uses a name that the context lacks.
     """
     return _environment().get_template(template).render(context)
-
-
-def write_report(path: Path, page: str) -> Path:
-    """Write a page; an existing one is replaced in one step. Returns the path.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
-    write_text_atomic(path, page)
-    return path

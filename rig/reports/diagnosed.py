@@ -17,12 +17,9 @@ from rig.campaigns.index import DIAGNOSIS, ENDINGS
 from rig.diagnosis.ledger import Ledger, Look
 from rig.diagnosis.run import run_diagnosis
 from rig.diagnosis.subject import subject
-from rig.diagnosis.traces import traces
 from rig.diagnosis.work import Start, for_each
 from rig.errors import RigError
-from rig.output.provenance import Provenance
-from rig.output.render import write_report
-from rig.reports.diagnosis import page
+from rig.reports.diagnosis import page_of
 from rig.reports.diagnosis_words import sentences
 
 
@@ -72,7 +69,7 @@ def diagnose_all(
     def keep(folder: Path, done: FolderDiagnosis) -> None:
         if done.look is not None:
             place = folder / DIAGNOSIS
-            write_report(place.with_suffix(".html"), done.page)
+            write_text_atomic(place.with_suffix(".html"), done.page)
             write_text_atomic(place, json.dumps(done.result, indent=2, allow_nan=False) + "\n")
             looks.enter(done.look)
         on_done(folder, done)
@@ -87,11 +84,10 @@ def diagnose_folder(ledger: Path, folder: Path) -> FolderDiagnosis:
         done, look = run_diagnosis(asked.campaign, asked.models, Ledger(ledger), quick=True)
     except (EstimationError, RigError) as error:
         return FolderDiagnosis(failed=str(error))
-    found = done.diagnosis
     return FolderDiagnosis(
-        tuple(sentences(found)),
-        found.to_json(),
-        page(found, traces(done), Provenance.now(found.sealed.seed)),
+        tuple(sentences(done.diagnosis)),
+        done.diagnosis.to_json(),
+        page_of(done, done.diagnosis.sealed.seed),
         look,
     )
 

@@ -1,12 +1,16 @@
 """A diagnosis as one interactive page: the answer and what to check, the evidence, the method."""
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from estimation.causes.verdict import Answer
 from estimation.diagnosis.result import Diagnosis, Finding, Value
+from estimation.files import write_text_atomic
 from estimation.model import Model
-from rig.diagnosis.traces import Traces
+from rig.diagnosis.traces import Traces, traces
 from rig.output.charts import embedded, scripts
 from rig.output.provenance import Provenance
 from rig.output.render import render
@@ -57,15 +61,15 @@ class Card:
     command: str
 
 
-def page(diagnosis: Diagnosis, traces: Traces, provenance: Provenance) -> str:
+def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
     """Return the page of HTML, which needs nothing outside itself.
 
     Args:
         diagnosis: The answer.
-        traces: The signals of the held-out test runs; an equation without has no signal charts.
+        signals: The signals of the held-out test runs; an equation without has no signal charts.
         provenance: When and from what this was made.
     """
-    drawn = charts(diagnosis, traces)
+    drawn = charts(diagnosis, signals)
     sealed = diagnosis.sealed
     method = (
         f"The model was fitted and searched on {len(sealed.discover)} training runs. The"
@@ -85,7 +89,7 @@ def page(diagnosis: Diagnosis, traces: Traces, provenance: Provenance) -> str:
             "tables": [
                 _probabilities(diagnosis.findings),
                 _parameters(diagnosis.findings),
-                *_moved(diagnosis, traces),
+                *_moved(diagnosis, signals),
             ],
             "others": other_sentences(diagnosis),
             "limits": [*diagnosis.notes, CONFIDENCE],
@@ -96,6 +100,37 @@ def page(diagnosis: Diagnosis, traces: Traces, provenance: Provenance) -> str:
             "provenance": provenance,
         },
     )
+
+
+def page_of(done: Answer, seed: int) -> str:
+    """Return the page of a diagnosis that this process made now."""
+    return page(done.diagnosis, traces(done), Provenance.now(seed))
+
+
+def json_of(done: Answer) -> str:
+    """Return a diagnosis as the text of its JSON file."""
+    return json.dumps(done.diagnosis.to_json(), indent=2, allow_nan=False) + "\n"
+
+
+def write(
+    done: Answer, seed: int, page_file: Path | None, json_file: Path | None = None
+) -> list[str]:
+    """Write the page and the JSON of a diagnosis where they are asked for.
+
+    Returns:
+        A line for each file written, the page first.
+
+    Raises:
+        OSError: A file cannot be written.
+    """
+    said = []
+    if page_file is not None:
+        write_text_atomic(page_file, page_of(done, seed))
+        said.append(f"Report: {page_file}")
+    if json_file is not None:
+        write_text_atomic(json_file, json_of(done))
+        said.append(f"Diagnosis: {json_file}")
+    return said
 
 
 def card(finding: Finding, diagnosis: Diagnosis) -> Card:
@@ -201,11 +236,11 @@ def _probabilities(findings: Sequence[Finding]) -> TextTable | None:
     return TextTable("Probability of each name", ["effect", "probability"], rows, note)
 
 
-def _moved(diagnosis: Diagnosis, traces: Traces) -> list[TextTable]:
+def _moved(diagnosis: Diagnosis, signals: Traces) -> list[TextTable]:
     """Return the declared parameters of each equation before and after the findings."""
     shown = []
     for name, parameters in diagnosis.moved.items():
-        known = traces.equations.get(name)
+        known = signals.equations.get(name)
         units = _units(known.model) if known else {}
         rows = []
         for key, value in parameters.items():

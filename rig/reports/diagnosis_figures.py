@@ -7,8 +7,7 @@ import numpy as np
 from estimation.diagnosis.result import Diagnosis, Error, Finding
 from estimation.recording import FloatArray
 from rig.diagnosis.traces import EquationTraces, RunTrace, Traces
-from rig.output.binning import binned
-from rig.output.charts import Chart, Line, axis, line, numbers, thinned, words
+from rig.output.charts import Chart, Line, axis, binned, line, numbers, thinned, words
 from rig.output.table import TextTable
 from rig.reports.diagnosis_words import display
 

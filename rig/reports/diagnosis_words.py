@@ -85,7 +85,7 @@ def check_of(finding: Finding) -> str:
     if finding.verdict in ("identified", "one_of"):
         checks = [_check(family) for family in (finding.family, *finding.alternatives)]
         if any(checks):
-            return " Then: ".join(dict.fromkeys(check for check in checks if check))
+            return " Then: ".join(dict.fromkeys(c[0].upper() + c[1:] for c in checks if c))
     words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
     if words:
         return (
@@ -101,12 +101,9 @@ def check_of(finding: Finding) -> str:
 def _check(family: str) -> str:
     """Return the advice in the description of an effect; empty without."""
     known = catalogue().get(family)
-    text = inspect.cleandoc(type(known).__doc__ or "") if known else ""
-    checks = [p for p in text.split("\n\n") if p.startswith("Check: ")]
-    if not checks:
-        return ""
-    advice = " ".join(checks[0].removeprefix("Check: ").split())
-    return advice[0].upper() + advice[1:]
+    text = inspect.getdoc(type(known)) or "" if known else ""
+    advice = next((p for p in text.split("\n\n") if p.startswith("Check: ")), "")
+    return " ".join(advice.removeprefix("Check: ").split())
 
 
 def sizes_of(parameters: Mapping[str, Value]) -> dict[str, str]:
@@ -162,18 +159,8 @@ def _others(finding: Finding) -> str:
         said = "Another effect of the catalogue does not fit as well."
     else:
         said = "A smooth function of its variables fits better than any effect of the catalogue."
-    checks = [check for f in (finding.family, *finding.alternatives) if (check := checked(f))]
-    return " ".join([said, *checks])
-
-
-def checked(family: str) -> str:
-    """Return the check by a technician for a family; empty where its file has none."""
-    known = catalogue().get(family)
-    text = inspect.getdoc(type(known)) if known else ""
-    for part in (text or "").split("\n\n"):
-        if part.startswith("Check: "):
-            return f"To check {family}: {' '.join(part.removeprefix('Check: ').split())}"
-    return ""
+    advice = {family: _check(family) for family in (finding.family, *finding.alternatives)}
+    return " ".join([said, *(f"To check {name}: {text}" for name, text in advice.items() if text)])
 
 
 def next_sentence(diagnosis: Diagnosis) -> str:
@@ -181,11 +168,8 @@ def next_sentence(diagnosis: Diagnosis) -> str:
     proposed = diagnosis.next_experiment
     if proposed is None:
         return NO_NEXT
-    names = (
-        " from ".join(proposed["between"][:2])
-        if len(proposed["between"]) == 2
-        else (", ".join(proposed["between"]) + " from each other")
-    )
+    between = proposed["between"]
+    names = " from ".join(between) if len(between) == 2 else f"{', '.join(between)} from each other"
     if proposed["protocol"] is None:
         return f"To distinguish {names}: {proposed['description']}."
     others = ", ".join(f"{name} {value:.3g}" for name, value in proposed["others"].items())

@@ -69,7 +69,7 @@ def test_torque_from_weights_to_a_session_that_uses_it(calibrate, tmp_path, caps
     assert record.operator == "Ada"
     assert record.firmware_hash == "00000000"  # weights hang on the fake, built from no sources
     assert record.figure_svg.startswith("<svg xmlns")
-    assert main(["cal", "check", "--store", "store"]) == 0
+    assert main(["calibrate", "check", "--store", "store"]) == 0
     assert main(["log", "check", "raw"]) == 0
     capsys.readouterr()
     # the same raw logs give the same numbers

@@ -80,7 +80,7 @@ RUN = [
     "rig doctor --sim",
     "rig selftest --sim",
     "rig udev",
-    "rig cal list",
+    "rig calibrate list",
     "rig grasper designs",
     "rig record --sim --protocol quick -o logs/first",
     "rig log check logs/first",

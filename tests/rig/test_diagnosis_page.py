@@ -12,7 +12,6 @@ from matplotlib.image import imread
 from estimation.diagnosis.result import VERDICTS
 from rig.diagnosis.traces import Traces
 from rig.output.provenance import Provenance
-from rig.output.render import write_report
 from rig.reports.diagnosis import page
 from tests.rig.browser import Opened, chromium
 from tests.rig.diagnosed import example
@@ -38,7 +37,9 @@ def text(diagnosed):
 
 @pytest.fixture(scope="module")
 def path(text, tmp_path_factory):
-    return write_report(tmp_path_factory.mktemp("page") / "diagnosis.html", text)
+    path = tmp_path_factory.mktemp("page") / "diagnosis.html"
+    path.write_text(text)
+    return path
 
 
 def test_the_answer_and_the_check_come_before_evidence_and_method(text):

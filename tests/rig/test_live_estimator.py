@@ -10,8 +10,7 @@ from estimation.estimators.bank import BankRecipe
 from estimation.fitting import fit
 from estimation.model import predict
 from estimation.recording import MissingChannelError, Recording
-from rig.live.estimator import HalfWidths, ModelEstimator
-from rig.live.model_status import with_model_status
+from rig.live.estimator import ModelEstimator, half_widths
 from rig.live.replay import replay_blocks
 from tests.estimation.synthetic import campaign
 
@@ -56,15 +55,14 @@ def test_a_physical_model_states_no_interval_at_rest(tmp_path):
     (declared,) = [m for m in model_file.reference_rig() if m.balance == "motor"]
     model_file.write(fit(declared, Campaign.of(runs)), path)
     estimator, run = ModelEstimator(path, runs[0].sample_rate_hz), runs[0]
-    shown = HalfWidths([estimator])
     stood = {name: np.full(4000, values[0]) for name, values in run.columns.items()}
     estimator.push(stood, np.arange(4000) / run.sample_rate_hz)
-    assert SPINDLE not in shown
+    assert SPINDLE not in half_widths([estimator])
     begun = 4000 / run.sample_rate_hz + run.time_s - run.time_s[0]
     speed = np.abs(np.gradient(run["spindle_angle_rad"], run.time_s))
     fastest = int(speed.argmax()) + 1
     estimator.push({k: v[:fastest] for k, v in run.columns.items()}, begun[:fastest])
-    assert shown[SPINDLE] > 0
+    assert half_widths([estimator])[SPINDLE] > 0
 
 
 def test_a_channel_the_model_lacks_is_named(model_path):
@@ -82,21 +80,14 @@ def test_a_state_estimator_runs_live_as_offline(tmp_path):
     estimator = ModelEstimator(path, runs[0].sample_rate_hz)
     assert estimator.model is None
     assert estimator.target_channel == SPINDLE
-    shown, live, widths = HalfWidths([estimator]), [], []
+    live, widths = [], []
     for block in replay_blocks(runs[0], [estimator], speed=None):
         live.append(block.estimates[SPINDLE])
-        widths.append((sum(map(len, live)) - 1, shown.get(SPINDLE, np.nan)))
+        widths.append((sum(map(len, live)) - 1, half_widths([estimator]).get(SPINDLE, np.nan)))
     offline = fitted.estimate(runs[0], causal=True)
     np.testing.assert_allclose(np.concatenate(live), offline.value, atol=1e-9)
     # the display shows the newest sample's own interval, and none while the jaw opens
-    newest, half_widths = np.array(widths).T
-    np.testing.assert_allclose(half_widths, offline.half_width[newest.astype(int)], rtol=1e-6)
-    assert 0 < np.isnan(half_widths).mean() < 1
-    assert len(set(half_widths[np.isfinite(half_widths)])) > 1
-
-
-def states(path, run):
-    """Return what the display says of an estimator in a run."""
-    estimator = ModelEstimator(path, run.sample_rate_hz)
-    blocks = with_model_status(replay_blocks(run, [estimator], speed=None), [estimator])
-    return {block.devices[-1].state for block in blocks}
+    newest, shown = np.array(widths).T
+    np.testing.assert_allclose(shown, offline.half_width[newest.astype(int)], rtol=1e-6)
+    assert 0 < np.isnan(shown).mean() < 1
+    assert len(set(shown[np.isfinite(shown)])) > 1

@@ -6,33 +6,26 @@ import signal
 from collections.abc import Iterator
 from contextlib import suppress
 
-import numpy as np
 from rich.console import Console
 
 from rig.bench.interrupts import leaving_safely
 from rig.live.block import SampleBlock
 from rig.live.options import ShowOptions
-from rig.live.run import show
-
-
-def _block(time_s: float) -> SampleBlock:
-    columns = {"motor_current_a": np.zeros(1)}
-    return SampleBlock(np.array([time_s]), columns, np.zeros(1, np.uint8), {}, 0, ())
+from rig.live.show import show
+from tests.rig.blocks import block
 
 
 def _swallowed() -> Iterator[SampleBlock]:
     """Yield blocks for ever; the signal's exception is lost once, as in a compiled callback."""
     with leaving_safely():
-        yield _block(0.0)
+        yield block(0, 1)
         with suppress(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGTERM)
         for k in range(1, 1000):
-            yield _block(0.01 * k)
+            yield block(10 * k, 1)
 
 
 def test_a_request_that_was_lost_in_a_callback_ends_the_display() -> None:
     console = Console(file=io.StringIO(), width=100)
-    summary = show(
-        _swallowed(), ShowOptions(title="x", channels=("motor_current_a",), plain=True), console
-    )
+    summary = show(_swallowed(), ShowOptions("x", plain=True), console)
     assert summary.ended == "interrupted"

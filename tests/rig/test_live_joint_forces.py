@@ -13,7 +13,7 @@ from rig.cli.main import main
 from rig.configuration.config import SHIPPED
 from rig.diagnosis.subject import subject
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints, of_joints
-from rig.live.model_status import ModelStatus
+from rig.live.status import ModelStatus
 from rig.log.convert import write_recording
 
 pytestmark = pytest.mark.integration
@@ -50,7 +50,7 @@ def status(days=0.0, **estimates):
         for m in model_file.read_all(MODEL)
     ]
     now = datetime.fromtimestamp(datetime(2026, 1, 1, tzinfo=UTC).timestamp() + 86400 * days, UTC)
-    return ModelStatus(models, now).of({k: np.full(9, v) for k, v in estimates.items()})
+    return ModelStatus(models, now=now).of({k: np.full(9, v) for k, v in estimates.items()})
 
 
 def test_an_estimate_beyond_what_was_fitted_is_suspect_and_an_old_fit_stale():

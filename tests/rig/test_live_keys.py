@@ -10,10 +10,9 @@ import pytest
 from calibration.linear import shipped_calibration_set
 from calibration.record import Validity, record_of_line
 from calibration.store import CalibrationStore
-from rig.live.block import DeviceStatus
-from rig.live.keys import pressed_keys
+from rig.live.block import DeviceStatus, through
+from rig.live.keys import display_keys
 from rig.live.session_blocks import session_blocks
-from rig.live.until import until
 from rig.log.reader import read_log
 from tests.rig.simulated import short_protocol, simulated, transport
 
@@ -23,7 +22,7 @@ def watched(config, keys, tmp_path, duration_s=2.0, plans=()):
     stream = session_blocks(
         config, lambda: transport(config), plans, (), lambda: next(script, ""), tmp_path
     )
-    return list(until(stream, duration_s))
+    return list(through(stream, duration_s=duration_s))
 
 
 def status(block, name):
@@ -68,7 +67,7 @@ def test_a_stop_disarms_a_moving_rig_and_goes_on_watching(tmp_path):
     pressed = next(stream)
     assert status(before, "logger").state == "armed"
     assert status(pressed, "stop") == DeviceStatus("stop", "disarmed", "confirmed by the board")
-    after = list(until(stream, 1.0))
+    after = list(through(stream, duration_s=1.0))
     assert {status(block, "logger").state for block in after[1:]} == {"disarmed"}
     assert np.ptp(after[-1].columns["spindle_angle_rad"]) < 1e-2
 
@@ -114,7 +113,7 @@ def test_keys_are_read_from_a_terminal_and_it_is_given_back(monkeypatch):
     with os.fdopen(theirs, "r+b", buffering=0) as terminal:
         monkeypatch.setattr(sys, "stdin", Terminal(terminal))
         before = termios.tcgetattr(theirs)
-        with pressed_keys() as keys:
+        with display_keys() as keys:
             assert keys() == ""
             os.write(ours, b"rM")
             assert keys() == "rm"
@@ -122,7 +121,7 @@ def test_keys_are_read_from_a_terminal_and_it_is_given_back(monkeypatch):
     os.close(ours)
     with Path(os.devnull).open() as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
-        with pressed_keys() as keys:
+        with display_keys() as keys:
             assert keys is None
 
 

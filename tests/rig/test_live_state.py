@@ -6,29 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimation.recording import Flag
-from rig.live.block import BlockError, DeviceStatus, SampleBlock
+from rig.live.block import BlockError, DeviceStatus
 from rig.live.sparkline import round_scale
 from rig.live.state import LiveState
 from rig.live.text import summary_lines
-from rig.live.window import Window
-
-GRIP = "distal_torque_n_m"
-OK = (DeviceStatus("teensy", "ok"),)
-
-
-def block(first, n, sensor=0.1, estimate=None, flags=0, lost=0, rate=1000.0, **changes):
-    """Return n samples from sample number `first` on."""
-    time_s = (first + np.arange(n)) / rate
-    estimates = {} if estimate is None else {GRIP: np.full(n, estimate)}
-    parts = {
-        "time_s": time_s,
-        "columns": {GRIP: np.full(n, sensor)},
-        "flags": np.broadcast_to(np.asarray(flags, np.uint8), n),
-        "estimates": estimates,
-        "lost": lost,
-        "devices": OK,
-    }
-    return SampleBlock(**parts | changes)
+from tests.rig.blocks import GRIP, block
 
 
 def state_of(*blocks):
@@ -76,7 +58,8 @@ def test_a_gap_lowers_the_measured_rate():
 @pytest.mark.parametrize("flag", [f for f in Flag if f])
 def test_flagged_samples_give_the_reason_and_no_number(flag):
     snapshot = state_of(
-        block(0, 500, estimate=0.1), block(500, 200, estimate=0.1, flags=flag)
+        block(0, 500, estimate=0.1),
+        block(500, 200, estimate=0.1, flags=np.full(200, flag, np.uint8)),
     ).snapshot()
     reading = snapshot.readings[0]
     assert reading.sensor.number is None
@@ -107,28 +90,26 @@ def test_a_restarted_device_clock_begins_the_trace_anew_and_keeps_the_totals():
 
 def test_blocks_whose_parts_do_not_fit_are_refused():
     with pytest.raises(BlockError, match="shape"):
-        block(0, 10, flags=0, columns={GRIP: np.zeros(9)})
+        block(0, 10, columns={GRIP: np.zeros(9)})
     with pytest.raises(BlockError, match="increase"):
         block(0, 2, time_s=np.array([0.1, 0.1]))
 
 
-@given(
-    sizes=st.lists(st.integers(1, 400), min_size=1, max_size=12),
-    seed=st.integers(0, 1000),
-)
-def test_window_does_not_depend_on_how_samples_are_cut_into_blocks(sizes, seed):
+@given(sizes=st.lists(st.integers(1, 400), min_size=1, max_size=12), seed=st.integers(0, 1000))
+def test_the_picture_does_not_depend_on_how_samples_are_cut_into_blocks(sizes, seed):
     n = sum(sizes)
     rng = np.random.default_rng(seed)
     time_s = np.cumsum(rng.uniform(0.0005, 0.004, n))
-    values = np.where(rng.random((2, n)) < 0.2, np.nan, rng.normal(size=(2, n)))
-    whole, cut = Window(2, 1.0, 0.02), Window(2, 1.0, 0.02)
-    whole.add(time_s, values)
-    for part in np.split(np.arange(n), np.cumsum(sizes)[:-1]):
-        cut.add(time_s[part], values[:, part])
-    np.testing.assert_array_equal(cut.count, whole.count)
-    np.testing.assert_allclose(cut.total, whole.total, atol=1e-12)
-    np.testing.assert_array_equal(cut.low, whole.low)
-    np.testing.assert_array_equal(cut.high, whole.high)
+    values = np.where(rng.random(n) < 0.2, np.nan, rng.normal(size=n))
+
+    def part(index):
+        return block(0, len(index), time_s=time_s[index], columns={GRIP: values[index]})
+
+    whole = state_of(part(np.arange(n))).snapshot()
+    cut = state_of(*map(part, np.split(np.arange(n), np.cumsum(sizes)[:-1]))).snapshot()
+    assert (cut.samples, cut.sample_rate_hz) == (whole.samples, whole.sample_rate_hz)
+    assert cut.readings[0].sensor == whole.readings[0].sensor
+    np.testing.assert_array_equal(cut.readings[0].sensor_trace, whole.readings[0].sensor_trace)
 
 
 @given(*2 * [st.integers(-(10**12), 10**12).map(lambda n: n * 1e-6)])

@@ -1,6 +1,5 @@
 """What a person reads on the display, as text, wide and narrow."""
 
-import dataclasses
 import io
 
 import numpy as np
@@ -8,38 +7,36 @@ import pytest
 from rich.console import Console
 
 from estimation.recording import Flag
-from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
-from rig.live.plain import plain_line
+from rig.live.block import DeviceStatus, LimitStatus
+from rig.live.options import ShowOptions
 from rig.live.state import LiveState
+from rig.live.text import plain_line
 from rig.live.view import View
+from tests.rig.blocks import GRIP, block
 
-GRIP = "distal_torque_n_m"
+OPTIONS = ShowOptions("rig live")
 DEVICES = (DeviceStatus("teensy", "armed", "SIM-0001"), DeviceStatus("load", "stale", "no reply"))
 LIMITS = (LimitStatus("motor current", 0.31, 0.6, "A"), LimitStatus("torque", -0.29, 0.3, "N m"))
 
 
 def stream(seconds=12.0, channel=GRIP, **changes):
-    time_s = np.arange(int(seconds * 1000)) / 1000
-    torque = np.full(time_s.size, 0.12)
-    block = SampleBlock(
-        time_s,
-        {channel: torque},
-        np.zeros(time_s.size, np.uint8),
-        {channel: torque + 0.0034},
-        lost=0,
-        devices=DEVICES,
-        limits=LIMITS,
-    )
-    return dataclasses.replace(block, **changes)
+    n = int(seconds * 1000)
+    parts = {
+        "columns": {channel: np.full(n, 0.12)},
+        "estimates": {channel: np.full(n, 0.1234)},
+        "devices": DEVICES,
+        "limits": LIMITS,
+    }
+    return block(0, n, **parts | changes)
 
 
-def snapshot_of(block, channels=(GRIP,)):
+def snapshot_of(samples, channels=(GRIP,)):
     state = LiveState(channels)
-    state.feed(block)
+    state.feed(samples)
     return state.snapshot()
 
 
-def render(snapshot, width=80, height=24, color=None, lever_m=0.012):
+def render(snapshot, width=80, height=24, color=None):
     console = Console(
         file=io.StringIO(),
         width=width,
@@ -47,7 +44,7 @@ def render(snapshot, width=80, height=24, color=None, lever_m=0.012):
         color_system=color,
         force_terminal=bool(color),
     )
-    console.print(View(snapshot, "rig live", lever_m))
+    console.print(View(snapshot, OPTIONS))
     return console.file.getvalue()
 
 
@@ -99,9 +96,8 @@ def test_without_an_estimator_the_sensor_is_the_main_value():
 
 
 def test_newtons_are_only_claimed_for_the_jaw():
-    text = render(
-        snapshot_of(stream(channel="proximal_torque_n_m"), ("proximal_torque_n_m",)), lever_m=0.012
-    )
+    spindle = "proximal_torque_n_m"
+    text = render(snapshot_of(stream(channel=spindle), (spindle,)))
     assert "Spindle torque" in text
     assert " N at " not in text
 
@@ -118,7 +114,7 @@ def test_limits_say_in_words_when_they_are_near_or_unknown():
 
 def test_colour_only_repeats_the_text():
     coloured = Console(file=io.StringIO(), width=80, height=24, record=True, force_terminal=True)
-    coloured.print(View(snapshot_of(stream()), "rig live", 0.012))
+    coloured.print(View(snapshot_of(stream()), OPTIONS))
     assert coloured.export_text(styles=False) == render(snapshot_of(stream()))
 
 
@@ -129,7 +125,7 @@ def test_before_the_first_sample_the_display_reports_it():
 
 
 def test_plain_line_holds_the_same_facts():
-    line = plain_line(snapshot_of(stream()), 0.012)
+    line = plain_line(snapshot_of(stream()), OPTIONS)
     assert "\n" not in line
     for wanted in (
         "123.4 mN m",

@@ -11,30 +11,22 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rig.cli.main import main
 from rig.errors import UsageError
-from rig.live.block import DeviceStatus, SampleBlock
+from rig.live.block import through
 from rig.live.options import ShowOptions
-from rig.live.web import HOST, open_page, shown_on
+from rig.live.web import HOST, WebView, open_page
+from tests.rig.blocks import block
 from tests.rig.browser import chromium
 
 pytestmark = pytest.mark.integration
 
 pytest.importorskip("tornado")
 
-GRIP = "distal_torque_n_m"
 PATIENCE_S = 120
 """Longest wait for anything: the machine may be busy with other tests."""
-
-
-def block(number: int, n: int = 50) -> SampleBlock:
-    time_s = (number * n + np.arange(n)) * 1e-3
-    torque = np.full(n, 0.05)
-    devices = (DeviceStatus("logger", "armed"),)
-    return SampleBlock(time_s, {GRIP: torque}, np.zeros(n, np.uint8), {GRIP: torque}, 0, devices)
 
 
 @pytest.fixture
@@ -138,7 +130,8 @@ def test_only_the_whole_address_opens_the_page_and_the_stream():
 
 def test_a_browser_that_reads_nothing_is_dropped_and_delays_nobody():
     server = open_page(HOST, 0)
-    stream = shown_on(server, (block(k) for k in range(200_000)), ShowOptions("test"))
+    sinks = [WebView(server, ShowOptions("test")).show]
+    stream = through((block(50 * k, estimate=0.1) for k in range(200_000)), sinks=sinks)
     next(stream)
     with viewer_of(server.url) as stalled, viewer_of(server.url) as reading:
         assert b"101" in stalled.recv(100)
@@ -150,7 +143,7 @@ def test_a_browser_that_reads_nothing_is_dropped_and_delays_nobody():
                 if server.viewers == 1:
                     break
             assert server.viewers == 1, "the stalled one was not dropped"
-            stream.close()
+    server.close()
 
 
 def message_of(lines) -> bytes:

@@ -13,9 +13,9 @@ from estimation.fitting import fit
 from rig.cli.main import main
 from rig.configuration.config import SHIPPED, load_config
 from rig.importers.registry import open_campaign
+from rig.live.block import through
 from rig.live.estimator import estimators_of
 from rig.live.session_blocks import session_blocks
-from rig.live.until import until
 from rig.log.convert import write_recording
 from rig.log.reader import read_log
 from tests.estimation.synthetic import run
@@ -127,7 +127,7 @@ def test_what_the_live_display_records_has_the_estimate_that_was_shown(tmp_path)
     config = simulated()
     script = iter(["r", "", "", "r"])
     blocks = list(
-        until(
+        through(
             session_blocks(
                 config,
                 lambda: transport(config),
@@ -136,7 +136,7 @@ def test_what_the_live_display_records_has_the_estimate_that_was_shown(tmp_path)
                 lambda: next(script, ""),
                 tmp_path,
             ),
-            0.5,
+            duration_s=0.5,
         )
     )
     (path,) = tmp_path.glob("*.mcap")

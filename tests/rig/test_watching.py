@@ -13,9 +13,10 @@ from rig.bench.session import Session
 from rig.cli.main import main
 from rig.diagnosis.subject import declared_models
 from rig.importers.registry import open_campaign
+from rig.live.block import through
 from rig.live.estimator import ModelEstimator
 from rig.live.replay import replay_blocks
-from rig.live.watching import watched
+from rig.live.status import FitStatus
 from rig.recording.campaign import open_campaign_folder, record_campaign
 from rig.recording.watch import watch_runs
 from tests.estimation import synthetic
@@ -92,7 +93,7 @@ def test_a_stream_reports_since_when_its_model_no_longer_fits() -> None:
         return np.where(late, 6e-3 * np.sin(4 * motor_rad), 0.0)
 
     run = synthetic.run("long", 0.35, 0.1, seed=3, seconds=60.0, extra=rough)
-    blocks = list(watched(replay_blocks(run, (), None), fitted))
+    blocks = list(through(replay_blocks(run, (), None), [FitStatus(fitted).step]))
     states = [(block.time_s[-1], block.devices[-1]) for block in blocks]
     assert {status.name for _, status in states} == {"model"}
     early = {status.state for time_s, status in states if time_s < 29}
@@ -106,6 +107,6 @@ def test_a_stream_without_the_models_channels_is_not_watched() -> None:
     fitted = fit(model_file.read(Path("motor")), synthetic.campaign(), bootstrap=0)
     time_s = np.arange(7000) * 1e-3
     bare = Recording("bare", time_s, {"distal_torque_n_m": np.zeros(7000)})
-    last = list(watched(replay_blocks(bare, (), None), fitted))[-1].devices[-1]
+    last = list(through(replay_blocks(bare, (), None), [FitStatus(fitted).step]))[-1].devices[-1]
     assert last.state == "not watched"
     assert "channel" in last.detail or "lacks" in last.detail

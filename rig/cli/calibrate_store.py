@@ -1,27 +1,20 @@
-"""`rig cal`: the calibration store."""
+"""`rig calibrate add | list | show | diff | use | diagnose`: the store of calibrations."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rig.cli.help import GroupedHelp
+from estimation.files import write_text_atomic
 from rig.cli.options import LedgerOption, SeedOption
-from rig.cli.rig_options import ConfigOption, SimFlag
-from rig.output.console import JsonFlag, emit_json, results, stages
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, present, stages
 
 if TYPE_CHECKING:
     from calibration.record import CalibrationRecord
     from calibration.store import CalibrationStore
     from rig.configuration.config import Config
-
-cal_app = typer.Typer(
-    name="cal",
-    help="Store, show and choose calibrations.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
 
 StoreOption = Annotated[
     Path | None,
@@ -34,12 +27,6 @@ StoreOption = Annotated[
 Hash = Annotated[str, typer.Argument(help="Hash of a record, or its beginning.")]
 
 
-@cal_app.callback()
-def cal() -> None:
-    """Store, show and choose calibrations."""
-
-
-@cal_app.command()
 def add(
     file: Annotated[Path, typer.Argument(help="TOML with a table [channels.NAME] per channel.")],
     operator: Annotated[str, typer.Option(help="Person responsible for the numbers.")],
@@ -62,7 +49,6 @@ def add(
     from calibration.linear import load_calibration_set
     from calibration.record import RawFile, Validity, record_of_line
     from rig import __version__
-    from rig.errors import UsageError
 
     lines = load_calibration_set(file).channels
     wanted = channel or sorted(lines)
@@ -82,45 +68,35 @@ def add(
         )
         for name in wanted
     ]
-    kept = _store(store)
+    kept = store_of(store)
     hashes = {record.channel: kept.add(record) for record in made}
-    for name, digest in hashes.items():
-        results(json).print(f"{digest}  {name}", markup=False)
-    if json:
-        emit_json({"store": kept.folder, "added": hashes})
+    data = {"store": kept.folder, "added": hashes}
+    present(json, data, *(f"{digest}  {name}" for name, digest in hashes.items()))
 
 
-@cal_app.command("list")
 def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
     """List every record, oldest first; the active ones are marked."""
     from rig.calibrate.shown import main_parameter
 
-    screen = results(json)
+    said = []
     listed: list[dict[str, Any]] = []
     for kept in _stores(store):
         active = {record.content_hash for record in kept.active().values()}
-        if not (records := kept.records()):
-            continue
-        screen.print(f"Store {kept.folder}", markup=False)
+        records = kept.records()
+        said += [f"Store {kept.folder}"] if records else []
         for r in records:  # lines, not a table: a terminal would cut the hashes off
-            mark = "*" if r.content_hash in active else " "
+            is_active = r.content_hash in active
             whom = f", instrument {r.instrument}" if r.instrument else ""
             made = f"{r.kind}, {r.made:%Y-%m-%d %H:%M} by {r.operator}{whom}"
-            line = f"{mark} {r.content_hash}  {r.channel}  {made}: {main_parameter(r)}"
-            screen.print(line, markup=False)
-            is_active = r.content_hash in active
+            mark = "*" if is_active else " "
+            said.append(f"{mark} {r.content_hash}  {r.channel}  {made}: {main_parameter(r)}")
             listed.append(_summary(r) | {"active": is_active, "store": kept.folder})
-    screen.print(
-        "* active"
-        if listed
-        else "No records yet. `rig calibrate` makes one, `rig cal add` takes a certificate."
-    )
-    if json:
-        kept = _store(store)
-        emit_json({"store": kept.folder, "records": listed, "choices": kept.choices()})
+    none = "No records yet. `rig calibrate torque` makes one, `add` takes a certificate."
+    kept = store_of(store)
+    data = {"store": kept.folder, "records": listed, "choices": kept.choices()}
+    present(json, data, *said, "* active" if listed else none)
 
 
-@cal_app.command()
 def show(
     record: Hash,
     figure: Annotated[Path | None, typer.Option(help="Write the residual figure here.")] = None,
@@ -128,22 +104,16 @@ def show(
     json: JsonFlag = False,
 ) -> None:
     """Show one record completely."""
-    from estimation.files import write_text_atomic
-    from rig.errors import UsageError
-
     found = _holding(record, store).get(record)
-    for name, value in _in_words(found).items():
-        results(json).print(f"{name}: {value}", markup=False)
+    said = [f"{name}: {value}" for name, value in _in_words(found).items()]
     if figure is not None:
         if not found.figure_svg:
             raise UsageError(f"The record {found.content_hash} has no figure.")
         write_text_atomic(figure, found.figure_svg)
-        results(json).print(f"Figure: {figure}", markup=False)
-    if json:
-        emit_json({"hash": found.content_hash, "record": found})
+        said.append(f"Figure: {figure}")
+    present(json, {"hash": found.content_hash, "record": found}, *said)
 
 
-@cal_app.command()
 def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = False) -> None:
     """Show what differs between two records."""
     a, b = (_holding(start, store).get(start) for start in (first, second))
@@ -153,18 +123,18 @@ def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = 
         for name in sorted({*left, *right})
         if left.get(name) != right.get(name)
     }
-    shown = _in_words(a), _in_words(b)
-    for name in dict.fromkeys((*shown[0], *shown[1])):
-        before, after = (one.get(name) for one in shown)
-        if before != after:
-            results(json).print(f"{name}: {before} -> {after}", markup=False)
+    before, after = _in_words(a), _in_words(b)
+    said = [
+        f"{name}: {before.get(name)} -> {after.get(name)}"
+        for name in dict.fromkeys((*before, *after))
+        if before.get(name) != after.get(name)
+    ]
     if not changes:
-        results(json).print("The two are the same record.")
-    if json:
-        emit_json({"first": a.content_hash, "second": b.content_hash, "changes": changes})
+        said.append("The two are the same record.")
+    data = {"first": a.content_hash, "second": b.content_hash, "changes": changes}
+    present(json, data, *said)
 
 
-@cal_app.command()
 def use(
     record: Hash,
     by: Annotated[str, typer.Option(help="Name of the person who chooses it.")],
@@ -177,55 +147,10 @@ def use(
     chosen = kept.use(record, _now(), by)
     old = before.get(chosen.key)
     was = old.content_hash if old else None
-    results(json).print(
-        f"{chosen.channel}: {chosen.content_hash} in place of {was or 'none'}.", markup=False
-    )
-    if json:
-        emit_json({"record": chosen.content_hash, "replaced": was, "key": chosen.key})
+    data = {"record": chosen.content_hash, "replaced": was, "key": chosen.key}
+    present(json, data, f"{chosen.channel}: {chosen.content_hash} in place of {was or 'none'}.")
 
 
-@cal_app.command()
-def check(
-    config: ConfigOption = None,
-    sim: SimFlag = False,
-    log: Annotated[
-        Path | None,
-        typer.Option(help="Also check this log's counts against the calibrated ranges."),
-    ] = None,
-    store: StoreOption = None,
-    json: JsonFlag = False,
-) -> int:
-    """Check the active records against today's date, serial numbers and raw files.
-
-    Exit code 1 when one must not be used.
-    """
-    from datetime import UTC, datetime
-
-    from calibration.rules import judge, judge_raw
-    from rig.configuration.chosen import choose_rig
-
-    settings = choose_rig(config, sim)
-    kept = _store(store, settings)
-    now = datetime.now(UTC)
-    here = ("", settings.instrument.serial)
-    active = [record for record in kept.active().values() if record.instrument in here]
-    verdicts = [
-        v for record in active for v in (*judge(record, now, settings.serials), *judge_raw(record))
-    ]
-    if log is not None:
-        verdicts += _range_verdicts(log, active)
-    for v in verdicts:
-        word = "error" if v.is_error else "warning"
-        results(json).print(f"{word}: {v.channel} {v.record}: {v.message} ({v.rule})", markup=False)
-    bad = any(v.is_error for v in verdicts)
-    fault = f"{len(verdicts)} objections, listed above" if verdicts else "nothing against them"
-    results(json).print(f"Active records: {len(active)}; {fault}.")
-    if json:
-        emit_json({"store": kept.folder, "ok": not bad, "verdicts": verdicts})
-    return int(bad)
-
-
-@cal_app.command()
 def diagnose(
     record: Hash,
     seed: SeedOption = 0,
@@ -247,28 +172,12 @@ def diagnose(
             asked.campaign, asked.models, looks, seed=seed, on_stage=on_stage
         )
     looks.enter(look)
-    screen = results(json)
-    for line in [*sentences(done.diagnosis), *done.diagnosis.notes]:
-        screen.print(line, markup=False)
-    if json:
-        emit_json(done.diagnosis.to_json())
+    data = done.diagnosis.to_json() if json else None
+    present(json, data, *sentences(done.diagnosis), *done.diagnosis.notes)
 
 
-def _range_verdicts(log: Path, records: "list[CalibrationRecord]") -> list[Any]:
-    from calibration.rules import judge_range
-    from rig.log.reader import read_log
-    from rig.log.streams import COUNTS
-
-    topic = read_log(log, topics=(COUNTS,)).topics[COUNTS]
-    return [
-        verdict
-        for record in records
-        if record.input in topic.columns
-        for verdict in judge_range(record, topic.rows[record.input])
-    ]
-
-
-def _store(folder: Path | None, settings: "Config | None" = None) -> "CalibrationStore":
+def store_of(folder: Path | None, settings: "Config | None" = None) -> "CalibrationStore":
+    """Return the store in a folder; without one that of a rig, else the default."""
     from calibration.store import CalibrationStore, default_folder
 
     if folder is None and settings is not None:
@@ -280,7 +189,7 @@ def _stores(folder: Path | None) -> "list[CalibrationStore]":
     """Return the named store; with none the real rig's and the simulated rig's."""
     from calibration.store import CalibrationStore, simulated_folder
 
-    kept = _store(folder)
+    kept = store_of(folder)
     return [kept] if folder else [kept, CalibrationStore(simulated_folder(kept.folder))]
 
 
@@ -293,14 +202,10 @@ def _holding(start: str, folder: Path | None) -> "CalibrationStore":
 
 
 def _now() -> str:
-    from datetime import UTC, datetime
-
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def _serials(words: list[str]) -> dict[str, str]:
-    from rig.errors import UsageError
-
     pairs = dict(word.split("=", 1) for word in words if "=" in word)
     if len(pairs) != len(words) or not all(k and v for k, v in pairs.items()):
         raise UsageError("A serial number is given as DEVICE=SERIAL.", f"Given: {words}.")
