@@ -72,11 +72,7 @@ def open_logger(
 
 @contextmanager
 def held_logger(config: Config) -> Iterator[TeensyLogger]:
-<<<<<<< HEAD
-    """Hold the rig and open its logger, for work outside a session; it is disarmed on the way out.
-=======
     """Hold the rig and open its logger without a session; it is disarmed on the way out.
->>>>>>> drivers
 
     Raises:
         DriverError: It cannot be reached.
