@@ -14,7 +14,9 @@ from rig.output.console import JsonFlag, progress
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
     from rig.studies.oneill.data import Source
+    from rig.studies.oneill.kinds import KindRow
     from rig.studies.oneill.networks import NetworkStudy, Training
+    from rig.studies.oneill.states import Shown
 
 study_app = typer.Typer(
     name="study",
@@ -77,7 +79,9 @@ def oneill(
         task = bar.add_task("runs", total=len(source.campaign))
         study = run_study(source, seed=seed, on_run=lambda name: bar.advance(task))
     campaign = source.campaign.exclude(study.left_out)
-    deep, physical, every_kind, shown = None, None, (), {}
+    deep, physical = None, None
+    every_kind: tuple[KindRow, ...] = ()
+    shown: dict[str, list[Shown]] = {}
     if networks:
         from rig.studies.oneill.networks import Training
 

@@ -15,11 +15,9 @@ from rig.studies.seeds import Keeper
 from rig.studies.zhang import free as zhang_free
 from rig.studies.zhang import networks as zhang_networks
 from rig.studies.zhang import physics as zhang_physics
-from rig.studies.zhang.psm import GRIPPER, simulate, with_instrument
-from rig.studies.zhang.psm_instruments import KINDS
+from rig.studies.zhang.psm import GRIPPER, KINDS, simulate, with_instrument
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
-from rig.studies.zhang.seed import one_arm
-from rig.studies.zhang.study import PAPER, run
+from rig.studies.zhang.study import PAPER, one_arm, run
 
 pytestmark = pytest.mark.long
 
