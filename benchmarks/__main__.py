@@ -17,6 +17,7 @@ import benchmarks
 from benchmarks.ratio import Ratio
 from estimation.files import write_text_atomic
 from rig.output.provenance import Provenance
+from rig.output.table import TextTable, to_page
 
 PREFIX = "bench_"
 
@@ -59,26 +60,18 @@ def _target(ratio: Ratio) -> str:
 
 
 def _markdown(ratios: list[Ratio]) -> str:
-    rows = []
-    for r in ratios:
-        holds = "yes" if r.holds else "**no**"
-        rows.append(f"| {r.name} | {r.ratio:.1f} | {_target(r)} | {holds} | {r.detail} |")
-    return "\n".join(
-        [
-            "# Benchmarks",
-            "",
-            "Each line is a ratio measured in one run against the baseline its name states, on"
-            f" {os.cpu_count()} cores. The machine was shared: the figures behind a ratio vary, the"
-            " ratio less so.",
-            "",
-            "| ratio | measured | target | holds | from |",
-            "|---|---:|---|---|---|",
-            *rows,
-            "",
-            Provenance.now(seed=0).line(),
-            "",
-        ]
-    )
+    rows = [
+        [r.name, f"{r.ratio:.1f}", _target(r), "yes" if r.holds else "**no**", r.detail]
+        for r in ratios
+    ]
+    paragraphs = [
+        "Benchmarks",
+        "Each line is a ratio measured in one run against the baseline its name states, on"
+        f" {os.cpu_count()} cores. The machine was shared: the figures behind a ratio vary, the"
+        " ratio less so.",
+    ]
+    table = TextTable("Ratios", ("ratio", "measured", "target", "holds", "from"), rows)
+    return to_page(paragraphs, [table], Provenance.now(0))
 
 
 if __name__ == "__main__":

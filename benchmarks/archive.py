@@ -26,8 +26,8 @@ from estimation.model_file import read, to_toml
 from rig.campaigns.drift import changes
 from rig.campaigns.index import campaigns
 from rig.campaigns.search import search
-from rig.diagnosis.engine import engine
 from rig.diagnosis.refit import refit_all
+from rig.diagnosis.work import engine
 from rig.log.convert import write_recording
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable, to_page
@@ -160,7 +160,7 @@ def measure(sizes: list[int], runs: int) -> tuple[list[list[str]], list[list[str
     rows = []
     for count in sizes:
         with tempfile.TemporaryDirectory(prefix="rig-archive-") as place:
-            root, index = Path(place) / "logs", Path(place) / "index.sqlite"
+            root, index = Path(place) / "logs", Path(place) / "index.json"
             size = write_archive(root, count, runs)
             begun = time.monotonic()
             whole = campaigns(root, index)

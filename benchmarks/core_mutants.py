@@ -33,6 +33,7 @@ from benchmarks.hunt import FIRMWARE, write_settings
 from estimation.files import write_text_atomic
 from rig.bench.firmware import source_hash
 from rig.output.provenance import Provenance
+from rig.output.table import TextTable, to_page
 
 ROOT = FIRMWARE.parent
 STATE = Path("build/core_mutants.json")
@@ -356,20 +357,15 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
     total = max(1, len(tried))
     noticed = sum(bool(tests) for tests in killed.values())
     asked = Counter(test for found in tried.values() for test in found)
-    lines = [
-        "# Mutants of the core",
-        "",
-        "Written by `make mutants-core`, which goes on where it stopped. Each mutant is one change",
-        "of one line of `firmware/core`, drawn by a fixed seed. Unit tests, random sequences and",
-        "contract tests see every mutant, the theorems those of the files that have some, in the",
-        "order of the list as far as they have come. Every small input is for the rest.",
-        "",
-        f"{len(tried)} mutants tried, {noticed} noticed ({noticed / total:.0%}),"
-        f" {len(alike)} equivalent; {len(results) - len(tried)} did not compile.",
-        f"Of those not noticed, {unfinished} have not yet been held against every test.",
-        "",
-        "| tests | mutants seen | noticed | share of those seen | noticed by nothing before |",
-        "|---|---:|---:|---:|---:|",
+    paragraphs = [
+        "Mutants of the core",
+        "Written by `make mutants-core`, which goes on where it stopped. Each mutant is one change"
+        " of one line of `firmware/core`, drawn by a fixed seed. Unit tests, random sequences and"
+        " contract tests see every mutant, the theorems those of the files that have some, in the"
+        " order of the list as far as they have come. Every small input is for the rest.",
+        f"Core {core}. {len(tried)} mutants tried, {noticed} noticed ({noticed / total:.0%}),"
+        f" {len(alike)} equivalent; {len(results) - len(tried)} did not compile. Of those not"
+        f" noticed, {unfinished} have not yet been held against every test.",
     ]
     names = {
         "unit": "unit tests in C++",
@@ -378,18 +374,21 @@ def page(results: dict[str, dict[str, bool] | None], core: str) -> str:
         "proofs": "theorems for all values",
         "small": "every small input",
     }
+    rows = []
     for test, title in names.items():
         share = count[test] / asked[test] if asked[test] else 0.0
-        lines.append(f"| {title} | {asked[test]} | {count[test]} | {share:.0%} | {alone[test]} |")
-    lines += ["", "Not noticed, or not yet (*):", ""]
-    lines += [
-        f"- `{name}`{' *' if lacking(name, tried[name], [*TESTS]) else ''}"
+        rows.append([title, str(asked[test]), str(count[test]), f"{share:.0%}", str(alone[test])])
+    columns = ("tests", "mutants seen", "noticed", "share of those seen", "by nothing before")
+    missed = [
+        [f"`{name}`", "to be tried" if lacking(name, tried[name], [*TESTS]) else "not noticed"]
         for name in sorted(lived)
-    ] or ["- none"]
-    lines += ["", "Equivalent:", "", *(f"- `{name}`: {why}." for name, why in alike.items())]
-    now = Provenance.now(SEED)
-    lines += ["", f"Made {now.date}, commit {now.commit}, core {core}, seed {SEED}."]
-    return "\n".join(lines) + "\n"
+    ]
+    missed += [[f"`{name}`", why] for name, why in alike.items()]
+    tables = [
+        TextTable("Tests", columns, rows),
+        TextTable("Not noticed", ("mutant", "why"), missed, "The others are equivalent."),
+    ]
+    return to_page(paragraphs, tables, Provenance.now(SEED))
 
 
 def main() -> int:

@@ -21,6 +21,7 @@ from benchmarks.hunt import FIRMWARE
 from estimation.files import write_text_atomic
 from rig.bench.firmware import source_hash
 from rig.output.provenance import Provenance
+from rig.output.table import TextTable, to_page
 
 SOURCE = Path("proofs") / "symbolic.cpp"
 PAGE = Path("docs/results/core-proofs.md")
@@ -88,24 +89,20 @@ def decide(program: Path, name: str, python: str, longest_s: float = LONGEST_S) 
 
 def page(decided: list[Decided]) -> str:
     """Return the page of what is shown."""
-    lines = [
-        "# Theorems on the core",
-        "",
-        "Written by `make proofs`. Each theorem is decided for every value that it names, by",
-        "symbolic execution of the machine code that g++ makes of the core with `-O1`, in which",
-        "undefined behaviour and an index out of range end a path and count as broken. What is",
-        "assumed, and what is not shown, is in [safety of the core](../safety-core.md).",
-        "",
-        "| theorem | states | paths | s | shown |",
-        "|---|---|---:|---:|---|",
+    paragraphs = [
+        "Theorems on the core",
+        "Written by `make proofs`. Each theorem is decided for every value that it names, by"
+        " symbolic execution of the machine code that g++ makes of the core with `-O1`, in which"
+        " undefined behaviour and an index out of range end a path and count as broken. What is"
+        " assumed, and what is not shown, is in [safety of the core](../safety-core.md)."
+        f" Core {source_hash() or 0:08x}; nothing is drawn, so the seed has no meaning.",
     ]
+    rows = []
     for one in decided:
         shown = "yes" if not one.broken else "**no**: " + "; ".join(one.broken)
-        lines.append(f"| {one.name} | {one.text} | {one.paths} | {one.seconds:.0f} | {shown} |")
-    now = Provenance.now(0)
-    core = f"{source_hash() or 0:08x}"
-    lines += ["", f"Made {now.date}, commit {now.commit}, core {core}, no seed."]
-    return "\n".join(lines) + "\n"
+        rows.append([one.name, one.text, str(one.paths), f"{one.seconds:.0f}", shown])
+    table = TextTable("Theorems", ("theorem", "states", "paths", "s", "shown"), rows)
+    return to_page(paragraphs, [table], Provenance.now(0))
 
 
 def main() -> int:

@@ -17,8 +17,10 @@ import re
 import subprocess
 import sys
 import tempfile
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+
+from pydantic import TypeAdapter
 
 from drivers.teensy.core import settings_bytes
 from estimation.files import write_text_atomic
@@ -26,6 +28,7 @@ from rig.bench.firmware import source_hash
 from rig.configuration.config import load_config
 from rig.machines.choose import machine_of
 from rig.output.provenance import Provenance
+from rig.output.table import TextTable, to_page
 
 FIRMWARE = Path(__file__).parents[1] / "firmware"
 PROGRAM = FIRMWARE / "build" / "hunt"
@@ -92,48 +95,34 @@ def run(program: Path, settings: Path, kind: str, first: int, count: int) -> Sea
 
 def joined(one: Search, other: Search) -> Search:
     """Return two searches as one."""
-    return Search(
-        one.sequences + other.sequences,
-        one.hours + other.hours,
-        one.armings + other.armings,
-        one.trips + other.trips,
-        max(one.farthest_rad, other.farthest_rad),
-        [*one.found, *other.found],
-    )
+    added = ("sequences", "hours", "armings", "trips", "found")
+    sums = {name: getattr(one, name) + getattr(other, name) for name in added}
+    return Search(**sums, farthest_rad=max(one.farthest_rad, other.farthest_rad))
 
 
 def kept(core: str) -> dict[str, Search]:
     """Return the searches of a core so far."""
     state = json.loads(STATE.read_text()) if STATE.is_file() else {}
-    if state.get("core") != core:
+    if state.pop("core", "") != core:
         return {kind: Search() for kind in CHUNKS}
-    searches = {kind: Search(**state[kind]) for kind in CHUNKS}
-    return {
-        kind: replace(search, found=[(seed, rule, events) for seed, rule, events in search.found])
-        for kind, search in searches.items()
-    }
+    return TypeAdapter(dict[str, Search]).validate_python(state)
 
 
 def page(searches: dict[str, Search], core: str) -> str:
     """Return the page of what was searched and found."""
-    lines = [
-        "# The search for broken rules",
-        "",
-        "Written by `make hunt`, which goes on where it stopped. Random sequences against the",
-        "compiled core of the reference rig with its shipped limits; the rules are in",
-        "`firmware/proofs/world.hpp`. The travel is 3 rad, and 5 degrees more is the rule.",
-        "",
-        "| sequences | run | rig-hours | armings | trips | farthest, rad | broken rules |",
-        "|---|---:|---:|---:|---:|---:|---|",
+    paragraphs = [
+        "The search for broken rules",
+        "Written by `make hunt`, which goes on where it stopped. Random sequences, of seeds from 0,"
+        " against the compiled core of the reference rig with its shipped limits; the rules are in"
+        " `firmware/proofs/world.hpp`. The travel is 3 rad, and 5 degrees more is the rule."
+        f" Core {core}.",
     ]
+    columns = ("sequences", "run", "rig-hours", "armings", "trips", "farthest, rad", "broken rules")
+    rows = []
     for kind, s in searches.items():
-        lines.append(
-            f"| {kind} | {s.sequences} | {s.hours:.1f} | {s.armings} | {s.trips} |"
-            f" {s.farthest_rad:.3f} | {len(s.found)} |"
-        )
-    now = Provenance.now(0)
-    lines += ["", f"Made {now.date}, commit {now.commit}, core {core}, seeds from 0."]
-    return "\n".join(lines) + "\n"
+        counts = [str(s.sequences), f"{s.hours:.1f}", str(s.armings), str(s.trips)]
+        rows.append([kind, *counts, f"{s.farthest_rad:.3f}", str(len(s.found))])
+    return to_page(paragraphs, [TextTable("Sequences", columns, rows)], Provenance.now(0))
 
 
 def main() -> int:
@@ -150,14 +139,11 @@ def main() -> int:
         settings = Path(folder) / "settings.bin"
         write_settings(settings)
         while True:
-            wanted = [
-                kind
-                for kind, lacks in (
-                    ("commands", searches["commands"].sequences < options.commands),
-                    ("faults", searches["faults"].hours < options.hours),
-                )
-                if lacks
-            ]
+            lacks = {
+                "commands": searches["commands"].sequences < options.commands,
+                "faults": searches["faults"].hours < options.hours,
+            }
+            wanted = [kind for kind in lacks if lacks[kind]]
             if not wanted:
                 break
             for kind in wanted:

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from estimation.campaign import Campaign
+from estimation.changes.compare import compare
 from estimation.changes.difference import Difference
 from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
 from estimation.recording import Recording
-from rig.diagnosis.compared import compared
 from rig.diagnosis.subject import Subject, subject
 from rig.machines.shipped import place_of
 from rig.output.provenance import Provenance
@@ -164,8 +164,8 @@ def answers(data: Path, only: str, skipped: list[str]) -> Iterator[Answer]:
                     for place, side in zip(places, pair.sides, strict=True)
                     if place is not None
                 ]
-                runs = [one.campaign for one in opened]
-                found = compared(runs[0], runs[1], opened[0].models, *runs[2:])
+                runs = [one.campaign.evidence for one in opened]
+                found = compare(runs[0], runs[1], opened[0].models, *runs[2:])
             except EstimationError as error:
                 refused = str(error)
         yield Answer(pair, found, refused, time.monotonic() - began)

@@ -88,7 +88,7 @@ PAGES = (
     Page(
         "archive",
         "python -m benchmarks.archive --out docs/results/archive.md",
-        "benchmarks/archive.py rig/campaigns rig/diagnosis/each.py rig/diagnosis/refit.py"
+        "benchmarks/archive.py rig/campaigns rig/diagnosis/work.py rig/diagnosis/refit.py"
         " rig/reports/diagnosed.py",
         30,
     ),

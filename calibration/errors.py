@@ -1,20 +1,10 @@
 """Errors of the `calibration` room: what a calibration refuses."""
 
+from estimation.errors import ExplainedError
 
-class CalibrationError(Exception):
-    """Base of every error this room raises on purpose.
 
-    Attributes:
-        what: What happened, in one sentence.
-        why: The cause as far as it is known; may be empty.
-        fix: Action or next command; may be empty.
-    """
-
-    def __init__(self, what: str, why: str = "", fix: str = "") -> None:
-        self.what = what
-        self.why = why
-        self.fix = fix
-        super().__init__(" ".join(part for part in (what, why, fix) if part))
+class CalibrationError(ExplainedError):
+    """Base of every error this room raises on purpose."""
 
 
 class UnknownNameError(CalibrationError):

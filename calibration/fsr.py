@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.polynomial import polynomial
 from scipy import stats
+from scipy.linalg import block_diag
 
 from calibration.fsr_curve import FsrCurve, is_monotone
 from calibration.quality import (
@@ -22,11 +23,15 @@ from calibration.quality import (
     check_rails,
     finite,
 )
+from calibration.record import Fit
+from calibration.regression import Regression, is_better, refuse_drift, regress
 from estimation.recording import FloatArray
 
 MINIMUM_RUNS = 3
 MINIMUM_POINTS = 60
 HYSTERESIS_BINS = 10
+HYSTERESIS_LIMIT, DRIFT_LIMIT = 0.15, 0.05
+"""Greatest hysteresis, and drift from the first to the last run, as shares of the span of force."""
 HIGHEST_DEGREE = 5
 WORTH = 0.05
 """A higher degree must lower the error on runs left out by more than this share to be taken."""
@@ -95,8 +100,6 @@ def fit_fsr(
     *,
     force_at_zero_n: float | None = None,
     rail_v: float = 1.0,
-    hysteresis_limit: float = 0.15,
-    drift_limit: float = 0.05,
 ) -> FsrResult:
     """Fit force over voltage on all runs.
 
@@ -106,8 +109,6 @@ def fit_fsr(
             within one standard error of the runs' differences, or within 5 %, of the least.
         force_at_zero_n: Force at 0 V, held fixed; fitted if None.
         rail_v: Upper end of the amplifier's range.
-        hysteresis_limit: Greatest hysteresis that passes, share of the span of force.
-        drift_limit: Greatest drift from first to last run that passes, share of the span of force.
 
     Raises:
         BadDataError: The data are not sufficient for a calibration; its `rule` is the reason.
@@ -117,27 +118,34 @@ def fit_fsr(
     hysteresis = hysteresis_ratio(runs)
     if hysteresis is not None:
         fix = "Condition the sensor by loading it to 110 % several times, and press more slowly."
-        check_limit("hysteresis", hysteresis, hysteresis_limit, "Hysteresis", fix)
+        check_limit("hysteresis", hysteresis, HYSTERESIS_LIMIT, "Hysteresis", fix)
     tried = range(1, HIGHEST_DEGREE + 1) if degree is None else (degree,)
-    errors = {}
-    for d in tried:
-        whole = _solve(volts, forces, d, force_at_zero_n)
-        if is_monotone(whole, float(volts.min()), float(volts.max())):
-            errors[d] = _held_out_squares(runs, d, force_at_zero_n)
-    if not errors:
+    fits = {d: _fitted(runs, d, force_at_zero_n) for d in tried}
+    low, high = float(volts.min()), float(volts.max())
+    fits = {
+        d: fit
+        for d, fit in fits.items()
+        if is_monotone(_coefficients(fit, force_at_zero_n), low, high)
+    }
+    if not fits:
         raise BadDataError(
             "not_monotone",
             f"No polynomial of degree {', '.join(map(str, tried))} rises over the whole range.",
             "One voltage must mean one force, and more voltage more force.",
             "Try a lower degree, or check the sign of the force.",
         )
-    chosen = _lowest_as_good(errors)
+    chosen = _lowest_as_good(fits)
     check_levels(volts, chosen + 2, "The voltage")
-    curve = _curve(runs, chosen, force_at_zero_n)
-    drift = (_mean_residual(curve, runs[-1]) - _mean_residual(curve, runs[0])) / span
+    fit = fits[chosen]
+    known = 0 if force_at_zero_n is None else 1  # a coefficient held fixed has no variance
+    covariance = block_diag(np.zeros((known, known)), fit.covariance)
+    coefficients = _coefficients(fit, force_at_zero_n)
+    names = {f"c{k}": value for k, value in enumerate(coefficients)}
+    kept = Fit.of("polynomial", names, covariance, fit.residual_rms, fit.size)
+    curve = FsrCurve(tuple(coefficients), low, high, kept, len(runs))
     fix = "Let the sensor rest between runs, and record again."
-    check_limit("drift", abs(drift), drift_limit, "Drift from first to last run", fix)
-    rmse = {d: float(np.sqrt(squares.mean())) for d, squares in errors.items()}
+    drift = refuse_drift(fit, span, DRIFT_LIMIT, fix)
+    rmse = {d: float(np.sqrt(fit.held_out.mean())) for d, fit in fits.items()}
     return FsrResult(curve, rmse, hysteresis, drift)
 
 
@@ -159,7 +167,7 @@ def hysteresis_ratio(runs: Sequence[FsrRun]) -> float | None:
     least = 0.05 * np.abs(rates).max()
     apart = []
     # a slope within the bin would count as a difference where the two are spread differently
-    trend = polynomial.polyval(volts, _solve(volts, forces, 3, None))
+    trend = polynomial.polyval(volts, polynomial.polyfit(volts, forces, 3))
     for k in range(HYSTERESIS_BINS):
         up = (bins == k) & (rates > least)
         down = (bins == k) & (rates < -least)
@@ -212,68 +220,27 @@ def _checked(runs: Sequence[FsrRun], degree: int, rail_v: float) -> tuple[FloatA
     return volts, forces
 
 
-def _solve(
-    volts: FloatArray, forces: FloatArray, degree: int, force_at_zero_n: float | None
-) -> FloatArray:
-    powers = polynomial.polyvander(volts, degree)
-    if force_at_zero_n is None:
-        return np.asarray(np.linalg.lstsq(powers, forces)[0])
-    rest = np.linalg.lstsq(powers[:, 1:], forces - force_at_zero_n)[0]
-    return np.concatenate([[force_at_zero_n], rest])
+def _fitted(runs: Sequence[FsrRun], degree: int, force_at_zero_n: float | None) -> Regression:
+    """Fit the powers of the voltage; the constant one only where the force at 0 V is not held."""
+    first, zero_n = (0, 0.0) if force_at_zero_n is None else (1, force_at_zero_n)
+    powers: list[FloatArray] = [
+        np.asarray(polynomial.polyvander(run.fsr_v, degree)[:, first:]) for run in runs
+    ]
+    return regress([(x, run.force_n - zero_n) for x, run in zip(powers, runs, strict=True)])
 
 
-def _held_out_squares(
-    runs: Sequence[FsrRun], degree: int, force_at_zero_n: float | None
-) -> FloatArray:
-    """Return each run's mean square error by the curve fitted on all others, shape (runs,)."""
-    squares = []
-    for left_out in runs:
-        others = [run for run in runs if run is not left_out]
-        volts = np.concatenate([run.fsr_v for run in others])
-        forces = np.concatenate([run.force_n for run in others])
-        curve = _solve(volts, forces, degree, force_at_zero_n)
-        error = left_out.force_n - polynomial.polyval(left_out.fsr_v, curve)
-        squares.append(float(np.mean(error**2)))
-    return np.array(squares)
+def _coefficients(fit: Regression, force_at_zero_n: float | None) -> list[float]:
+    known = [] if force_at_zero_n is None else [force_at_zero_n]
+    return [*known, *fit.values.tolist()]
 
 
-def _lowest_as_good(errors: dict[int, FloatArray]) -> int:
-    best = min(errors, key=lambda d: float(errors[d].mean()))
-    for degree in sorted(errors):
-        worse = errors[degree] - errors[best]
-        differs = worse.mean() > worse.std(ddof=1) / np.sqrt(worse.size)
-        is_worth_it = np.sqrt(errors[degree].mean()) > (1 + WORTH) * np.sqrt(errors[best].mean())
-        if not (differs and is_worth_it):
+def _lowest_as_good(fits: dict[int, Regression]) -> int:
+    """Return the lowest degree that is not worse on runs left out than the best one."""
+    best = min(fits, key=lambda d: float(fits[d].held_out.mean()))
+    least = np.sqrt(fits[best].held_out.mean())
+    for degree in sorted(fits):
+        squares = fits[degree].held_out
+        is_worth_it = np.sqrt(squares.mean()) > (1 + WORTH) * least
+        if not (is_worth_it and is_better(fits[best].held_out, squares)):
             return degree
     return best
-
-
-def _curve(runs: Sequence[FsrRun], degree: int, force_at_zero_n: float | None) -> FsrCurve:
-    """Fit all runs; the covariance takes the samples of one run as one piece of evidence."""
-    volts = np.concatenate([run.fsr_v for run in runs])
-    forces = np.concatenate([run.force_n for run in runs])
-    solved = _solve(volts, forces, degree, force_at_zero_n)
-    first = 0 if force_at_zero_n is None else 1  # a coefficient held fixed has no variance
-    powers = polynomial.polyvander(volts, degree)[:, first:]
-    bread = np.linalg.pinv(powers.T @ powers)
-    meat = np.zeros_like(bread)
-    for run in runs:
-        error = run.force_n - polynomial.polyval(run.fsr_v, solved)
-        score = polynomial.polyvander(run.fsr_v, degree)[:, first:].T @ error
-        meat += np.outer(score, score)
-    covariance = np.zeros((degree + 1, degree + 1))
-    covariance[first:, first:] = bread @ meat @ bread * len(runs) / (len(runs) - 1)
-    residual = forces - polynomial.polyval(volts, solved)
-    return FsrCurve(
-        coefficients=tuple(solved.tolist()),
-        low_v=float(volts.min()),
-        high_v=float(volts.max()),
-        covariance=tuple(map(tuple, covariance.tolist())),
-        residual_rms_n=float(np.sqrt(np.mean(residual**2))),
-        runs=len(runs),
-        points=int(volts.size),
-    )
-
-
-def _mean_residual(curve: FsrCurve, run: FsrRun) -> float:
-    return float(np.mean(run.force_n - curve.force_n(run.fsr_v)))

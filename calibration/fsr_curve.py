@@ -37,19 +37,15 @@ class FsrCurve:
         coefficients: c0, c1, ...
         low_v: Least voltage it holds for.
         high_v: Greatest voltage it holds for.
-        covariance: Of the coefficients, shape (p, p); empty if unknown.
-        residual_rms_n: Root mean square residual, N; NaN if unknown.
+        fit: The coefficients and how well they are known; None for those of a paper.
         runs: Number of runs fitted on.
-        points: Number of samples fitted on.
     """
 
     coefficients: tuple[float, ...]
     low_v: float
     high_v: float
-    covariance: tuple[tuple[float, ...], ...] = ()
-    residual_rms_n: float = float("nan")
+    fit: Fit | None = None
     runs: int = 0
-    points: int = 0
 
     def __post_init__(self) -> None:
         if not (self.low_v < self.high_v and np.isfinite(self.coefficients).all()):
@@ -99,20 +95,14 @@ class FsrCurve:
             FsrRangeError: One lies outside the range.
             CalibrationError: The curve comes without a covariance.
         """
-        if not self.covariance:
+        if self.fit is None or self.fit.residual_rms is None:
             raise CalibrationError("The curve comes without a covariance, so it has no interval.")
         force = self.force_n(fsr_v)
         powers = polynomial.polyvander(np.asarray(fsr_v, float), len(self.coefficients) - 1)
-        curve = np.einsum("...i,ij,...j->...", powers, np.array(self.covariance), powers)
-        spread = np.sqrt(np.maximum(curve, 0.0) + self.residual_rms_n**2)
+        curve = np.einsum("...i,ij,...j->...", powers, np.array(self.fit.covariance), powers)
+        spread = np.sqrt(np.maximum(curve, 0.0) + self.fit.residual_rms**2)
         half = float(stats.t.ppf((1 + level) / 2, self.runs - 1)) * spread
         return force - half, force + half
-
-    def as_fit(self) -> Fit:
-        """Return it as a calibration record keeps it."""
-        names = {f"c{k}": value for k, value in enumerate(self.coefficients)}
-        rms = None if np.isnan(self.residual_rms_n) else self.residual_rms_n
-        return Fit("polynomial", names, self.covariance, rms, self.points)
 
 
 ZHANG_2022 = FsrCurve((0.105, 2.57, -4.63, 3.71), 0.0, 1.0)

@@ -15,6 +15,7 @@ import numpy as np
 
 from calibration.fsr import Creep, FsrRun
 from calibration.fsr_curve import FsrCurve
+from calibration.regression import is_better, regress
 from estimation.recording import FloatArray
 
 CREEP_START_S = 0.1
@@ -84,29 +85,17 @@ def fit_memory(curve: FsrCurve, runs: Sequence[FsrRun], creep: Creep | None) -> 
     pairs = []
     for run in runs:
         column = 0.5 * _lens(curve, run.fsr_v) * _direction(run.time_s, run.fsr_v)
-        pairs.append((column, run.force_n - curve.force_n(run.fsr_v)))
-    gaps = np.array([_slope([pair]) for pair in pairs])
-    gap = _slope(pairs)
-    without, with_gap = np.empty(len(pairs)), np.empty(len(pairs))
-    for k, (column, left) in enumerate(pairs):
-        others = _slope([pair for j, pair in enumerate(pairs) if j != k])
-        without[k] = np.mean(left**2)
-        with_gap[k] = np.mean((left - others * column) ** 2)
-    gain = without - with_gap
-    matters = gain.mean() > gain.std(ddof=1) / np.sqrt(gain.size)
+        pairs.append((column[:, None], run.force_n - curve.force_n(run.fsr_v)))
+    gaps = np.array([float(x[:, 0] @ left / (x[:, 0] @ x[:, 0])) for x, left in pairs])
+    fit = regress(pairs)
+    without = np.array([np.mean(left**2) for _, left in pairs])
     creeps = creep is not None and abs(creep.rate) > 3 * creep.standard_error
     return FsrMemory(
-        gap_n=gap if matters else 0.0,
+        gap_n=float(fit.values[0]) if is_better(fit.held_out, without) else 0.0,
         gap_standard_error_n=float(gaps.std(ddof=1) / np.sqrt(gaps.size)),
         creep_ratio=creep.rate if creeps and creep is not None else 0.0,
-        held_out_rmse_n=(float(np.sqrt(without.mean())), float(np.sqrt(with_gap.mean()))),
+        held_out_rmse_n=(float(np.sqrt(without.mean())), float(np.sqrt(fit.held_out.mean()))),
     )
-
-
-def _slope(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
-    column = np.concatenate([x for x, _ in pairs])
-    left = np.concatenate([y for _, y in pairs])
-    return float(column @ left / max(float(column @ column), 1e-300))
 
 
 def _lens(curve: FsrCurve, fsr_v: FloatArray) -> FloatArray:

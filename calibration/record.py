@@ -2,13 +2,15 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import block_diag
 
 from calibration.errors import CalibrationError
 from calibration.linear import LinearCalibration
@@ -62,6 +64,33 @@ class Fit:
     covariance: tuple[tuple[float, ...], ...] = ()
     residual_rms: float | None = None
     points: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        form: str,
+        parameters: Mapping[str, float],
+        covariance: ArrayLike,
+        residual_rms: float | None,
+        points: int,
+    ) -> "Fit":
+        """Return a fit with the covariance as it was computed, an array of shape (p, p)."""
+        rows = np.asarray(covariance, dtype=float).tolist()
+        return cls(form, parameters, tuple(map(tuple, rows)), residual_rms, points)
+
+    def extended(
+        self, values: Mapping[str, float], deviations: Sequence[float] | None = None
+    ) -> "Fit":
+        """Return the fit with further parameters, which its own are not correlated with.
+
+        Args:
+            values: Name to value.
+            deviations: Standard deviation of each; 0 if None.
+        """
+        variances = np.square(np.zeros(len(values)) if deviations is None else deviations)
+        covariance = block_diag(self.covariance, np.diag(variances))
+        whole = {**self.parameters, **values}
+        return Fit.of(self.form, whole, covariance, self.residual_rms, self.points)
 
     def __post_init__(self) -> None:
         covariance = np.array(self.covariance, dtype=float)

@@ -46,8 +46,7 @@ class Regression:
     def as_fit(self, form: str, *names: str) -> Fit:
         """Return it as a calibration record keeps it, its coefficients by name."""
         parameters = dict(zip(names, self.values.tolist(), strict=True))
-        covariance = tuple(map(tuple, self.covariance.tolist()))
-        return Fit(form, parameters, covariance, self.residual_rms, self.size)
+        return Fit.of(form, parameters, self.covariance, self.residual_rms, self.size)
 
 
 def regress(runs: Sequence[Run], least_runs: int = 3) -> Regression:
@@ -83,21 +82,30 @@ def regress(runs: Sequence[Run], least_runs: int = 3) -> Regression:
     )
 
 
-def refuse_drift(fit: Regression, span: float, limit: float = 0.05) -> float:
+def refuse_drift(
+    fit: Regression,
+    span: float,
+    limit: float = 0.05,
+    fix: str = "Let the rig and its amplifiers warm up, then begin again.",
+) -> float:
     """Return how far the last run's residual is from the first's, over the span of the target.
 
     Raises:
         BadDataError: It is beyond the limit.
     """
     drift = float(fit.residuals[-1].mean() - fit.residuals[0].mean()) / span
-    fix = "Let the rig and its amplifiers warm up, then begin again."
     check_limit("drift", abs(drift), limit, "Drift from the first to the last run", fix)
     return drift
 
 
-def is_better(more: Regression, fewer: Regression) -> bool:
-    """Return whether the larger fit predicts runs left out better, by one standard error."""
-    gain = fewer.held_out - more.held_out
+def is_better(more: FloatArray, fewer: FloatArray) -> bool:
+    """Return whether the larger of two fits predicts runs left out better, by a standard error.
+
+    Args:
+        more: Its mean square errors on runs left out, shape (runs,).
+        fewer: Those of the smaller fit, or of none.
+    """
+    gain = fewer - more
     return bool(gain.mean() > gain.std(ddof=1) / np.sqrt(gain.size))
 
 

@@ -27,64 +27,17 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 MINIMUM_READINGS = 100
 MINIMUM_STEPS = 6
 MINIMUM_LEVELS = 4
+RAILS_COUNTS = (-32768.0, 32767.0)
+"""Least and greatest count of the converter."""
+SHUNT_TOLERANCE = 0.01
+"""Greatest relative deviation from the certificate that passes."""
+LINEARITY_LIMIT, HYSTERESIS_LIMIT, DRIFT_LIMIT = 0.01, 0.01, 0.005
+"""Greatest departure from the line, hysteresis and drift of the zero, as shares of the span."""
 
 
-def shunt_ratio(shunt_ohm: float, bridge_ohm: float = 350.0) -> float:
-    """Return the output a shunt across one arm of an equal-arm bridge gives, V/V of excitation.
-
-    Vo/Vex = R / (4 Rs + 2 R); Yokogawa DL850E manual, appendix, and Vishay TN-514.
-
-    Args:
-        shunt_ohm: Rs.
-        bridge_ohm: R, resistance of each arm.
-    """
-    if not (shunt_ohm > 0 and bridge_ohm > 0):
-        raise BadDataError("points", f"Resistances {shunt_ohm} and {bridge_ohm} ohm cannot be.")
-    return bridge_ohm / (4 * shunt_ohm + 2 * bridge_ohm)
-
-
-def weight_torque_n_m(
-    mass_kg: ArrayLike,
-    arm_m: float,
-    arm_from_horizontal_rad: float = 0.0,
-    gravity_m_s2: float = STANDARD_GRAVITY_M_S2,
-) -> FloatArray:
-    """Return the torque of masses at the end of an arm, N m.
-
-    Args:
-        mass_kg: Masses, any shape.
-        arm_m: Length of the arm from the axis to where the mass hangs.
-        arm_from_horizontal_rad: Angle of the arm.
-        gravity_m_s2: Local gravity.
-    """
-    lever_m = arm_m * np.cos(arm_from_horizontal_rad)
-    return np.asarray(np.asarray(mass_kg, dtype=np.float64) * gravity_m_s2 * lever_m)
-
-
-@dataclass(frozen=True, slots=True)
-class ShuntCheck:
-    """A sensor with and without its shunt.
-
-    Attributes:
-        unloaded_counts: Mean reading without the shunt.
-        shunted_counts: Mean reading with it.
-        change_counts: Shunted less unloaded.
-        certificate_counts: The change by the certificate.
-        deviation: Change over the certificate's, less one.
-        tolerance: Greatest deviation that passes.
-    """
-
-    unloaded_counts: float
-    shunted_counts: float
-    change_counts: float
-    certificate_counts: float
-    deviation: float
-    tolerance: float
-
-    @property
-    def passes(self) -> bool:
-        """Whether the deviation is within the tolerance."""
-        return abs(self.deviation) <= self.tolerance
+def weight_torque_n_m(mass_kg: ArrayLike, arm_m: float) -> FloatArray:
+    """Return the torque of masses, any shape, at the end of a level arm, N m."""
+    return np.asarray(np.asarray(mass_kg, dtype=np.float64) * STANDARD_GRAVITY_M_S2 * arm_m)
 
 
 def check_shunt(
@@ -92,29 +45,23 @@ def check_shunt(
     shunted: ArrayLike,
     certificate_v_v: float,
     counts_per_v_v: float,
-    tolerance: float = 0.01,
-    rails_counts: tuple[float, float] | None = None,
-) -> ShuntCheck:
-    """Compare the change a shunt makes with the one its certificate states.
+) -> float:
+    """Return the change a shunt makes over the one its certificate states, less one.
 
     Args:
         unloaded: Readings without the shunt, counts, shape (n,).
         shunted: Readings with it, counts, shape (m,).
-        certificate_v_v: Change by the certificate, V/V; see `shunt_ratio` where it states ohms.
+        certificate_v_v: Change by the certificate, V/V. A shunt of Rs across one arm of an
+            equal-arm bridge of R gives R / (4 Rs + 2 R) (Yokogawa DL850E manual; Vishay TN-514).
         counts_per_v_v: Gain of amplifier and converter.
-        tolerance: Greatest relative deviation that passes.
-        rails_counts: Least and greatest count of the converter.
 
     Raises:
-        BadDataError: Too few readings, at a rail, drifting, or no change beyond the noise.
+        BadDataError: Too few readings, at a rail, drifting, no change beyond the noise, or another
+            change than the certificate's.
     """
     means, errors = [], []
     for name, values in (("unloaded", unloaded), ("shunted", shunted)):
-        readings = finite(values, f"the {name} readings")
-        check_points(readings.size, MINIMUM_READINGS, f"{name} readings")
-        if rails_counts is not None:
-            check_rails(readings, *rails_counts, f"the {name} readings", pile_up=False)
-        _check_steady(readings, name)
+        readings = _at_rest(values, name)
         means.append(float(readings.mean()))
         errors.append(float(readings.std(ddof=1)) / np.sqrt(readings.size))
     change = means[1] - means[0]
@@ -128,9 +75,16 @@ def check_shunt(
             f"By the certificate it is {certificate:.4g}.",
             "Check that the shunt is switched on and the bridge is excited.",
         )
-    return ShuntCheck(
-        means[0], means[1], change, certificate, change / certificate - 1.0, tolerance
-    )
+    deviation = change / certificate - 1.0
+    if abs(deviation) > SHUNT_TOLERANCE:
+        raise BadDataError(
+            "shunt",
+            f"The shunt changes the reading by {change:.0f} counts, "
+            f"by the certificate {certificate:.0f}.",
+            f"That is {deviation:+.2%}; {SHUNT_TOLERANCE:.0%} passes.",
+            "Check wiring, excitation and the amplifier's gain before hanging weights.",
+        )
+    return deviation
 
 
 @dataclass(frozen=True)
@@ -151,10 +105,7 @@ class TorqueResult:
     """The line through known torques, torque = slope (counts - zero).
 
     Attributes:
-        slope_n_m: Torque of a count.
-        zero_counts: Counts at no torque.
-        covariance: Of slope and zero, shape (2, 2).
-        residual_rms_n_m: Root mean square residual of the steps.
+        fit: Slope, N m a count, and zero, counts.
         linearity: Greatest residual of a level's mean, over the span of torque.
         hysteresis: Greatest difference of loading and unloading at one level, over the span; None
             where no level was reached both ways.
@@ -162,53 +113,32 @@ class TorqueResult:
             where the series does not begin and end unloaded.
         low_counts: Least mean reading.
         high_counts: Greatest mean reading.
-        steps: Number of steps.
+        torque_n_m: Torque of each step, shape (n,).
+        residual_n_m: Torque by the line less that of the step, shape (n,).
     """
 
-    slope_n_m: float
-    zero_counts: float
-    covariance: tuple[tuple[float, ...], ...]
-    residual_rms_n_m: float
+    fit: Fit
     linearity: float
     hysteresis: float | None
     drift: float | None
     low_counts: float
     high_counts: float
-    steps: int
-
-    def as_fit(self) -> Fit:
-        """Return it as a calibration record keeps it."""
-        parameters = {"slope": self.slope_n_m, "zero": self.zero_counts}
-        return Fit(LINE, parameters, self.covariance, self.residual_rms_n_m, self.steps)
+    torque_n_m: FloatArray
+    residual_n_m: FloatArray
 
 
-def fit_torque(
-    steps: Sequence[Step],
-    *,
-    rails_counts: tuple[float, float] | None = None,
-    linearity_limit: float = 0.01,
-    hysteresis_limit: float = 0.01,
-    drift_limit: float = 0.005,
-) -> TorqueResult:
+def fit_torque(steps: Sequence[Step]) -> TorqueResult:
     """Fit the line through the steps' mean readings, each step one piece of evidence.
 
     Args:
         steps: In the order they were made: up through the levels and down again.
-        rails_counts: Least and greatest count of the converter.
-        linearity_limit: Greatest departure from the line that passes, share of the span.
-        hysteresis_limit: Greatest hysteresis that passes, share of the span.
-        drift_limit: Greatest drift of the zero that passes, share of the span.
 
     Raises:
         BadDataError: The data are not sufficient for a calibration; its `rule` is the reason.
     """
     check_points(len(steps), MINIMUM_STEPS, "steps")
     for k, step in enumerate(steps):
-        readings = finite(step.counts, f"step {k + 1}")
-        check_points(readings.size, MINIMUM_READINGS, f"readings in step {k + 1}")
-        if rails_counts is not None:
-            check_rails(readings, *rails_counts, f"the readings of step {k + 1}", pile_up=False)
-        _check_steady(readings, f"step {k + 1}")
+        _at_rest(step.counts, f"step {k + 1}")
     torques = finite([step.torque_n_m for step in steps], "the torques")
     counts = np.array([step.counts.mean() for step in steps])
     noise = float(np.median([step.counts.std(ddof=1) for step in steps]))
@@ -224,33 +154,38 @@ def fit_torque(
     residual = (counts - zero) * slope - torques
     span = float(np.ptp(torques))
     linearity = _linearity(torques, residual) / span
-    hysteresis, drift = _hysteresis(torques, residual), _zero_drift(torques, residual)
-    hysteresis = None if hysteresis is None else hysteresis / span
-    drift = None if drift is None else drift / span
-    if drift is not None:
+    hysteresis, drift = _hysteresis(torques, residual, span), None
+    if torques[0] == 0.0 and torques[-1] == 0.0:
+        drift = float(residual[-1] - residual[0]) / span
         fix = "Let the amplifier warm up, and repeat."
-        check_limit("drift", abs(drift), drift_limit, "Drift of the zero", fix)
+        check_limit("drift", abs(drift), DRIFT_LIMIT, "Drift of the zero", fix)
     if hysteresis is not None:
         fix = "Look for friction in the arm and for a loose mounting."
-        check_limit("hysteresis", hysteresis, hysteresis_limit, "Hysteresis", fix)
+        check_limit("hysteresis", hysteresis, HYSTERESIS_LIMIT, "Hysteresis", fix)
     fix = "Check the masses, and that the arm stays level."
-    check_limit("not_linear", linearity, linearity_limit, "The departure from a line", fix)
-    return TorqueResult(
-        slope_n_m=slope,
-        zero_counts=zero,
-        covariance=_covariance(torques, counts, float(line.slope), zero),
-        residual_rms_n_m=float(np.sqrt(np.mean(residual**2))),
-        linearity=linearity,
-        hysteresis=hysteresis,
-        drift=drift,
-        low_counts=float(counts.min()),
-        high_counts=float(counts.max()),
-        steps=len(steps),
+    check_limit("not_linear", linearity, LINEARITY_LIMIT, "The departure from a line", fix)
+    apart = -float(torques.mean()) * line.stderr**2
+    spread = np.array([[line.stderr**2, apart], [apart, line.intercept_stderr**2]])
+    turned = np.diag([-(slope**2), 1.0])
+    fit = Fit.of(
+        LINE,
+        {"slope": slope, "zero": zero},
+        turned @ spread @ turned,
+        float(np.sqrt(np.mean(residual**2))),
+        len(steps),
     )
+    low, high = float(counts.min()), float(counts.max())
+    return TorqueResult(fit, linearity, hysteresis, drift, low, high, torques, residual)
 
 
-def _check_steady(readings: FloatArray, name: str) -> None:
-    """Refuse readings whose halves differ by more than the noise of one reading, and a count."""
+def _at_rest(values: ArrayLike, name: str) -> FloatArray:
+    """Return readings, refused where they are few, at a rail, or do not rest.
+
+    Their halves may differ by the noise of one reading, and by a count.
+    """
+    readings = finite(values, f"the readings of {name}")
+    check_points(readings.size, MINIMUM_READINGS, f"readings of {name}")
+    check_rails(readings, *RAILS_COUNTS, f"the readings of {name}", pile_up=False)
     first, last = np.array_split(readings, 2)
     moved = abs(float(last.mean() - first.mean()))
     if moved > max(float(np.std(np.diff(readings))) / np.sqrt(2), 1.0):
@@ -260,13 +195,14 @@ def _check_steady(readings: FloatArray, name: str) -> None:
             "That is more than the noise of one reading.",
             "Wait until the weight hangs still.",
         )
+    return readings
 
 
 def _linearity(torques: FloatArray, residual: FloatArray) -> float:
     return max(abs(float(residual[torques == level].mean())) for level in np.unique(torques))
 
 
-def _hysteresis(torques: FloatArray, residual: FloatArray) -> float | None:
+def _hysteresis(torques: FloatArray, residual: FloatArray, span: float) -> float | None:
     """Return the greatest difference between a level reached from below and from above."""
     rising = np.diff(torques, prepend=torques[0]) > 0
     falling = np.diff(torques, prepend=torques[0]) < 0
@@ -275,22 +211,4 @@ def _hysteresis(torques: FloatArray, residual: FloatArray) -> float | None:
         for here in (torques == level for level in np.unique(torques))
         if (here & rising).any() and (here & falling).any()
     ]
-    return max(apart, default=None)
-
-
-def _zero_drift(torques: FloatArray, residual: FloatArray) -> float | None:
-    if torques[0] != 0.0 or torques[-1] != 0.0:
-        return None
-    return float(residual[-1] - residual[0])
-
-
-def _covariance(
-    torques: FloatArray, counts: FloatArray, counts_per_n_m: float, zero: float
-) -> tuple[tuple[float, ...], ...]:
-    """Return the covariance of slope (N m a count) and zero, from that of counts over torque."""
-    design = np.column_stack([torques, np.ones_like(torques)])
-    residual = counts - design @ [counts_per_n_m, zero]
-    variance = float(residual @ residual) / (len(torques) - 2)
-    turned = np.diag([-1.0 / counts_per_n_m**2, 1.0])
-    covariance = turned @ (variance * np.linalg.inv(design.T @ design)) @ turned
-    return tuple(map(tuple, covariance.tolist()))
+    return max(apart) / span if apart else None

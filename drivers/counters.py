@@ -1,16 +1,40 @@
-"""Counters of the link to a device, and numbers for samples without any."""
+"""Counters of the link to a device."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
-import numpy as np
-from numpy.typing import NDArray
 
-from drivers.link import LinkCounters
+@dataclass(slots=True)
+class LinkCounters:
+    """Counters of a link since it was opened.
+
+    Attributes:
+        frames: Good frames received.
+        crc_errors: Frames dropped: wrong CRC, not COBS, or too long.
+        discarded_bytes: Bytes in dropped frames, and those before the first whole frame.
+        unknown_frames: Good frames of an unexpected kind or version.
+        gaps: Places where samples are missing.
+        lost: Samples missing in those places.
+        duplicates: Samples dropped because they had come before.
+        retries: Commands sent again because no answer came.
+    """
+
+    frames: int = 0
+    crc_errors: int = 0
+    discarded_bytes: int = 0
+    unknown_frames: int = 0
+    gaps: int = 0
+    lost: int = 0
+    duplicates: int = 0
+    retries: int = 0
+
+    def as_dict(self) -> dict[str, int]:
+        """Return the counters by name."""
+        return asdict(self)
 
 
 @dataclass(slots=True)
 class DeviceCounters(LinkCounters):
-    """Counters of a link since it was opened; see also `drivers.link.LinkCounters`.
+    """Counters of a link since it was opened; see also `LinkCounters`.
 
     `crc_errors` counts checksums that do not fit, whatever their kind.
 
@@ -27,40 +51,3 @@ class DeviceCounters(LinkCounters):
     late: int = 0
     device_errors: int = 0
     restarts: int = 0
-
-
-class Arrivals:
-    """Numbers the samples of a stream that does not, and notices its silences.
-
-    Args:
-        counters: Counters to add silences to.
-        longest_silence_s: Longest time between samples that is not a fault, s.
-    """
-
-    def __init__(self, counters: DeviceCounters, longest_silence_s: float) -> None:
-        self._counters = counters
-        self._longest_silence_s = longest_silence_s
-        self._next = 0
-        self._heard_s = 0.0
-        self._silent = False
-
-    def restart(self, now_s: float) -> None:
-        """Begin to count at 0 and to listen from now on."""
-        self._next = 0
-        self._heard_s = now_s
-        self._silent = False
-
-    def number(self, count: int, now_s: float) -> NDArray[np.int64]:
-        """Return the numbers of `count` samples that have come, int64, shape (count,).
-
-        Call it with 0 when nothing came, too: a silence is then counted once, while it lasts.
-        """
-        if now_s - self._heard_s > self._longest_silence_s and not self._silent:
-            self._counters.stalls += 1
-            self._silent = True
-        if count:
-            self._heard_s = now_s
-            self._silent = False
-        numbers = np.arange(self._next, self._next + count, dtype=np.int64)
-        self._next += count
-        return numbers

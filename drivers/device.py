@@ -4,7 +4,7 @@ A driver is made from an open link, controls one device, and does nothing in the
 passes in `read`. Simulation swaps the link and nothing else.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 from typing import Literal, Protocol, runtime_checkable
@@ -12,6 +12,7 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.counters import DeviceCounters
 from drivers.errors import LinkError
 
 
@@ -46,6 +47,33 @@ class Channel:
     lower: float
     upper: float
     description: str
+
+
+AXES = ("force_x_n", "force_y_n", "force_z_n", "torque_x_n_m", "torque_y_n_m", "torque_z_n_m")
+"""Channels of a force and torque sensor."""
+
+
+def wrench_channels(rate_hz: float, tops: Sequence[float]) -> tuple[Channel, ...]:
+    """Return three forces and three torques, given the largest value of each, N and N m."""
+    kinds = [("N", "force")] * 3 + [("N m", "torque")] * 3
+    return tuple(
+        Channel(name, unit, rate_hz, -top, top, text)
+        for name, (unit, text), top in zip(AXES, kinds, tops, strict=True)
+    )
+
+
+def moved_wrench(wrench: NDArray[np.float64], point_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a wrench about another point, axes unchanged, shape (..., 6).
+
+    The force stays; the torque becomes T' = T + r x F, with r from the new point to the old one,
+    here `-point_m`.
+
+    Args:
+        wrench: Force and torque about the sensor's origin, N and N m, shape (..., 6).
+        point_m: The new point in the sensor's axes, m, shape (3,).
+    """
+    force, torque = wrench[..., :3], wrench[..., 3:]
+    return np.concatenate((force, torque + np.cross(-point_m, force)), axis=-1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,3 +232,57 @@ def stop_and_let_go(stop: Callable[[], None], let_go: Callable[[], None]) -> Non
         pass  # it is gone already
     finally:
         let_go()
+
+
+class Clocked(Protocol):
+    """The way to a device: a transport or a CAN bus."""
+
+    @property
+    def now_s(self) -> float:
+        """Its clock, s."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it."""
+        ...
+
+
+class LinkedDevice:
+    """What every driver of a device on one link has.
+
+    A driver gives `channels`, `identify` and `stop`.
+
+    Args:
+        way: The way to the device, closed with it.
+        rate_hz: Samples a second.
+    """
+
+    def __init__(self, way: Clocked, rate_hz: float) -> None:
+        self._way = way
+        self._rate_hz = rate_hz
+        self._counters = DeviceCounters()
+        self._identified = self._closed = False
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What a sample has."""
+        raise NotImplementedError
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened on the way."""
+        return self._counters.as_dict()
+
+    def identify(self) -> DeviceIdentity:
+        """Ask who is there."""
+        raise NotImplementedError
+
+    def stop(self) -> None:
+        """Let no more samples come."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Stop where that can still be done, and let go of the way."""
+        if not self._closed:
+            self._closed = True
+            stop_and_let_go(self.stop, self._way.close)

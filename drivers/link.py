@@ -2,11 +2,11 @@
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.counters import LinkCounters
 from drivers.errors import LinkTimeoutError
 from drivers.framing import DELIMITER, FrameStream, encode_frame
 from drivers.transport.transport import Transport
@@ -14,35 +14,6 @@ from drivers.transport.transport import Transport
 TRIES = 3
 REPLY_TIMEOUT_S = 0.1
 """Time for one answer. A full queue of a USB port is emptied in a fraction of it."""
-
-
-@dataclass(slots=True)
-class LinkCounters:
-    """Counters of a link since it was opened.
-
-    Attributes:
-        frames: Good frames received.
-        crc_errors: Frames dropped: wrong CRC, not COBS, or too long.
-        discarded_bytes: Bytes in dropped frames, and those before the first whole frame.
-        unknown_frames: Good frames of an unexpected kind or version.
-        gaps: Places where samples are missing.
-        lost: Samples missing in those places.
-        duplicates: Samples dropped because they had come before.
-        retries: Commands sent again because no answer came.
-    """
-
-    frames: int = 0
-    crc_errors: int = 0
-    discarded_bytes: int = 0
-    unknown_frames: int = 0
-    gaps: int = 0
-    lost: int = 0
-    duplicates: int = 0
-    retries: int = 0
-
-    def as_dict(self) -> dict[str, int]:
-        """Return the counters by name."""
-        return asdict(self)
 
 
 class FramedLink:

@@ -4,26 +4,22 @@ Source: Modbus application protocol 1.1b3 and serial line guide 1.02.
 """
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.ati_net.protocol import AXES
-from drivers.counters import Arrivals, DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, stop_and_let_go
+from drivers.counters import DeviceCounters
+from drivers.device import AXES, Channel, wrench_channels
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.sliding import Check, SlidingFrames
+from drivers.streaming import StreamedDevice
 from drivers.transport.transport import Transport
 
 READ, WRITE = 0x03, 0x10
 TRIES = 3
 REPLY_TIMEOUT_S = 0.2
-QUIET_S = 0.05
-"""A stopped stream has ended when nothing arrives for this long, s."""
-LONGEST_SILENCE_S = 0.1
-"""Shortest time without a frame after which frames are missing from the count of a stream, s."""
 
 
 def crc16(data: bytes) -> int:
@@ -74,7 +70,6 @@ class ModbusLine:
         slave: Its address.
         counters: Counters of retries, timeouts and discarded bytes.
         title: The device in messages.
-        jam: Bytes that end its stream.
         check: What a person should check where it does not answer.
     """
 
@@ -83,33 +78,14 @@ class ModbusLine:
         transport: Transport,
         slave: int,
         counters: DeviceCounters,
-        *,
         title: str,
-        jam: bytes,
         check: str,
     ) -> None:
         self._transport = transport
         self._slave = slave
         self._counters = counters
         self._title = title
-        self._jam = jam
         self._check = check
-
-    def quieten(self) -> None:
-        """End the stream and wait until nothing more comes.
-
-        Raises:
-            LinkTimeoutError: It goes on.
-        """
-        self._transport.write(self._jam)
-        give_up_s = self._transport.now_s + 1.0
-        while self._transport.read(QUIET_S):
-            if self._transport.now_s > give_up_s:
-                raise LinkTimeoutError(
-                    f"The {self._title} at {self._transport.url} does not end its stream.",
-                    "It was jammed and continued for 1 s.",
-                    "Check the adapter's sending side, or switch the sensor off and on.",
-                )
 
     def read(self, first: int, count: int) -> bytes:
         """Return registers, two bytes each, high byte first.
@@ -139,12 +115,15 @@ class ModbusLine:
 
         return self._asked(request, whole, lambda: None)[1]
 
-    def begin_stream(self, request: bytes, answer: tuple[int, bytes]) -> bytes:
+    def begin_stream(
+        self, request: bytes, answer: tuple[int, bytes], quieten: Callable[[], None]
+    ) -> bytes:
         """Let a stream begin; return the bytes of it that came with the answer.
 
         Args:
             request: What begins it.
             answer: Function and data of the answer to it.
+            quieten: Ends the stream.
 
         Raises:
             LinkTimeoutError: Nobody answers.
@@ -162,7 +141,7 @@ class ModbusLine:
                 return None
 
         # it may stream although its answer did not come through
-        data = self._asked(request, begun, self.quieten)
+        data = self._asked(request, begun, quieten)
         if data != answer:
             raise self.refused(*data)
         return rest
@@ -232,7 +211,7 @@ class Stream:
     agree: int
 
 
-class StreamedSensor:
+class StreamedSensor(StreamedDevice):
     """Three forces and three torques of a sensor that is asked over Modbus, then streams.
 
     A driver gives `identify` and `decode`, and `prepare` where the stream needs more.
@@ -244,25 +223,13 @@ class StreamedSensor:
     """
 
     def __init__(self, transport: Transport, stream: Stream, rate_hz: float) -> None:
-        self._transport = transport
+        super().__init__(transport, rate_hz, stream.title)
         self._stream = stream
-        self._rate_hz = rate_hz
-        self._counters = DeviceCounters()
-        self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
         self._frames = SlidingFrames(
             stream.frame_size, stream.frame_checks, self._counters, agree=stream.agree
         )
-        self._line = ModbusLine(
-            transport,
-            stream.slave,
-            self._counters,
-            title=stream.title,
-            jam=stream.jam,
-            check=stream.check,
-        )
-        self._errors_at_start = 0
+        self._line = ModbusLine(transport, stream.slave, self._counters, stream.title, stream.check)
         self._early = b""
-        self._identified = self._closed = False
 
     @property
     def tops(self) -> Sequence[float]:
@@ -272,20 +239,7 @@ class StreamedSensor:
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Three forces and three torques."""
-        kinds = [("N", "force")] * 3 + [("N m", "torque")] * 3
-        return tuple(
-            Channel(name, unit, self._rate_hz, -top, top, text)
-            for name, (unit, text), top in zip(AXES, kinds, self.tops, strict=True)
-        )
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Counters of the line."""
-        return self._counters.as_dict()
-
-    def identify(self) -> DeviceIdentity:
-        """End the stream and ask who is there."""
-        raise NotImplementedError
+        return wrench_channels(self._rate_hz, self.tops)
 
     def prepare(self) -> None:
         """Write what the stream needs."""
@@ -294,49 +248,23 @@ class StreamedSensor:
         """Return values, shape (n, 6), and the `SampleFlag` bits of each frame, shape (n,)."""
         raise NotImplementedError
 
-    def start(self) -> None:
-        """Let the stream begin.
-
-        Raises:
-            LinkTimeoutError: Nobody answers.
-            DriverError: The sensor refuses.
-        """
-        if not self._identified:
-            self.identify()
-        self._line.quieten()
+    def begin(self) -> None:
+        """Let the stream begin."""
+        self.quieten()
         self.prepare()
         self._frames.restart()
-        self._errors_at_start = self._counters.crc_errors
-        self._early = self._line.begin_stream(self._stream.begin, self._stream.begun)
-        self._arrivals.restart(self._transport.now_s)
+        stream = self._stream
+        self._early = self._line.begin_stream(stream.begin, stream.begun, self.quieten)
 
-    def read(self, timeout_s: float) -> Batch:
-        """Return the frames that have come, stamped with the time of this read.
-
-        Raises:
-            DriverError: Neither `identify` nor `start` has been called.
-        """
-        if not self._identified:
-            raise DriverError(f"The {self._stream.title} is not known.", fix="Call start first.")
+    def receive(
+        self, timeout_s: float
+    ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
+        """Return the values and flags of the frames that have come."""
         frames = self._frames.read(self._transport, timeout_s, self._early)
         self._early = b""
         values, flags = self.decode(frames)
-        now_s = self._transport.now_s
-        return Batch(
-            {name: values[:, axis] for axis, name in enumerate(AXES)},
-            np.full(len(values), now_s),
-            "host",
-            self._arrivals.number(len(values), now_s),
-            flags,
-            self._counters.crc_errors - self._errors_at_start,
-        )
+        return dict(zip(AXES, values.T, strict=True)), flags
 
     def stop(self) -> None:
         """End the stream."""
         self._transport.write(self._stream.jam)
-
-    def close(self) -> None:
-        """End the stream where that can still be done, and let go of the line."""
-        if not self._closed:
-            self._closed = True
-            stop_and_let_go(self.stop, self._transport.close)

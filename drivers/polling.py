@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from drivers.counters import DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, stop_and_let_go
+from drivers.device import Batch, Clocked, LinkedDevice
 from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError, LinkTimeoutError
 
 
@@ -52,20 +51,7 @@ class PollSchedule:
         self._counters.lost += samples
 
 
-class Clocked(Protocol):
-    """The way to a polled device: a transport or a CAN bus."""
-
-    @property
-    def now_s(self) -> float:
-        """Its clock, s."""
-        ...
-
-    def close(self) -> None:
-        """Let go of it."""
-        ...
-
-
-class PolledDevice:
+class PolledDevice(LinkedDevice):
     """A device that is asked for every sample, at a steady rate.
 
     A driver gives `channels`, `identify`, `idle` and `sample`, and may give `judge`.
@@ -77,23 +63,10 @@ class PolledDevice:
     """
 
     def __init__(self, way: Clocked, rate_hz: float, late_s: float = 0.0) -> None:
-        self._way = way
-        self._rate_hz = rate_hz
+        super().__init__(way, rate_hz)
         self._late_s = late_s
-        self._counters = DeviceCounters()
         self._schedule = PollSchedule(rate_hz, self._counters)
         self._schedule.restart(way.now_s)
-        self._identified = self._closed = False
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """What a sample has."""
-        raise NotImplementedError
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """What happened on the way."""
-        return self._counters.as_dict()
 
     @property
     def now_s(self) -> float:
@@ -104,10 +77,6 @@ class PolledDevice:
     def wait_s(self) -> float:
         """Time until the next sample is due, 0 when it is."""
         return self._schedule.wait_s(self._way.now_s)
-
-    def identify(self) -> DeviceIdentity:
-        """Ask who is there."""
-        raise NotImplementedError
 
     def idle(self, wait_s: float) -> None:
         """Let time pass; what comes unasked is late, and dropped."""
@@ -157,12 +126,6 @@ class PolledDevice:
 
     def stop(self) -> None:
         """Do nothing: a device that is not asked is silent."""
-
-    def close(self) -> None:
-        """Stop, and let go of the way."""
-        if not self._closed:
-            self._closed = True
-            stop_and_let_go(self.stop, self._way.close)
 
     @cached_property
     def _names(self) -> list[str]:

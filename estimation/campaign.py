@@ -1,4 +1,4 @@
-"""A campaign: many runs of one rig, walked run by run, split by run, on one clock.
+"""A campaign: many runs of one rig, walked run by run, split by run.
 
 A campaign contains run *handles*. A handle has the run's name and conditions and loads the
 recording on request, so a campaign may be larger than memory: iterate over it and keep only what
@@ -48,20 +48,6 @@ class Run:
         """Read the recording; the handle's reason of exclusion goes with it."""
         recording = self.load()
         return recording.exclude(self.excluded) if self.excluded else recording
-
-
-@dataclass(frozen=True)
-class Clock:
-    """One clock over all runs of a campaign.
-
-    Attributes:
-        start_s: Campaign time of each run's first sample, shape (runs,).
-        gap_known: Whether the gap before each run was recorded, shape (runs,). A run with False
-            is placed back to back with its predecessor: the gap's true length is unknown.
-    """
-
-    start_s: FloatArray
-    gap_known: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -165,43 +151,6 @@ class Campaign:
         return Campaign(
             tuple(replace(r, load=partial(_timed, r.load, min(known))) for r in self.runs)
         )
-
-    def clock(self) -> Clock:
-        """Place all runs on one clock.
-
-        A run with a recorded start keeps it, relative to the first recorded start; a run without
-        one follows its predecessor back to back, one sample period later. Walks the campaign.
-
-        Raises:
-            CampaignError: Recorded starts make runs overlap or run backwards.
-        """
-        start_s: list[float] = []
-        gap_known: list[bool] = []
-        end_s = 0.0
-        # an absolute start is usable once a first one has tied it to campaign time
-        epoch_s: float | None = None
-        for index, recording in enumerate(self):
-            known = False
-            start = end_s
-            if recording.started_at_ns is not None:
-                absolute_s = recording.started_at_ns * 1e-9
-                if epoch_s is None:
-                    epoch_s = absolute_s - end_s
-                else:
-                    start = absolute_s - epoch_s
-                    known = True
-                known = known or index == 0
-            if start < end_s - 1e-3:
-                raise CampaignError(
-                    f"Run {recording.name!r} starts {end_s - start:.3f} s before its predecessor"
-                    " ends.",
-                    "The recorded starts are out of order or the runs overlap.",
-                )
-            start_s.append(start)
-            gap_known.append(known)
-            period_s = 1.0 / recording.sample_rate_hz if len(recording) > 1 else 0.0
-            end_s = start + recording.duration_s + period_s
-        return Clock(np.array(start_s), np.array(gap_known, dtype=bool))
 
     def folds(self, count: int, seed: int = 0) -> list[Split]:
         """Split by run into folds: each run is tested exactly once.

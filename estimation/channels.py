@@ -69,6 +69,14 @@ def unit_of(name: str) -> str:
     return UNIT_BY_SUFFIX[ending_of(name)]
 
 
+def unit_or_none(name: str) -> str | None:
+    """Return the SI unit symbol a name ends in; None where it ends in none."""
+    try:
+        return unit_of(name)
+    except UnknownUnitError:
+        return None
+
+
 def ending_of(name: str) -> str:
     """Return the suffix of a name that states its unit, such as `n_m`.
 
@@ -87,29 +95,26 @@ def ending_of(name: str) -> str:
     )
 
 
-def _channel(name: str, description: str) -> tuple[str, Channel]:
-    return name, Channel(name, unit_of(name), description)
-
-
-CHANNELS: dict[str, Channel] = dict(
-    [
-        _channel("time_s", "device clock, starts near zero in each run"),
-        _channel("campaign_time_s", "time since the campaign's first run began, derived"),
-        _channel("motor_angle_rad", "drive motor shaft, before the gearhead"),
-        _channel("spindle_angle_rad", "instrument spindle, after the gearhead"),
-        _channel("jaw_angle_rad", "jaw, from the encoder of the load motor"),
-        _channel("target_angle_rad", "commanded trajectory of the spindle"),
-        _channel("motor_current_a", "measured current of the drive motor"),
-        _channel("motor_command_ratio", "command to the current controller, 1 is full scale"),
-        _channel("load_command_a", "current commanded to the load motor at the jaw"),
-        _channel("proximal_torque_n_m", "torque sensor at the spindle"),
-        _channel("distal_torque_n_m", "torque sensor at the jaw"),
-        _channel("fsr_v", "amplified force-sensing resistor"),
-        _channel("wrist_pitch_rad", "wrist pitch of the instrument"),
-        _channel("wrist_roll_rad", "roll of the instrument shaft"),
-        _channel("motor_temperature_k", "drive motor housing"),
-    ]
-)
+CHANNELS: dict[str, Channel] = {
+    name: Channel(name, unit_of(name), description)
+    for name, description in {
+        "time_s": "device clock, starts near zero in each run",
+        "campaign_time_s": "time since the campaign's first run began, derived",
+        "motor_angle_rad": "drive motor shaft, before the gearhead",
+        "spindle_angle_rad": "instrument spindle, after the gearhead",
+        "jaw_angle_rad": "jaw, from the encoder of the load motor",
+        "target_angle_rad": "commanded trajectory of the spindle",
+        "motor_current_a": "measured current of the drive motor",
+        "motor_command_ratio": "command to the current controller, 1 is full scale",
+        "load_command_a": "current commanded to the load motor at the jaw",
+        "proximal_torque_n_m": "torque sensor at the spindle",
+        "distal_torque_n_m": "torque sensor at the jaw",
+        "fsr_v": "amplified force-sensing resistor",
+        "wrist_pitch_rad": "wrist pitch of the instrument",
+        "wrist_roll_rad": "roll of the instrument shaft",
+        "motor_temperature_k": "drive motor housing",
+    }.items()
+}
 """Registered channels of the grasper rig by name. Other names are allowed if they carry a unit."""
 
 

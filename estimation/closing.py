@@ -6,7 +6,6 @@ Robotics and Automation Letters 2018, section II.C.
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +44,4 @@ def closing_samples(run: Recording, keep_flagged: bool = True) -> Recording:
     kept = is_closing(run)
     if not keep_flagged:
         kept &= run.valid
-    return replace(
-        run,
-        time_s=run.time_s[kept],
-        columns={name: values[kept] for name, values in run.columns.items()},
-        flags=run.flags[kept],
-    )
+    return run.at(np.flatnonzero(kept))

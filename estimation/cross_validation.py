@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, in_folds
 from estimation.closing import is_closing, processed
 from estimation.estimator import Estimator, Recipe
+from estimation.estimators.bank import BankRecipe, fit_runs
 from estimation.fitting import fit
-from estimation.model import Model, balance_channels, estimate, settled
+from estimation.model import Model, counted_error
 from estimation.recording import FloatArray
-from estimation.scores import Score, score
+from estimation.scores import Score, rmse, score
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,17 +50,12 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
     errors: dict[str, FloatArray] = {}
     for split in campaign.folds(folds, seed):
         fitted = fit(declared, split.train, bootstrap=0)
-        for recording in split.test:
-            run = balance_channels(fitted, recording)
-            places = settled(fitted, run)
-            error = run[fitted.target] - estimate(fitted, run)
-            errors[recording.name] = error[places]
-    whole = np.concatenate(list(errors.values()))
+        errors |= {run.name: counted_error(fitted, run) for run in split.test}
     centred = {name: error - error.mean() for name, error in errors.items() if error.size}
     return HeldOutError(
-        rmse=_rms(np.concatenate(list(centred.values()))),
-        rmse_with_means=_rms(whole),
-        rmse_by_run={name: _rms(error) for name, error in sorted(centred.items())},
+        rmse=rmse(np.concatenate(list(centred.values())), 0.0),
+        rmse_with_means=rmse(np.concatenate(list(errors.values())), 0.0),
+        rmse_by_run={name: rmse(error, 0.0) for name, error in sorted(centred.items())},
         runs=len(errors),
         folds=folds,
     )
@@ -105,5 +101,24 @@ def closing_pairs(
     return pairs
 
 
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int) -> Score:
+    """Return the error of a state estimator on runs not fitted; flagged samples are left out.
+
+    Args:
+        recipe: What is fitted.
+        campaign: The runs; excluded ones are left out.
+        folds: Number of folds, at least 2.
+        seed: Seed of the folds.
+
+    Raises:
+        NetworkError: No sample is a closing one.
+    """
+    found = [recipe.evidence_of(recording) for recording in campaign.evidence]
+    runs = [run for run in found if run is not None]
+    estimates, truths = [], []
+    for held_out in in_folds(len(runs), folds, seed):
+        rest = [run for k, run in enumerate(runs) if k not in held_out]
+        fitted = fit_runs(rest, recipe.bank, recipe.target, recipe.settings)
+        estimates += [fitted.of_design(runs[k].design, runs[k].rows).value for k in held_out]
+        truths += [runs[k].truth for k in held_out]
+    return score(np.concatenate(estimates), np.concatenate(truths))

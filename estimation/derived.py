@@ -20,6 +20,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from estimation.channels import ending_of
@@ -27,7 +28,6 @@ from estimation.filters import PAPER, LowPass, fill_gaps, filter_recording, holo
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SPINDLE_SPEED, closing, in_motion
 from estimation.signals import Combination, Samples, Signals, reference
-from estimation.window import ALIKE, lowest, since_lowest
 
 CAMPAIGN_TIME = "campaign_time_s"
 """Time since the campaign's first run began; a clock, so no filter touches it."""
@@ -45,6 +45,10 @@ TURNING = "motor_angle_rad"
 
 TRAVEL_WINDOW_S = 0.5
 """Window of a travel, s. A longer memory could identify the run."""
+
+ALIKE = 1e-9
+"""Values that differ by less are alike where the place of the lowest matters. A filtered angle at
+rest differs by its rounding, which is another one for samples one by one, in batches, or in C."""
 
 CLOCKS = ("time_s", CAMPAIGN_TIME)
 
@@ -65,19 +69,27 @@ def measured_channels(names: Iterable[str], signals: Signals | None = None) -> t
             needed |= {share.channel for share in combination.shares}
             if combination.direction is not None:
                 needed.add(origin_of(combination.direction.speed)[0])
-        elif name.endswith((TRAVEL, TURNED)):
-            needed.add(_turning(name))
-        elif FALL in name:
-            needed.add(_plain(name))
-        elif RISE in name:
-            needed |= {_plain(name), TURNING}
         elif name != "time_s":
-            needed.add(origin_of(now_of(name))[0])
+            now, kind = _now(name)
+            needed.add(now if kind in (FALL, RISE) else origin_of(now)[0])
+            needed |= {TURNING} if kind == RISE else set()
     return tuple(sorted(needed))
 
 
-def _turning(name: str) -> str:
-    return name.removesuffix(TRAVEL).removesuffix(TURNED) + "_angle_rad"
+def _now(name: str) -> tuple[str, str]:
+    """Return the channel that a channel of the past is computed from, and of which kind it is.
+
+    The kind is the part of its name that states it, or the milliseconds ago; empty of the present.
+    """
+    for kind in (TRAVEL, TURNED):
+        if name.endswith(kind):
+            return name.removesuffix(kind) + "_angle_rad", kind
+    for kind in (FALL, RISE):
+        if kind in name:
+            return name.replace(kind, "_"), kind
+    if (ago := AGO.match(name)) is not None:
+        return ago["name"] + ago["unit"], ago["ms"]
+    return name, ""
 
 
 def fall_of(channel: str) -> str:
@@ -98,16 +110,6 @@ def ago_of(channel: str, ms: int) -> str:
 def _parted(channel: str) -> tuple[str, str]:
     suffix = ending_of(channel)
     return channel.removesuffix(f"_{suffix}"), suffix
-
-
-def now_of(name: str) -> str:
-    """Return the channel a channel is the past of, or the channel itself."""
-    ago = AGO.match(name)
-    return name if ago is None else ago["name"] + ago["unit"]
-
-
-def _plain(name: str) -> str:
-    return name.replace(FALL, "_").replace(RISE, "_")
 
 
 def origin_of(name: str) -> tuple[str, int]:
@@ -164,18 +166,19 @@ def derive(
 
     channels: dict[str, FloatArray] = {}
     for name in names:
-        if name.endswith(TRAVEL):
-            channels[name] = since_lowest(filtered[_turning(name)], window)
-        elif name.endswith(TURNED):
-            angle = filtered[_turning(name)]
-            channels[name] = (np.arange(len(angle)) - lowest(angle, window, ALIKE)) / sample_rate_hz
-        elif FALL in name:
-            channels[name] = since_lowest(-filtered[_plain(name)], window)
-        elif RISE in name:
-            channel = filtered[_plain(name)]
-            channels[name] = channel - channel[lowest(filtered[TURNING], window, ALIKE)]
-        elif (ago := AGO.match(name)) is not None:
-            channels[name] = _delayed(differentiated(now_of(name)), ago["ms"], sample_rate_hz)
+        now, kind = _now(name)
+        if kind == TRAVEL:
+            channels[name] = since_lowest(filtered[now], window)
+        elif kind == TURNED:
+            back = np.arange(len(filtered[now])) - lowest(filtered[now], window, ALIKE)
+            channels[name] = back / sample_rate_hz
+        elif kind == FALL:
+            channels[name] = since_lowest(-filtered[now], window)
+        elif kind == RISE:
+            turned = lowest(filtered[TURNING], window, ALIKE)
+            channels[name] = filtered[now] - filtered[now][turned]
+        elif kind:
+            channels[name] = _delayed(differentiated(now), kind, sample_rate_hz)
         else:
             channels[name] = differentiated(name)
     return channels
@@ -287,12 +290,41 @@ def _on_time(values: FloatArray, name: str, recording: Recording, signals: Signa
 
 def looks_back(names: Iterable[str]) -> bool:
     """Whether a channel needs the samples of the last `TRAVEL_WINDOW_S`."""
-    return any(
-        name.endswith((TRAVEL, TURNED)) or FALL in name or RISE in name or AGO.match(name)
-        for name in names
-    )
+    return any(_now(name)[1] for name in names)
+
+
+def differentiated_from(names: Iterable[str]) -> set[str]:
+    """Return the channels that the named channels, or those of their past, are derivatives of."""
+    origins = (origin_of(_now(name)[0]) for name in names)
+    return {source for source, times in origins if times}
 
 
 def window_samples(sample_rate_hz: float) -> int:
     """Return the number of samples in the window of a travel."""
     return max(1, round(TRAVEL_WINDOW_S * sample_rate_hz))
+
+
+def since_lowest(values: FloatArray, window: int) -> FloatArray:
+    """Return each value less the lowest of itself and the `window - 1` before it."""
+    return np.asarray(values - values[lowest(values, window)])
+
+
+@njit(cache=True)
+def lowest(values: FloatArray, window: int, alike: float = 0.0) -> NDArray[np.int64]:
+    """Return the place of the lowest of each value and the `window - 1` before it.
+
+    Of those that differ by no more than `alike` it is the last. Values that rise are kept in a
+    queue, so each one is looked at twice at the most.
+    """
+    found = np.empty(len(values), np.int64)
+    queue = np.empty(len(values), np.int64)
+    first, end = 0, 0
+    for i in range(len(values)):
+        while end > first and values[queue[end - 1]] >= values[i] - alike:
+            end -= 1
+        queue[end] = i
+        end += 1
+        if queue[first] <= i - window:
+            first += 1
+        found[i] = queue[first]
+    return found

@@ -4,8 +4,8 @@ import difflib
 from collections.abc import Sequence
 
 
-class EstimationError(Exception):
-    """Base of every error this room raises on purpose.
+class ExplainedError(Exception):
+    """An error that is raised on purpose; the rooms above derive theirs from it, too.
 
     Attributes:
         what: What happened, in one sentence.
@@ -18,6 +18,10 @@ class EstimationError(Exception):
         self.why = why
         self.fix = fix
         super().__init__(" ".join(part for part in (what, why, fix) if part))
+
+
+class EstimationError(ExplainedError):
+    """Base of every error this room raises on purpose."""
 
 
 class MissingExtraError(EstimationError):

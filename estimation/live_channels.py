@@ -10,10 +10,9 @@ from estimation.derived import (
     CAMPAIGN_TIME,
     CLOCKS,
     derive,
+    differentiated_from,
     looks_back,
     measured_channels,
-    now_of,
-    origin_of,
     window_samples,
 )
 from estimation.filters import PAPER, CausalFilter, LowPass, fill_gaps
@@ -55,7 +54,7 @@ class CausalChannels:
         self._last_row: FloatArray = np.empty(0)
         self._kept = max(2, window_samples(sample_rate_hz) if looks_back(self.names) else 0)
         self._history: FloatArray = np.empty((0, 0))  # the last filtered rows
-        moving = [source for source, times in map(origin_of, map(now_of, self.names)) if times]
+        moving = differentiated_from(self.names)
         angles = [name for name in self.measured if tracked and name.endswith("_angle_rad")]
         self._tracked = {name: self.measured.index(name) for name in angles if name in moving}
         self._tracker = tracker(sample_rate_hz) if self._tracked else None

@@ -261,6 +261,18 @@ def estimate(model: Model, channels: Mapping[str, FloatArray] | Recording) -> Fl
     return total
 
 
+def counted_error(model: Model, recording: Recording) -> FloatArray:
+    """Return the target less the estimate at the samples that count for a model, shape (k,).
+
+    Raises:
+        NotFittedError: A parameter has no value.
+        MissingChannelError: The recording lacks a channel.
+    """
+    channels = balance_channels(model, recording)
+    error = channels[model.target] - estimate(model, channels)
+    return error[settled(model, channels)]
+
+
 def predict(model: Model, recording: Recording, causal: bool = False) -> FloatArray:
     """Estimate the target of one run.
 

@@ -21,18 +21,17 @@ A file of several equations contains each under `[[models]]`, with `[models.proc
 import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
-from typing import cast, get_args
+from typing import Any, cast, get_args
 
 from estimation.effects import effect
-from estimation.errors import EstimationError
+from estimation.errors import EstimationError, UnknownNameError
 from estimation.files import write_text_atomic
 from estimation.filters import LowPass
 from estimation.model import Estimate, Evidence, Model, ModelError, Term
-from estimation.model_table import ModelFileError, NoModelError
 from estimation.plant_file import shipped_plant
 from estimation.plant_models import declared
 from estimation.signals import (
@@ -43,11 +42,18 @@ from estimation.signals import (
     read_combinations,
     reference,
 )
-from estimation.toml_table import Table
-from estimation.toml_table import value_text as _value
+from estimation.toml_table import Table, entries, value_text
 
 SCHEMA = "rig.model/1"
 SEVERAL = "rig.models/1"
+
+
+class ModelFileError(ModelError):
+    """A model file cannot be read; the message names the file and the key."""
+
+
+class NoModelError(ModelFileError, UnknownNameError):
+    """There is no model of that name, and no such file."""
 
 
 def shipped() -> dict[str, Path]:
@@ -149,26 +155,16 @@ def _model(top: Table) -> Model:
     processing = top.table("processing")
     evidence = top.table("fit")
     target = top.take("target", str)
-    model = Model(
-        name=top.take("name", str),
-        balance=top.take("balance", str),
-        target=target,
-        description=top.take("description", str, ""),
+    samples = processing.choice("samples", ("", *get_args(Samples))) or None
+    return top.made(
+        Model,
         terms=tuple(_term(entry, target) for entry in top.tables("effects")),
-        low_pass=LowPass(
-            processing.number("cutoff_hz", LowPass().cutoff_hz),
-            processing.take("order", int, LowPass().order),
-        ),
         run_offsets=processing.take("run_offsets", bool, True),
-        counted=cast(
-            Samples | None, processing.choice("samples", ("", *get_args(Samples))) or None
-        ),
+        counted=cast(Samples | None, samples),
+        low_pass=processing.made(LowPass),
         evidence=_evidence(evidence) if evidence.content else None,
         signals=_signals(top),
     )
-    for table in (top, processing, evidence):
-        table.finish()
-    return model
 
 
 def _signals(top: Table) -> Signals:
@@ -178,11 +174,8 @@ def _signals(top: Table) -> Signals:
     table = top.table("signals")
     rest = table.table("rest")
     slowest = {speed: rest.number(speed) for speed in rest.content}
-    sensors, readings = table.table("sensors"), {}
-    for channel in sensors.content:
-        one = sensors.table(channel)
-        readings[channel] = Reading(*(one.optional(key.name) for key in fields(Reading)))
-        one.finish()
+    sensors = table.table("sensors")
+    readings = {channel: sensors.table(channel).made(Reading) for channel in sensors.content}
     found = Signals(read_combinations(table.tables("derived", [])), slowest, readings)
     table.finish()
     return found
@@ -209,63 +202,38 @@ def write_all(models: Sequence[Model], path: Path) -> None:
 def to_toml(*models: Model) -> str:
     """Return one or more models as TOML text; `parse_all` gives the same models back."""
     if len(models) == 1:
-        return "\n".join([f"schema = {_value(SCHEMA)}", *_lines(models[0])]) + "\n"
-    lines = [f"schema = {_value(SEVERAL)}"]
+        return "\n".join([f"schema = {value_text(SCHEMA)}", *_lines(models[0])]) + "\n"
+    lines = [f"schema = {value_text(SEVERAL)}"]
     for model in models:
         lines += ["", "[[models]]", *_lines(model, "models.")]
     return "\n".join(lines) + "\n"
 
 
 def _lines(model: Model, within: str = "") -> list[str]:
-    lines = [
-        f"name = {_value(model.name)}",
-        f"balance = {_value(model.balance)}",
-        f"target = {_value(model.target)}",
-        f"description = {_value(model.description)}",
-        "",
-        f"[{within}processing]",
-        f"cutoff_hz = {_value(model.low_pass.cutoff_hz)}",
-        f"order = {_value(model.low_pass.order)}",
-        f"run_offsets = {_value(model.run_offsets)}",
-    ]
-    if model.counted is not None:
-        lines.append(f"samples = {_value(model.counted)}")
+    lines = entries({key: getattr(model, key) for key in ("name", "balance", "target")})
+    lines += entries({"description": model.description})
+    lines += ["", f"[{within}processing]", *entries(asdict(model.low_pass))]
+    lines += entries({"run_offsets": model.run_offsets, "samples": model.counted})
     if model.signals != reference():
-        lines += ["", f"[{within}signals.rest]"]
-        lines += [f"{speed} = {_value(slow)}" for speed, slow in model.signals.rest.items()]
+        lines += ["", f"[{within}signals.rest]", *entries(model.signals.rest)]
         lines += ["", f"[{within}signals.sensors]"] if model.signals.readings else []
-        for channel, stated in model.signals.readings.items():
-            about = {key: value for key, value in asdict(stated).items() if value is not None}
-            lines.append(f"{channel} = {_value(about)}")
+        lines += entries({name: _known(one) for name, one in model.signals.readings.items()})
         lines += combination_lines(model.signals.combinations, f"{within}signals.derived")
     for term in model.terms:
-        lines += [
-            "",
-            f"[[{within}effects]]",
-            f"id = {_value(term.effect.id)}",
-            f"sign = {term.sign}",
-        ]
-        lines += [f"channels.{role} = {_value(name)}" for role, name in term.channels.items()]
+        lines += ["", f"[[{within}effects]]", *entries({"id": term.effect.id, "sign": term.sign})]
+        lines += entries(term.channels, "channels.")
         for parameter in term.parameters:
-            if (known := term.values.get(parameter.name)) is not None:
-                unit = term.unit(parameter, model.target)
-                entries = {"value": known.value, "unit": unit}
-                entries |= {"spread": known.spread} if known.spread is not None else {}
-                entries |= {"ci95": list(known.ci95)} if known.ci95 is not None else {}
-                lines.append(f"parameters.{parameter.name} = {_value(entries)}")
+            if (estimate := term.values.get(parameter.name)) is not None:
+                stated = {"value": estimate.value, "unit": term.unit(parameter, model.target)}
+                lines += entries({parameter.name: stated | _known(estimate)}, "parameters.")
     if model.evidence is not None:
-        lines += ["", f"[{within}fit]"]
-        lines += [
-            f"{key} = {_value(getattr(model.evidence, key))}"
-            for key in ("runs", "samples", "rmse", "rmse_with_means", "seed")
-        ]
-        if model.evidence.run_spread is not None:
-            lines.append(f"run_spread = {_value(model.evidence.run_spread)}")
-        if model.evidence.target_range is not None:
-            lines.append(f"target_range = {_value(list(model.evidence.target_range))}")
-        if model.evidence.made_at:
-            lines.append(f"made_at = {_value(model.evidence.made_at)}")
+        made_at = {"made_at": model.evidence.made_at or None}
+        lines += ["", f"[{within}fit]", *entries(asdict(model.evidence) | made_at)]
     return lines
+
+
+def _known(stated: Reading | Estimate) -> dict[str, Any]:
+    return {key: value for key, value in asdict(stated).items() if value is not None}
 
 
 def _term(entry: Table, target: str) -> Term:
@@ -276,13 +244,8 @@ def _term(entry: Table, target: str) -> Term:
     values, units = {}, {}
     for name in parameters.content:
         known = parameters.table(name)
-        values[name] = Estimate(
-            known.number("value"),
-            known.number("spread") if "spread" in known.content else None,
-            _two(known, "ci95") if "ci95" in known.content else None,
-        )
         units[name] = known.take("unit", str)
-        known.finish()
+        values[name] = known.made(Estimate, ci95=_two(known, "ci95"))
     entry.finish()
     names = {role: channels.take(role, str) for role in channels.content}
     term = Term(kind, sign, names, values)
@@ -303,7 +266,9 @@ def _check_units(term: Term, target: str, stated: Mapping[str, str]) -> None:
             )
 
 
-def _two(table: Table, key: str) -> tuple[float, float]:
+def _two(table: Table, key: str) -> tuple[float, float] | None:
+    if key not in table.content:
+        return None
     values = table.take(key, list)
     if len(values) != 2 or not all(isinstance(v, int | float) for v in values):
         raise ModelFileError(f"{table.where}: {key} = {values!r} is not two numbers.")
@@ -311,16 +276,9 @@ def _two(table: Table, key: str) -> tuple[float, float]:
 
 
 def _evidence(table: Table) -> Evidence:
-    return Evidence(
-        runs=tuple(str(name) for name in table.take("runs", list)),
-        samples=table.take("samples", int),
-        rmse=table.number("rmse"),
-        rmse_with_means=table.number("rmse_with_means"),
-        seed=table.take("seed", int),
-        run_spread=table.number("run_spread") if "run_spread" in table.content else None,
-        target_range=_two(table, "target_range") if "target_range" in table.content else None,
-        made_at=_date(table),
-    )
+    runs = tuple(str(name) for name in table.take("runs", list))
+    target_range, made_at = _two(table, "target_range"), _date(table)
+    return table.made(Evidence, runs=runs, target_range=target_range, made_at=made_at)
 
 
 def _date(table: Table) -> str:

@@ -145,11 +145,11 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
     absent = [name for name in needed if name not in (*columns, "time_s")]
     if absent:
         near = nearest(absent[0], list(columns)) if columns else "There are no runs."
-        return _troubled(plain, f"{', '.join(absent)} was not recorded. {near}")
+        return replace(plain, trouble=f"{', '.join(absent)} was not recorded. {near}")
     try:
         fitted = fit(model, campaign, bootstrap=0)
     except EstimationError as error:
-        return _troubled(plain, f"{error.what} {error.fix}".strip())
+        return replace(plain, trouble=f"{error.what} {error.fix}".strip())
     found = _described(fitted, values=True)
     evidence = fitted.evidence
     assert evidence is not None  # noqa: S101  a fit sets its evidence
@@ -166,10 +166,6 @@ def _targets(model: Model, campaign: Campaign) -> Iterator[FloatArray]:
         target = channels[model.target][settled(model, channels)]
         if target.size:
             yield target - target.mean() if model.run_offsets else target
-
-
-def _troubled(plain: CheckedEquation, trouble: str) -> CheckedEquation:
-    return replace(plain, trouble=trouble)
 
 
 def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) -> Iterator[str]:

@@ -13,11 +13,12 @@ a gearbox winds up before its output turns. Acceleration is taken from the drive
 turns fastest.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 from estimation.channels import unit_of
+from estimation.derived import measured_channels
 from estimation.plant import (
     ACCELERATION,
     EFFORT,
@@ -296,25 +297,10 @@ def missing(plant: Plant) -> list[Missing]:
 
 def unused(plant: Plant) -> list[str]:
     """Return the channels that no equation reads."""
-    combined: Mapping[str, Combination] = {c.name: c for c in signals(plant).combinations}
-    read: set[str] = set()
-    for equation in equations(plant):
-        names = [equation.target, *(n for part in equation.parts for n in part.channels.values())]
-        for name in names:
-            read |= {name, *_origins(plant, name)}
-            if name in combined:
-                read |= {share.channel for share in combined[name].shares}
+    names = [
+        name
+        for equation in equations(plant)
+        for name in (equation.target, *(n for p in equation.parts for n in p.channels.values()))
+    ]
+    read = {*names, *measured_channels(names, signals(plant))}
     return [s.name for s in plant.sensors if s.name not in read]
-
-
-def _origins(plant: Plant, name: str) -> set[str]:
-    """Return the sensors that a channel of motion or a rate is differentiated from."""
-    found = {
-        sensor.name
-        for axis in plant.axes
-        if (sensor := plant.position(axis.name)) is not None
-        and name in (plant.moved(axis.name, SPEED), plant.moved(axis.name, ACCELERATION))
-    }
-    return found | {
-        s.name for s in plant.sensors if s.name.removesuffix("_n_m") + RATE["N m"] == name
-    }

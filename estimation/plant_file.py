@@ -40,14 +40,13 @@ from estimation.plant import (
     Part,
     Plant,
     PlantError,
-    Reads,
     Sensor,
     Transmission,
     Written,
 )
 from estimation.plant_equations import equations
 from estimation.signals import Samples, combination_lines, read_combinations
-from estimation.toml_table import Lines, Table, value_text
+from estimation.toml_table import Lines, Table, entries, value_text
 
 SCHEMA = "rig.machine/1"
 
@@ -117,84 +116,23 @@ def parse(text: str, where: str = "machine") -> Plant:
 
 def _plant(top: Table) -> Plant:
     machine = top.table("machine")
-    name, description = machine.take("name", str), machine.take("description", str, "")
-    cutoff_hz, order = machine.number("cutoff_hz", 50.0), machine.take("order", int, 3)
-    run_offsets = machine.take("run_offsets", bool, True)
-    machine.finish()
     top.ignore("data")
     parts: dict[str, tuple[Any, ...]] = {
-        "axes": tuple(_axis(t) for t in top.tables("axis", [])),
-        "transmissions": tuple(_transmission(t) for t in top.tables("transmission", [])),
-        "actuators": tuple(_actuator(t) for t in top.tables("actuator", [])),
-        "sensors": tuple(_sensor(t) for t in top.tables("sensor", [])),
-        "loads": tuple(_load(t) for t in top.tables("load", [])),
+        "axes": tuple(t.made(Axis) for t in top.tables("axis", [])),
+        "transmissions": tuple(t.made(Transmission) for t in top.tables("transmission", [])),
+        "actuators": tuple(_channel(t).made(Actuator) for t in top.tables("actuator", [])),
+        "sensors": tuple(_channel(t).made(Sensor) for t in top.tables("sensor", [])),
+        "loads": tuple(_channel(t).made(Load) for t in top.tables("load", [])),
         "equations": tuple(_equation(t) for t in top.tables("equation", [])),
         "derived": read_combinations(top.tables("derived", [])),
     }
     top.finish()
-    return Plant(
-        name=name,
-        description=description,
-        cutoff_hz=cutoff_hz,
-        order=order,
-        run_offsets=run_offsets,
-        **parts,
-    )
+    return machine.made(Plant, **parts)
 
 
-def _axis(table: Table) -> Axis:
-    made = Axis(
-        table.take("name", str),
-        table.take("unit", str),
-        table.optional("rest_speed"),
-        table.take("description", str, ""),
-    )
-    table.finish()
-    return made
-
-
-def _transmission(table: Table) -> Transmission:
-    made = Transmission(
-        name=table.take("name", str),
-        input=table.take("input", str),
-        output=table.take("output", str),
-        ratio=table.optional("ratio"),
-        compliant=table.take("compliant", bool, False),
-        damped=table.take("damped", bool, False),
-        deflection=table.take("deflection", str, ""),
-        description=table.take("description", str, ""),
-    )
-    table.finish()
-    return made
-
-
-def _actuator(table: Table) -> Actuator:
-    made = Actuator(
-        table.take("name", str), table.take("axis", str), table.take("description", str, "")
-    )
-    _check_unit(table, made.name)
-    table.finish()
-    return made
-
-
-def _sensor(table: Table) -> Sensor:
-    made = Sensor(
-        name=table.take("name", str),
-        axis=table.take("axis", str, ""),
-        reads=cast(Reads, table.choice("reads", get_args(Reads))),
-        counts=table.optional("counts"),
-        rate_hz=table.optional("rate_hz"),
-        noise=table.optional("noise"),
-        delay_s=table.optional("delay_s"),
-        description=table.take("description", str, ""),
-    )
-    _check_unit(table, made.name)
-    table.finish()
-    return made
-
-
-def _check_unit(table: Table, channel: str) -> None:
-    """Raise where a stated unit is not the one that the channel's name ends in."""
+def _channel(table: Table) -> Table:
+    """Return the table of a channel; a unit that it states is the one that its name ends in."""
+    channel = table.take("name", str)
     try:
         unit = unit_of(channel)
     except EstimationError as error:
@@ -206,17 +144,7 @@ def _check_unit(table: Table, channel: str) -> None:
             f"Channels are in SI and the name ends in the unit: {channel} is in {unit}.",
             "Rename the channel; how recorded values are converted is stated under [data].",
         )
-
-
-def _load(table: Table) -> Load:
-    made = Load(
-        table.take("name", str),
-        table.take("axis", str),
-        table.take("description", str, ""),
-    )
-    _check_unit(table, made.name)
-    table.finish()
-    return made
+    return table
 
 
 def _equation(table: Table) -> Written:
@@ -224,17 +152,9 @@ def _equation(table: Table) -> Written:
     for effect in table.tables("effects"):
         channels = effect.table("channels")
         named = {role: channels.take(role, str) for role in channels.content}
-        parts.append(Part(effect.take("id", str), effect.take("sign", int, 1), named))
-        effect.finish()
-    made = Written(
-        table.take("name", str),
-        table.take("target", str),
-        tuple(parts),
-        table.take("description", str, ""),
-        cast(Samples | None, table.choice("samples", ("", *get_args(Samples))) or None),
-    )
-    table.finish()
-    return made
+        parts.append(effect.made(Part, channels=named))
+    samples = cast(Samples | None, table.choice("samples", ("", *get_args(Samples))) or None)
+    return table.made(Written, parts=tuple(parts), samples=samples)
 
 
 def write(plant: Plant, path: Path, more: str = "") -> None:
@@ -255,7 +175,7 @@ def to_toml(plant: Plant) -> str:
     """Return a machine as TOML text; `parse` gives it back."""
     lines = [f"schema = {value_text(SCHEMA)}", "", "[machine]"]
     machine = {key: getattr(plant, key) for key in ("name", "description", "cutoff_hz", "order")}
-    lines += _entries(machine | {"run_offsets": plant.run_offsets})
+    lines += _stated(machine | {"run_offsets": plant.run_offsets})
     for header, parts in (
         ("axis", plant.axes),
         ("transmission", plant.transmissions),
@@ -264,22 +184,19 @@ def to_toml(plant: Plant) -> str:
         ("load", plant.loads),
     ):
         for part in cast(tuple[Any, ...], parts):
-            lines += ["", f"[[{header}]]", *_entries(asdict(part))]
+            lines += ["", f"[[{header}]]", *_stated(asdict(part))]
     lines += combination_lines(plant.derived, "derived")
     for equation in plant.equations:
         keys = ("name", "target", "samples", "description")
         about = {key: getattr(equation, key) for key in keys}
-        lines += ["", "[[equation]]", *_entries(about)]
+        lines += ["", "[[equation]]", *_stated(about)]
         for part in equation.parts:
-            lines += ["", "[[equation.effects]]", f"id = {value_text(part.id)}"]
-            lines.append(f"sign = {part.sign}")
-            lines += [f"channels.{role} = {value_text(c)}" for role, c in part.channels.items()]
+            lines += ["", "[[equation.effects]]", *entries({"id": part.id, "sign": part.sign})]
+            lines += entries(part.channels, "channels.")
     return "\n".join(lines) + "\n"
 
 
-def _entries(content: Mapping[str, Any]) -> list[str]:
-    return [
-        f"{key} = {value_text(value)}"
-        for key, value in content.items()
-        if value is not None and value != "" and (value is not False or key == "run_offsets")
-    ]
+def _stated(content: Mapping[str, Any]) -> list[str]:
+    """Return the lines of keys that are not as they are where they are left out."""
+    kept = {k: v for k, v in content.items() if v != "" and (v is not False or k == "run_offsets")}
+    return entries(kept)

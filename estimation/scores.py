@@ -35,7 +35,7 @@ class Score:
 
 
 def rmse(estimate: ArrayLike, truth: ArrayLike) -> float:
-    """Return the root mean square error of two arrays of equal shape."""
+    """Return the root mean square error of an array to another one or to a number."""
     return float(np.sqrt(np.mean(np.square(np.asarray(estimate) - np.asarray(truth)))))
 
 
@@ -68,7 +68,7 @@ def score(estimate: ArrayLike, truth: ArrayLike) -> Score:
         samples=int(error.size),
         mae=float(error.mean()),
         p95=float(np.percentile(error, 95)),
-        rmse=float(np.sqrt(np.mean(error**2))),
+        rmse=rmse(error, 0.0),
         pearson_r=float(np.corrcoef(estimated, measured)[0, 1]) if varies else float("nan"),
         spearman_rho=(
             float(stats.spearmanr(estimated, measured).statistic) if varies else float("nan")

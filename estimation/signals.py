@@ -1,11 +1,11 @@
 """What a machine's channels give besides their readings: combinations, and speeds of standstill."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cache
-from typing import Any, Literal
+from typing import Literal
 
-from estimation.toml_table import Table, value_text
+from estimation.toml_table import Table, entries
 
 Samples = Literal["all", "motion", "closing"]
 """Which samples of a run count: all valid ones, those in motion, or those that close the jaw."""
@@ -132,16 +132,12 @@ def _combination(table: Table) -> Combination:
     name = table.take("name", str)
     shares = []
     for share in table.tables("shares"):
-        channel = share.take("channel", str)
-        shares.append(Share(channel, share.number("times", 1.0), share.number("over", 1.0)))
+        shares.append(share.made(Share))
         if shares[-1].over == 0.0:
             raise table.error(f"{table.at('shares')}: a channel cannot be divided by zero.")
-        share.finish()
     direction = None
     if "direction" in table.content:
-        part = table.table("direction")
-        direction = Direction(part.take("speed", str), part.number("size"), part.number("width"))
-        part.finish()
+        direction = table.table("direction").made(Direction)
     table.finish()
     return Combination(name, tuple(shares), direction)
 
@@ -150,15 +146,8 @@ def combination_lines(combinations: Iterable[Combination], header: str) -> list[
     """Return combinations as TOML; `read_combinations` gives them back."""
     lines = []
     for one in combinations:
-        lines += ["", f"[[{header}]]", f"name = {value_text(one.name)}"]
-        lines.append(f"shares = {value_text([_share_entry(share) for share in one.shares])}")
-        if (part := one.direction) is not None:
-            entry = {"speed": part.speed, "size": part.size, "width": part.width}
-            lines.append(f"direction = {value_text(entry)}")
+        shares = [{k: v for k, v in asdict(share).items() if v != 1.0} for share in one.shares]
+        turn = None if one.direction is None else asdict(one.direction)
+        lines += ["", f"[[{header}]]"]
+        lines += entries({"name": one.name, "shares": shares, "direction": turn})
     return lines
-
-
-def _share_entry(share: Share) -> dict[str, Any]:
-    entry: dict[str, Any] = {"channel": share.channel}
-    entry |= {"times": share.times} if share.times != 1.0 else {}
-    return entry | ({"over": share.over} if share.over != 1.0 else {})

@@ -5,13 +5,18 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import MISSING, dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from estimation.errors import EstimationError, nearest
 
 HEADER = re.compile(r"^\s*(\[\[?)\s*([\w.\-]+)\s*\]\]?")
 KEY = re.compile(r"^\s*([\w\-]+)\s*(?:\.[\w.\-]+\s*)?=")
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
 
 Place = tuple[str, int, str]
 """A table's name, which one of that name (from 1), and a key; the key is empty for the header."""
@@ -105,10 +110,6 @@ class Table:
             raise self.error(f"{self.at(key)}: {key} = {value} is not a finite number.")
         return value
 
-    def optional(self, key: str) -> float | None:
-        """Return a finite number, or None where the key is not there."""
-        return self.number(key) if key in self.content else None
-
     def choice(self, key: str, allowed: Sequence[str]) -> str:
         """Return one of a few words, the first of them where the key is not there."""
         word: str = self.take(key, str, allowed[0])
@@ -119,6 +120,30 @@ class Table:
                 fix=nearest(word, known),
             )
         return word
+
+    def made(self, kind: type[T], **known: Any) -> T:
+        """Return a dataclass whose fields are keys of this table, read as they are annotated.
+
+        A key of a field with a default may be left out. An unknown key is an error.
+
+        Args:
+            kind: The dataclass; its fields are str, bool, int, float, float | None or of few words.
+            known: Values of its other fields.
+        """
+        types = get_type_hints(kind)
+        for each in fields(kind):
+            if each.name in known:
+                continue
+            self.ignore(each.name)
+            if each.name in self.content or each.default is MISSING:
+                known[each.name] = self._typed(each.name, types[each.name])
+        self.finish()
+        return kind(**known)
+
+    def _typed(self, key: str, kind: Any) -> Any:
+        if get_origin(kind) is Literal:
+            return self.choice(key, get_args(kind))
+        return self.take(key, kind) if kind in (str, bool, int) else self.number(key)
 
     def table(self, key: str) -> "Table":
         """Return a table within this one; an empty one where there is none."""
@@ -148,6 +173,16 @@ class Table:
                 raise self.error(
                     f"{self.at(key)} has an unknown key {key!r}.", fix=nearest(key, self._read)
                 )
+
+
+def entries(content: Mapping[str, Any], within: str = "") -> list[str]:
+    """Return the lines of a table's keys, without those whose value is None.
+
+    Args:
+        content: The keys and their values.
+        within: What stands before each key, such as `channels.`.
+    """
+    return [f"{within}{key} = {value_text(v)}" for key, v in content.items() if v is not None]
 
 
 def value_text(value: Any) -> str:

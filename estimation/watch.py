@@ -13,8 +13,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from estimation.model import Model, balance_channels, estimate, settled
+from estimation.model import Model, counted_error
 from estimation.recording import Recording
+from estimation.scores import rmse
 
 T = TypeVar("T")
 
@@ -120,11 +121,7 @@ def begin_of(rising: Sequence[tuple[T, float]]) -> T:
 
 def run_error(model: Model, recording: Recording) -> float | None:
     """Return a model's error on one run as its fit counts it, or None without a usable sample."""
-    channels = balance_channels(model, recording)
-    places = settled(model, channels)
-    if places.size == 0:
+    error = counted_error(model, recording)
+    if error.size == 0:
         return None
-    error = (channels[model.target] - estimate(model, channels))[places]
-    if model.run_offsets:
-        error = error - error.mean()
-    return float(np.sqrt(np.mean(error**2)))
+    return rmse(error, error.mean() if model.run_offsets else 0.0)

@@ -9,7 +9,7 @@ from enum import IntEnum
 from calibration.errors import CalibrationError
 from calibration.errors import UnknownNameError as NoSuchRecord
 from drivers.errors import DriverError
-from estimation.errors import EstimationError
+from estimation.errors import EstimationError, ExplainedError
 from estimation.errors import UnknownNameError as NoSuchModel
 from estimation.files import OutputError
 
@@ -28,22 +28,10 @@ class ExitCode(IntEnum):
     UNREAD = 141
 
 
-class RigError(Exception):
-    """Base of every error the application raises on purpose.
-
-    Attributes:
-        what: What happened, in one sentence.
-        why: The cause as far as it is known; may be empty.
-        fix: Action or next command; may be empty.
-    """
+class RigError(ExplainedError):
+    """Base of every error the application raises on purpose."""
 
     exit_code = ExitCode.FAILED
-
-    def __init__(self, what: str, why: str = "", fix: str = "") -> None:
-        self.what = what
-        self.why = why
-        self.fix = fix
-        super().__init__(" ".join(part for part in (what, why, fix) if part))
 
 
 class UsageError(RigError):

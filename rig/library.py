@@ -227,8 +227,7 @@ def compare(
     """
     from estimation.changes.compare import compare as changes
 
-    third = [] if on is None else list(on.evidence)
-    return changes(list(a.evidence), list(b.evidence), models, third, seed)
+    return changes(a.evidence, b.evidence, models, () if on is None else on.evidence, seed)
 
 
 def predict(model: Model, recording: Recording) -> Prediction:

@@ -15,8 +15,7 @@ from benchmarks.diagnosis import machines, otherlab, own, varied
 from benchmarks.diagnosis.asking import Rig
 from benchmarks.diagnosis.case import KINDS, Case
 from benchmarks.diagnosis.measure import Row, measure
-from benchmarks.diagnosis.page import PAGE, Measured, append, judged_seeds
-from benchmarks.diagnosis.seeds import next_to_judge
+from benchmarks.diagnosis.page import PAGE, Measured, append, next_to_judge
 from benchmarks.rigs import part_of
 
 
@@ -95,9 +94,7 @@ def _counts(text: str) -> dict[str, int]:
 
 def _generators(options: argparse.Namespace) -> Iterator[Generator]:
     if options.own or options.varied:
-        seed = options.seed
-        if seed is None:
-            seed = next_to_judge(judged_seeds(options.page))
+        seed = next_to_judge(options.page) if options.seed is None else options.seed
         _say(f"seed {seed}: {part_of(seed)}")
         if options.own:
             yield Generator("own", list(own.cases(seed, options.counts)), seed)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from benchmarks.diagnosis.case import KINDS, MACHINE
+from benchmarks.diagnosis.case import BLOCK, KINDS, MACHINE
 from benchmarks.diagnosis.measure import Row
-from benchmarks.rigs import part_of
+from benchmarks.rigs import JUDGE, part_of
 from estimation.files import write_text_atomic
 
 PAGE = Path("docs/results/diagnosis-versions.md")
@@ -110,10 +110,11 @@ def append(page: Path, measured: Measured, rows: Sequence[Row]) -> None:
     write_text_atomic(page, "\n".join(parts))
 
 
-def judged_seeds(page: Path) -> set[int]:
-    """Return the seeds that stand on a page."""
+def next_to_judge(page: Path) -> int:
+    """Return the first judging block of seeds that no line of a page has."""
     text = page.read_text() if page.exists() else ""
-    return {int(cells[3]) for cells in _lines(text, SIMULATED) if cells[3].isdigit()}
+    spent = {int(cells[3]) // BLOCK for cells in _lines(text, SIMULATED) if cells[3].isdigit()}
+    return next(seed for seed in JUDGE[::BLOCK] if seed // BLOCK not in spent)
 
 
 def _lines(text: str, section: str) -> list[list[str]]:

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis import scoring
-from benchmarks.diagnosis.case import KINDS, Case, Judgement, Report, write_recordings
-from benchmarks.diagnosis.seeds import BLOCK
+from benchmarks.diagnosis.case import BLOCK, KINDS, Case, Judgement, Report, write_recordings
 from benchmarks.diagnosis.truths import same_on_one_rig
 from benchmarks.rigs import Case as Drawn
 from benchmarks.rigs import draw

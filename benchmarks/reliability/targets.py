@@ -60,18 +60,23 @@ class Target:
 
 def _commands() -> list[bytes]:
     gains, limits = np.array([20.0, 0.2, 4.0, 0.3, 2700.0]), Limits()
-    payloads = [teensy.encode_command(kind, 7) for kind in teensy.Kind if kind >= 16]
-    payloads += [REFERENCE.encode_arm(8, gains, limits, 7), teensy.encode_ping(9, 10)]
+    payloads = [teensy.encode(kind, 7) for kind in teensy.Kind if kind >= 16]
+    payloads += [
+        REFERENCE.encode_arm(8, gains, limits, 7),
+        teensy.encode(teensy.Kind.PING, 9, 0, 10),
+    ]
     payloads.append(REFERENCE.encode_setpoints(9, (np.arange(5), np.arange(5)), 7))
     return [encode_frame(payload) for payload in payloads]
 
 
 def _replies() -> list[bytes]:
     payloads = [
-        teensy.encode_ack(teensy.Ack(1, 2, 0, 1, 99)),
-        teensy.encode_pong(3, 4, 5),
-        teensy.encode_hello_reply(1, teensy.Identity("TEENSY-1", "", REFERENCE.protocol_hash)),
-        teensy.encode_trip_report(1, 4, 3, (5, 6, 7, 8)),
+        teensy.encode(teensy.Kind.ACK, 1, 2, 0, 1, 99),
+        teensy.encode(teensy.Kind.PONG, 3, 4, 5),
+        teensy.encode(
+            teensy.Kind.HELLO_REPLY, 1, REFERENCE.protocol_hash, 5, 0, b"TEENSY-1", 0, 0, 0
+        ),
+        teensy.encode(teensy.Kind.TRIP_REPORT, 1, 4, 3, 5, 6, 7, 8),
         np.zeros(1, SAMPLE_DTYPE).tobytes(),
     ]
     return [encode_frame(payload) for payload in payloads]

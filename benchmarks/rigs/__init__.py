@@ -8,7 +8,7 @@ seed, over factors; a form is a random function, so no case repeats another's fo
 from benchmarks.rigs.case import Case, NoCaseError, draw
 from benchmarks.rigs.recipes import KINDS
 from benchmarks.rigs.seeds import CALIBRATE, DEVELOP, JUDGE, part_of
-from benchmarks.rigs.truth import HiddenTruth, Truth
+from benchmarks.rigs.structure import HiddenTruth, Truth
 
 __all__ = [
     "CALIBRATE",

@@ -7,15 +7,14 @@ import numpy as np
 
 from benchmarks.rigs import equivalent, kernel, structure
 from benchmarks.rigs.drawn import Drawn, Ranges, ranges_of
-from benchmarks.rigs.faults import Fault
 from benchmarks.rigs.plant import draw_controller, draw_plant, over
 from benchmarks.rigs.protocol import draw_protocol
 from benchmarks.rigs.recipes import RECIPES, STRENGTHS, needs_rest
 from benchmarks.rigs.residual import EQUATIONS
-from benchmarks.rigs.sensors import draw_chain
+from benchmarks.rigs.sensors import Fault, draw_chain
 from benchmarks.rigs.stage import EPOCH_NS, FIRST, Stage, Switched, UnstableError
 from benchmarks.rigs.strength import Fits, amplitude_for, fits_of, shown
-from benchmarks.rigs.truth import HiddenTruth, Truth
+from benchmarks.rigs.structure import HiddenTruth, Truth
 from estimation.campaign import with_campaign_time
 from rig.simulation.forms import Random
 
@@ -179,7 +178,13 @@ def _truth(
         low, high = STRENGTHS[kind]
         if not low <= strength <= high:
             return None
-        found.append(_told(one.drawn, name, one, strength, equation))
+        drawn = one.drawn
+        found.append(
+            HiddenTruth(
+                drawn.place, drawn.family, drawn.variables, one.runs, strength, equation, name,
+                one.amplitude, drawn.synonyms,
+            )
+        )  # fmt: skip
     columns = structure.columns(stage, switched, clean)
     best = structure.oracle(prepared, columns, whole) if switched else clean
     if any(best[e].rms() > INCOMPLETE * clean[e].rms() for e in EQUATIONS):
@@ -196,22 +201,6 @@ def _truth(
         {e: best[e].rms() for e in EQUATIONS},
         columns,
         together,
-    )
-
-
-def _told(
-    drawn: Drawn, name: str, switched: Switched, strength: float, equation: str
-) -> HiddenTruth:
-    return HiddenTruth(
-        drawn.place,
-        drawn.family,
-        drawn.variables,
-        switched.runs,
-        strength,
-        equation,
-        name,
-        switched.amplitude,
-        drawn.synonyms,
     )
 
 

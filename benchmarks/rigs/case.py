@@ -14,7 +14,7 @@ from benchmarks.rigs.build import build
 from benchmarks.rigs.recipes import KINDS, recipes_for
 from benchmarks.rigs.seeds import part_of
 from benchmarks.rigs.stage import Stage, Switched
-from benchmarks.rigs.truth import Truth
+from benchmarks.rigs.structure import Truth
 from estimation.campaign import Campaign
 from estimation.recording import Recording
 from rig.errors import RigError, UsageError

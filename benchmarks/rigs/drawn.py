@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.rigs import kernel
-from benchmarks.rigs.faults import Fault
 from benchmarks.rigs.hidden import Hidden, Table
 from benchmarks.rigs.plant import Plant
+from benchmarks.rigs.sensors import Fault
 from estimation.recording import FloatArray
 from rig.simulation.forms import POINTS, Random, grid
 

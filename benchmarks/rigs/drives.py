@@ -1,5 +1,7 @@
 """Recipes of ripples, springs, transmission and torque constant: catalogue names, drawn forms."""
 
+from functools import partial
+
 import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe, order_over
@@ -64,14 +66,10 @@ def current_ripple(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     return Drawn(WORDS["motor"], "ripple.current", ("motor_angle", "current"), part, 0.1)
 
 
-def output_ripple(place: str) -> Recipe:
-    """Return a recipe of a torque that repeats with the spindle's turn."""
-
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        part = Hidden(place, "table", (turn_table(random, ranges, "spindle", 60),))
-        return Drawn(WORDS[place], "ripple.output", ("spindle_angle",), part, level(plant, place))
-
-    return recipe
+def output_ripple(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a torque that repeats with the spindle's turn."""
+    part = Hidden(place, "table", (turn_table(random, ranges, "spindle", 60),))
+    return Drawn(WORDS[place], "ripple.output", ("spindle_angle",), part, level(plant, place))
 
 
 def eccentric(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
@@ -91,16 +89,12 @@ def pulley(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     return Drawn("pulley", "eccentric.load", ("spindle_angle", "load"), part, 0.01, others)
 
 
-def spring(place: str) -> Recipe:
-    """Return a recipe of a spring between a part and the ground, hardening or softening."""
-
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        variable = "jaw_angle" if place == "jaw" else "spindle_angle"
-        part = Hidden(place, "table", (ranges.table(variable, rising(random) - 0.5),))
-        word = WORDS.get(place, "jaw")
-        return Drawn(word, "spring.position", (variable,), part, level(plant, place))
-
-    return recipe
+def spring(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a spring between a part and the ground, hardening or softening."""
+    variable = "jaw_angle" if place == "jaw" else "spindle_angle"
+    part = Hidden(place, "table", (ranges.table(variable, rising(random) - 0.5),))
+    word = WORDS.get(place, "jaw")
+    return Drawn(word, "spring.position", (variable,), part, level(plant, place))
 
 
 def end_stop(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
@@ -145,49 +139,37 @@ def backlash(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     return Drawn("gear", "transmission.backlash", ("load",), part, 0.05 * ranges.size("twist"))
 
 
-def stiffening(place: str, variable: str) -> Recipe:
-    """Return a recipe of a spring that is not straight."""
-
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        sign = 1.0 if random.random() < 0.5 else -1.0
-        table = ranges.sided(variable, power(random, 1.6, 3.0), odd=True)
-        made = Table(variable, table.low, table.high, sign * table.values)
-        part = Hidden(place, "table", (made,))
-        guess = 0.1 * ranges.size(variable)
-        return Drawn(place, "transmission.stiffening", ("load",), part, guess)
-
-    return recipe
+def stiffening(place: str, variable: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a spring that is not straight."""
+    sign = 1.0 if random.random() < 0.5 else -1.0
+    table = ranges.sided(variable, power(random, 1.6, 3.0), odd=True)
+    made = Table(variable, table.low, table.high, sign * table.values)
+    part = Hidden(place, "table", (made,))
+    guess = 0.1 * ranges.size(variable)
+    return Drawn(place, "transmission.stiffening", ("load",), part, guess)
 
 
-def relaxation(place: str, variable: str) -> Recipe:
-    """Return a recipe of a part of the deflection that comes with time, over several times."""
-
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        count = int(random.integers(1, BANK_OF_LAGS + 1))
-        times = np.sort([over(random, 0.08, 3.0) for _ in range(count)])
-        weights = random.dirichlet(np.ones(count))
-        part = Hidden(place, "lags", (ranges.table(variable),), reach=times, weights=weights)
-        return Drawn(place, "transmission.relaxation", ("load", "time"), part, 0.15)
-
-    return recipe
+def relaxation(place: str, variable: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw a part of the deflection that comes with time, over several times."""
+    count = int(random.integers(1, BANK_OF_LAGS + 1))
+    times = np.sort([over(random, 0.08, 3.0) for _ in range(count)])
+    weights = random.dirichlet(np.ones(count))
+    part = Hidden(place, "lags", (ranges.table(variable),), reach=times, weights=weights)
+    return Drawn(place, "transmission.relaxation", ("load", "time"), part, 0.15)
 
 
-def inner_loop(place: str, variable: str) -> Recipe:
-    """Return a recipe of wires or teeth that rub on each other while a spring deflects."""
-
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        reach = ranges.span(variable) * over(random, 0.04, 0.25)
-        kind, reaches, weights = bank(random, reach)
-        if kind == "relays":
-            middle = 0.5 * (ranges.low[variable] + ranges.high[variable])
-            reaches = reaches + middle
-        part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=-weights)
-        if kind == "bouc_wen":
-            part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=weights)
-        guess = 0.03 * ranges.size(variable)
-        return Drawn(place, LOOPS[kind == "bouc_wen"], ("load", "history"), part, guess, LOOPS)
-
-    return recipe
+def inner_loop(place: str, variable: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw wires or teeth that rub on each other while a spring deflects."""
+    reach = ranges.span(variable) * over(random, 0.04, 0.25)
+    kind, reaches, weights = bank(random, reach)
+    if kind == "relays":
+        middle = 0.5 * (ranges.low[variable] + ranges.high[variable])
+        reaches = reaches + middle
+    part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=-weights)
+    if kind == "bouc_wen":
+        part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=weights)
+    guess = 0.03 * ranges.size(variable)
+    return Drawn(place, LOOPS[kind == "bouc_wen"], ("load", "history"), part, guess, LOOPS)
 
 
 def play(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
@@ -214,24 +196,24 @@ def wavy(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
 DRIVES: dict[str, Recipe] = {
     "ripple.motor motor": motor_ripple,
     "ripple.current motor": current_ripple,
-    "ripple.output motor": output_ripple("motor"),
-    "ripple.output spindle": output_ripple("spindle"),
+    "ripple.output motor": partial(output_ripple, "motor"),
+    "ripple.output spindle": partial(output_ripple, "spindle"),
     "eccentric.load motor": eccentric,
     "eccentric.load pulley": pulley,
-    "spring.position motor": spring("motor"),
-    "spring.position spindle": spring("spindle"),
-    "spring.position jaw": spring("jaw"),
+    "spring.position motor": partial(spring, "motor"),
+    "spring.position spindle": partial(spring, "spindle"),
+    "spring.position jaw": partial(spring, "jaw"),
     "spring.end_stop jaw": end_stop,
     "gravity.payload jaw": payload,
     "motor.saturation motor": saturation,
     "motor.thermal motor": thermal,
     "transmission.backlash gear": backlash,
-    "transmission.stiffening gear": stiffening("gear", "twist"),
-    "transmission.stiffening cable": stiffening("cable", "stretch"),
-    "transmission.relaxation gear": relaxation("gear", "twist"),
-    "transmission.relaxation cable": relaxation("cable", "stretch"),
-    "hysteresis.presliding gear": inner_loop("gear", "twist"),
-    "hysteresis.presliding cable": inner_loop("cable", "stretch"),
+    "transmission.stiffening gear": partial(stiffening, "gear", "twist"),
+    "transmission.stiffening cable": partial(stiffening, "cable", "stretch"),
+    "transmission.relaxation gear": partial(relaxation, "gear", "twist"),
+    "transmission.relaxation cable": partial(relaxation, "cable", "stretch"),
+    "hysteresis.presliding gear": partial(inner_loop, "gear", "twist"),
+    "hysteresis.presliding cable": partial(inner_loop, "cable", "stretch"),
     "transmission.backlash cable": play,
     "ripple.output gear": wavy,
 }

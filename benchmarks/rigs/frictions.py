@@ -1,6 +1,7 @@
 """Recipes of losses at motor and spindle: catalogue names, forms drawn again each time."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -47,18 +48,14 @@ def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: Drawer
     return recipe
 
 
-def slow(place: str) -> Drawer:
-    """Return the drawer of a level that falls with the size of the speed."""
-
-    def table(random: Random, ranges: Ranges) -> Table:
-        return ranges.way(f"{place}_way", falling(random, grid() / random.uniform(0.05, 0.3)))
-
-    return table
+def slow(place: str, random: Random, ranges: Ranges) -> Table:
+    """Draw a level that falls with the size of the speed."""
+    return ranges.way(f"{place}_way", falling(random, grid() / random.uniform(0.05, 0.3)))
 
 
-def loaded(place: str) -> Drawer:
-    """Return the drawer of a level that grows with the load, of either sign."""
-    return lambda random, ranges: ranges.sided(LOADS[place], power(random, 0.6, 1.7), odd=False)
+def loaded(place: str, random: Random, ranges: Ranges) -> Table:
+    """Draw a level that grows with the load, of either sign."""
+    return ranges.sided(LOADS[place], power(random, 0.6, 1.7), odd=False)
 
 
 def along(random: Random, ranges: Ranges) -> Table:
@@ -113,17 +110,21 @@ def _centred(ranges: Ranges, variable: str) -> FloatArray:
     return np.asarray(ranges.table(variable).x / ranges.size(variable))
 
 
-def speeding(place: str, family: str, low: float, high: float, odd: bool) -> Recipe:
-    """Return a recipe of a torque that is a distorted power of the speed."""
-
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        table = ranges.sided(f"{place}_speed", power(random, low, high), odd)
-        return Drawn(
-            WORDS[place], family, ("velocity",), Hidden(place, "table", (table,)),
-            level(plant, place),
-        )  # fmt: skip
-
-    return recipe
+def speeding(
+    place: str,
+    family: str,
+    form: tuple[float, float, bool],
+    random: Random,
+    ranges: Ranges,
+    plant: Plant,
+) -> Drawn:
+    """Draw a torque that is a distorted power of the speed: least and most power, and if odd."""
+    low, high, odd = form
+    table = ranges.sided(f"{place}_speed", power(random, low, high), odd)
+    return Drawn(
+        WORDS[place], family, ("velocity",), Hidden(place, "table", (table,)),
+        level(plant, place),
+    )  # fmt: skip
 
 
 def load_viscous(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
@@ -138,45 +139,47 @@ def load_viscous(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     )  # fmt: skip
 
 
-def loop(place: str) -> Recipe:
-    """Return a recipe of friction that builds up over a way after each reversal."""
-
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        variable = f"{place}_angle"
-        reach = ranges.span(variable) * over(random, 0.02, 0.15)
-        kind, reaches, weights = bank(random, reach)
-        if kind == "relays":  # relays about the whole travel, not about zero
-            middle = 0.5 * (ranges.low[variable] + ranges.high[variable])
-            spread = 0.4 * ranges.span(variable) * random.uniform(-1.0, 1.0, BANK)
-            reaches = reaches + np.tile(middle + spread, 2)
-        part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=weights)
-        family = LOOPS[kind == "bouc_wen"]
-        return Drawn(WORDS[place], family, (variable, "history"), part, level(plant, place), LOOPS)
-
-    return recipe
+def loop(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw friction that builds up over a way after each reversal."""
+    variable = f"{place}_angle"
+    reach = ranges.span(variable) * over(random, 0.02, 0.15)
+    kind, reaches, weights = bank(random, reach)
+    if kind == "relays":  # relays about the whole travel, not about zero
+        middle = 0.5 * (ranges.low[variable] + ranges.high[variable])
+        spread = 0.4 * ranges.span(variable) * random.uniform(-1.0, 1.0, BANK)
+        reaches = reaches + np.tile(middle + spread, 2)
+    part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=weights)
+    family = LOOPS[kind == "bouc_wen"]
+    return Drawn(WORDS[place], family, (variable, "history"), part, level(plant, place), LOOPS)
 
 
 def _recipes() -> dict[str, Recipe]:
     found: dict[str, Recipe] = {
         "friction.load_viscous motor": load_viscous,
         "friction.capstan spindle": rubbing(
-            "spindle", "friction.capstan", ("load", "velocity_sign"), loaded("spindle"), sided_share
+            "spindle",
+            "friction.capstan",
+            ("load", "velocity_sign"),
+            partial(loaded, "spindle"),
+            sided_share,
         ),
     }
     for place in WORDS:
         for family, variables, table in (
-            ("friction.stribeck", ("velocity",), slow(place)),
-            ("friction.load", ("load", "velocity_sign"), loaded(place)),
+            ("friction.stribeck", ("velocity",), partial(slow, place)),
+            ("friction.load", ("load", "velocity_sign"), partial(loaded, place)),
             ("friction.position", ("spindle_angle", "velocity_sign"), along),
             ("friction.warmup", ("time", "velocity_sign"), fading),
             ("change.step", ("time", "velocity_sign"), stepping),
             ("friction.dwell", ("dwell", "velocity_sign"), rested),
         ):
             found[f"{family} {place}"] = rubbing(place, family, variables, table)
-        found[f"friction.drag {place}"] = speeding(place, "friction.drag", 1.7, 3.0, odd=True)
-        asymmetric = speeding(place, "friction.viscous_asymmetry", 0.8, 1.4, odd=False)
+        found[f"friction.drag {place}"] = partial(
+            speeding, place, "friction.drag", (1.7, 3.0, True)
+        )
+        asymmetric = partial(speeding, place, "friction.viscous_asymmetry", (0.8, 1.4, False))
         found[f"friction.viscous_asymmetry {place}"] = asymmetric
-        found[f"hysteresis.presliding {place}"] = loop(place)
+        found[f"hysteresis.presliding {place}"] = partial(loop, place)
     return found
 
 

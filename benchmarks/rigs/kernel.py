@@ -12,10 +12,9 @@ without effects the declared equations of the reference rig hold, but for the fi
 what the gear's spring does to accelerations.
 """
 
-import hashlib
 import math
+import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -23,6 +22,7 @@ import numpy as np
 
 from benchmarks.rigs import hidden
 from rig.simulation import plant as reference
+from rig.simulation.bench import hash_of
 from rig.simulation.forms import BANK
 from rig.simulation.plant import TICK_S, braking, clip
 
@@ -65,14 +65,6 @@ P_MOTOR, P_CONSTANT, P_GEAR, P_SPINDLE, P_CABLE, P_JAW, P_PULLEY = range(len(hid
 TABLE, STOPS, RELAYS, BOUC_WEN, LAGS = range(len(hidden.OPERATORS))
 ACCELERATION_LAG_S = 4e-3
 POINTS, MOST = hidden.TABLE_POINTS, hidden.MOST
-
-
-def _fingerprint() -> str:
-    """Return a hash of the sources the compiled loop is made of, part of its cache's key."""
-    digest = hashlib.sha256()
-    for file in (reference.__file__, hidden.__file__, __file__):
-        digest.update(Path(str(file)).read_bytes())
-    return digest.hexdigest()
 
 
 @numba.njit()
@@ -200,6 +192,8 @@ def _build(source: str) -> Callable[..., bool]:
         x = np.zeros(len(hidden.VARIABLES))
         x[V_DWELL] = 1.0
         values, signs = np.zeros(MOST), np.zeros(MOST)
+        torques, limits, speeds = np.zeros(3), np.zeros(3), np.zeros(3)  # motor, spindle, jaw
+        widths = np.array([p.motor_width, p.spindle_width, p.spindle_width])
         slowed = ws
         for tick in range(setpoints.shape[0]):
             count = p.counts_per_turn / (2.0 * math.pi)
@@ -243,8 +237,9 @@ def _build(source: str) -> Callable[..., bool]:
                 x[V_GEAR_TORQUE], x[V_CABLE_TORQUE] = T, C
 
                 constant = p.constant
-                motor, spindle, jaw = 0.0, 0.0, 0.0
-                motor_level, spindle_level, jaw_level = p.motor_friction, p.spindle_friction, 0.0
+                torques[:] = 0.0
+                limits[0], limits[1], limits[2] = p.motor_friction, p.spindle_friction, 0.0
+                speeds[0], speeds[1], speeds[2] = wm, ws, wq
                 for k in range(rows.number):
                     place, rubs = rows.kinds[k, 0], rows.kinds[k, 2] != 0
                     if place in (P_GEAR, P_CABLE, P_PULLEY):
@@ -253,28 +248,14 @@ def _build(source: str) -> Callable[..., bool]:
                     if place == P_CONSTANT:
                         values[k] = value * p.constant * current
                         constant -= p.constant * value
-                    elif place == P_MOTOR:
-                        if rubs:
-                            value = max(value, -motor_level)
-                            motor_level += value
-                            values[k] = _signed(value, wm, p.motor_width)
-                        else:
-                            motor += value
-                            values[k] = value
-                    elif place == P_SPINDLE:
-                        if rubs:
-                            value = max(value, -spindle_level)
-                            spindle_level += value
-                            values[k] = _signed(value, ws, p.spindle_width)
-                        else:
-                            spindle += value
-                            values[k] = value
-                    elif rubs:
-                        value = max(value, -jaw_level)
-                        jaw_level += value
-                        values[k] = _signed(value, wq, p.spindle_width)
+                        continue
+                    body = 0 if place == P_MOTOR else 1 if place == P_SPINDLE else 2
+                    if rubs:
+                        value = max(value, -limits[body])
+                        limits[body] += value
+                        values[k] = _signed(value, speeds[body], widths[body])
                     else:
-                        jaw += value
+                        torques[body] += value
                         values[k] = value
 
                 if step == 0:
@@ -288,18 +269,18 @@ def _build(source: str) -> Callable[..., bool]:
                             added[tick, MOST + k] = signs[k] * C
 
                 share = dt / p.motor_inertia
-                wm += share * (constant * current - p.motor_viscous * wm - T / p.ratio - motor)
-                wm -= braking(wm, share * motor_level, p.motor_width)
+                wm += share * (constant * current - p.motor_viscous * wm - T / p.ratio - torques[0])
+                wm -= braking(wm, share * limits[0], p.motor_width)
                 share = dt / p.spindle_inertia
                 before = ws
-                ws += share * (T - lever * C - p.spindle_viscous * ws - spindle)
-                ws -= braking(ws, share * spindle_level, p.spindle_width)
+                ws += share * (T - lever * C - p.spindle_viscous * ws - torques[1])
+                ws -= braking(ws, share * limits[1], p.spindle_width)
                 slowed += dt / ACCELERATION_LAG_S * ((ws - before) / dt - slowed)
                 x[V_ACCELERATION] = slowed
                 share = dt / jaw_inertia
                 before = wq
-                wq += share * (C - loading - load.viscous * wq - jaw)
-                wq -= braking(wq, share * jaw_level, p.spindle_width)
+                wq += share * (C - loading - load.viscous * wq - torques[2])
+                wq -= braking(wq, share * limits[2], p.spindle_width)
                 if step == 0:
                     turning = p.load_inertia * (wq - before) / dt
                     out[tick, DISTAL] = loading + load.viscous * before + turning
@@ -317,4 +298,4 @@ def _build(source: str) -> Callable[..., bool]:
     return play
 
 
-play = _build(_fingerprint())
+play = _build(hash_of([reference, hidden, sys.modules[__name__]]))

@@ -1,9 +1,11 @@
 """Recipes outside the catalogue: functions of variables that no family of it has."""
 
+from functools import partial
+
 import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe
-from benchmarks.rigs.frictions import LOADS, WORDS, Drawer, level, loaded, rubbing
+from benchmarks.rigs.frictions import LOADS, WORDS, level, loaded, rubbing
 from benchmarks.rigs.hidden import Hidden, Table
 from benchmarks.rigs.plant import Plant
 from rig.simulation.forms import Random, falling, grid, smooth, spots
@@ -25,13 +27,9 @@ def pushed(random: Random, ranges: Ranges) -> Table:
     return Table("acceleration", -size, size, values if random.random() < 0.5 else 1.0 - values)
 
 
-def windowed(place: str) -> Drawer:
-    """Return the drawer of a level that is there at some loads only."""
-
-    def table(random: Random, ranges: Ranges) -> Table:
-        return ranges.table(LOADS[place], spots(random, 1, 0.06, 0.15))
-
-    return table
+def windowed(place: str, random: Random, ranges: Ranges) -> Table:
+    """Draw a level that is there at some loads only."""
+    return ranges.table(LOADS[place], spots(random, 1, 0.06, 0.15))
 
 
 def aged(random: Random, ranges: Ranges) -> Table:
@@ -44,39 +42,29 @@ def jumping(random: Random, ranges: Ranges) -> Table:
     return Table("jump", 0.0, 1.0, grid())
 
 
-def beyond(place: str) -> Recipe:
-    """Return a recipe of drag on one part of the travel only."""
-
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        x = grid() - random.uniform(0.35, 0.65)
-        side = 0.5 + 0.5 * np.tanh(x / random.uniform(0.03, 0.1)) * random.choice([-1.0, 1.0])
-        tables = (
-            ranges.sided(f"{place}_speed", lambda size: size, odd=True),
-            ranges.table("spindle_angle", side),
-        )
-        part = Hidden(place, "table", tables)
-        return Drawn(
-            WORDS[place], UNKNOWN, ("velocity", "spindle_angle"), part, level(plant, place)
-        )
-
-    return recipe
+def beyond(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw drag on one part of the travel only."""
+    x = grid() - random.uniform(0.35, 0.65)
+    side = 0.5 + 0.5 * np.tanh(x / random.uniform(0.03, 0.1)) * random.choice([-1.0, 1.0])
+    tables = (
+        ranges.sided(f"{place}_speed", lambda size: size, odd=True),
+        ranges.table("spindle_angle", side),
+    )
+    part = Hidden(place, "table", tables)
+    return Drawn(WORDS[place], UNKNOWN, ("velocity", "spindle_angle"), part, level(plant, place))
 
 
-def switching(place: str) -> Recipe:
-    """Return a recipe of friction that comes on at high speed and goes off at low speed."""
-
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
-        fast = ranges.high[f"{place}_way"]
-        reach = np.zeros(80)
-        reach[0], reach[40] = random.uniform(0.35, 0.6) * fast, random.uniform(0.08, 0.25) * fast
-        part = Hidden(
-            place, "relays", (ranges.way(f"{place}_way", grid()),), friction=True,
-            reach=reach, weights=np.ones(1),
-        )  # fmt: skip
-        variables = ("velocity", "history", "velocity_sign")
-        return Drawn(WORDS[place], UNKNOWN, variables, part, level(plant, place))
-
-    return recipe
+def switching(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    """Draw friction that comes on at high speed and goes off at low speed."""
+    fast = ranges.high[f"{place}_way"]
+    reach = np.zeros(80)
+    reach[0], reach[40] = random.uniform(0.35, 0.6) * fast, random.uniform(0.08, 0.25) * fast
+    part = Hidden(
+        place, "relays", (ranges.way(f"{place}_way", grid()),), friction=True,
+        reach=reach, weights=np.ones(1),
+    )  # fmt: skip
+    variables = ("velocity", "history", "velocity_sign")
+    return Drawn(WORDS[place], UNKNOWN, variables, part, level(plant, place))
 
 
 def notch(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
@@ -105,20 +93,24 @@ def _recipes() -> dict[str, Recipe]:
         along = ("spindle_angle", "velocity_sign")
         found[f"unknown {place} tight spot"] = rubbing(place, UNKNOWN, along, tight)
         found[f"unknown {place} worn spot"] = rubbing(
-            place, UNKNOWN, ("spindle_angle", "load", "velocity_sign"), tight, loaded(place)
+            place,
+            UNKNOWN,
+            ("spindle_angle", "load", "velocity_sign"),
+            tight,
+            partial(loaded, place),
         )
         found[f"unknown {place} pushed"] = rubbing(
             place, UNKNOWN, ("acceleration", "velocity_sign"), pushed
         )
         found[f"unknown {place} load window"] = rubbing(
-            place, UNKNOWN, ("load", "velocity_sign"), windowed(place)
+            place, UNKNOWN, ("load", "velocity_sign"), partial(windowed, place)
         )
         found[f"unknown {place} age window"] = rubbing(
             place, UNKNOWN, ("dwell", "velocity_sign"), aged
         )
         found[f"unknown {place} jumps"] = rubbing(place, UNKNOWN, ("velocity_sign",), jumping)
-        found[f"unknown {place} drag beyond"] = beyond(place)
-        found[f"unknown {place} switching"] = switching(place)
+        found[f"unknown {place} drag beyond"] = partial(beyond, place)
+        found[f"unknown {place} switching"] = partial(switching, place)
     return found
 
 

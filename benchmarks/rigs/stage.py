@@ -11,12 +11,11 @@ import numpy as np
 
 from benchmarks.rigs import kernel, residual
 from benchmarks.rigs.drawn import Drawn
-from benchmarks.rigs.faults import Fault, error_of
 from benchmarks.rigs.hidden import MOST, Hidden, rows_of
 from benchmarks.rigs.plant import Controller, Plant, constants_of
 from benchmarks.rigs.protocol import LEAD_S, Plan, Protocol
 from benchmarks.rigs.residual import Prepared
-from benchmarks.rigs.sensors import READINGS, Chain, noise_of, read
+from benchmarks.rigs.sensors import READINGS, Chain, Fault, error_of, noise_of, read
 from estimation.recording import FloatArray, Instrument, Recording
 
 EPOCH_NS = 1_700_000_000_000_000_000

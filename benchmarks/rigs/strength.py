@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.rigs import residual
-from benchmarks.rigs.faults import Fault
 from benchmarks.rigs.hidden import Hidden
 from benchmarks.rigs.residual import EQUATIONS, Fitted, Prepared
+from benchmarks.rigs.sensors import Fault
 from benchmarks.rigs.stage import Stage, Switched, UnstableError
 
 SHOWN = {

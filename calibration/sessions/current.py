@@ -9,7 +9,7 @@ and gear at the spindle, c the remaining zeros. F / K is the current that only t
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,13 +17,18 @@ from calibration.chain import CURRENT, GEAR
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError, check_change, check_levels, check_limit
-from calibration.regression import refuse_drift, regress
-from calibration.sessions.motion import moves, need_channel, steady
+from calibration.regression import Regression, refuse_drift, regress
+from calibration.sessions.motion import condition, joined, moves, residuals, steady
 from estimation.recording import FloatArray
 
 TORQUE, COMMAND = GEAR.torque, "motor_command_ratio"
 LOADS_A = (0.1, 0.3, 0.5, 0.7, 0.9)
 SPEEDS_RAD_S = (0.5, 1.0)
+LEAST_RUNS = 6
+RESIDUAL_LIMIT = 0.1
+"""Greatest residual that passes, share of the span of torque."""
+MOST_LATE = 6
+"""Delays tried, samples."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +41,6 @@ class CurrentSession:
         repeats: Number of moves of each.
         motor_constant_n_m_a: Torque constant of the data sheet; with the ratio gives an efficiency.
         gear_ratio: Ratio of the gear by its label.
-        residual_limit: Greatest residual that passes, share of the span of torque.
     """
 
     loads_a: tuple[float, ...] = LOADS_A
@@ -44,7 +48,6 @@ class CurrentSession:
     repeats: int = 1
     motor_constant_n_m_a: float | None = None
     gear_ratio: float = GEAR.ratio
-    residual_limit: float = 0.1
 
     kind = "current"
     devices = ("logger",)
@@ -56,13 +59,12 @@ class CurrentSession:
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
         """Return the torque a current gives, and the current a command gives."""
         runs = [steady(m, (CURRENT, TORQUE, COMMAND)) for m in measurements]
-        currents = need_channel(np.concatenate([run[CURRENT] for run in runs]), CURRENT)
-        torques = need_channel(np.concatenate([run[TORQUE] for run in runs]), TORQUE)
+        currents = joined(runs, CURRENT)
+        torques = joined(runs, TORQUE)
         check_change(currents, 0.05, "The current")
         check_change(torques, 0.02, "The torque")
-        loads = np.array([float(m.recording.conditions["load_command_a"]) for m in measurements])
-        check_levels(loads, 3, "The load")
-        torque = regress([equation(run) for run in runs], least_runs=6)
+        check_levels(condition(measurements, "load_command_a"), 3, "The load")
+        torque = regress([equation(run) for run in runs], LEAST_RUNS)
         gain, friction = torque.values[:2]
         if gain <= 0:
             raise BadDataError(
@@ -73,14 +75,9 @@ class CurrentSession:
             )
         span = float(np.ptp(torques))
         fix = "Look for a tight spot, a loose coupling, or another effect with `rig diagnose`."
-        check_limit(
-            "not_linear", torque.residual_rms / span, self.residual_limit, "The residual", fix
-        )
+        check_limit("not_linear", torque.residual_rms / span, RESIDUAL_LIMIT, "The residual", fix)
         drift = refuse_drift(torque, span)
-        driver = regress(
-            [(np.column_stack([r[COMMAND], np.ones_like(r[COMMAND])]), r[CURRENT]) for r in runs],
-            least_runs=6,
-        )
+        driver = _driver(runs)
         low, high = float(currents.min()), float(currents.max())
         half = torque.half_widths()
         found: dict[str, float | str] = {
@@ -94,19 +91,67 @@ class CurrentSession:
         }
         names = ("torque_constant_n_m_a", "friction_n_m", "damping_n_m_s_rad", "offset_n_m")
         torque_fit = torque.as_fit("current", *names)
-        driver_fit = driver.as_fit("driver", "gain_a", "offset_a")
-        series = {
-            m.recording.name: (run[CURRENT], left * 1e3)
-            for m, run, left in zip(measurements, runs, torque.residuals, strict=True)
-        }
-        commands = np.concatenate([run[COMMAND] for run in runs])
+        series = residuals(measurements, [run[CURRENT] for run in runs], torque)
         return Conclusion(
-            (
-                Result("spindle_torque_n_m", CURRENT, torque_fit, low, high),
-                Result(CURRENT, COMMAND, driver_fit, float(commands.min()), float(commands.max())),
-            ),
+            (Result("spindle_torque_n_m", CURRENT, torque_fit, low, high), driver),
             found,
             Residuals("motor current, A", "residual, mN m", series),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveCurrentSession:
+    """Calibrate the current of an unloaded drive without a torque sensor.
+
+    Attributes:
+        speeds_rad_s: Speeds of the shaft; at least two.
+        repeats: Number of moves of each.
+        motor_constant_n_m_a: Torque at the shaft an ampere, by the data sheet.
+    """
+
+    speeds_rad_s: tuple[float, ...]
+    repeats: int = 1
+    motor_constant_n_m_a: float | None = None
+
+    kind = "current"
+    devices = ("logger",)
+
+    def steps(self) -> list[Step]:
+        """One move a speed and repeat, enough of them for an interval."""
+        repeats = max(self.repeats, -(-LEAST_RUNS // len(self.speeds_rad_s)))
+        return moves(self.speeds_rad_s, (0.0,), repeats)
+
+    def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
+        """Return the current that turning takes, and the current a command gives."""
+        # a drive measures before it takes the command of the same cycle: the delay fits best
+        tried = [
+            [steady(_late_by(m, late), (CURRENT, COMMAND)) for m in measurements]
+            for late in range(MOST_LATE)
+        ]
+        late = int(np.argmin([_current_by_command(runs).residual_rms for runs in tried]))
+        runs = tried[late]
+        currents = joined(runs, CURRENT)
+        check_change(currents, 0.005, "The current")
+        check_levels(condition(measurements, "speed_rad_s"), 2, "The speed")
+        turning = regress([_turning(run) for run in runs], LEAST_RUNS)
+        friction, damping, zero = turning.values.tolist()
+        half = turning.half_widths().tolist()
+        constant = self.motor_constant_n_m_a
+        found: dict[str, float | str] = {
+            "friction_current_a": friction,
+            "friction_current_ci95_a": half[0],
+            "damping_current_at_1_rad_s_a": damping,
+            "damping_current_at_1_rad_s_ci95_a": half[1],
+            "zero_current_a": zero,
+            "delay_of_the_drive_s": late / measurements[0].recording.sample_rate_hz,
+            "friction_torque": "no torque constant was given"
+            if constant is None
+            else f"{friction * constant:.3g} N m by the data sheet's constant",
+        }
+        velocities = [run["spindle_velocity_rad_s"] for run in runs]
+        series = residuals(measurements, velocities, turning)
+        return Conclusion(
+            (_driver(runs),), found, Residuals("speed, rad/s", "residual, mA", series)
         )
 
 
@@ -115,3 +160,30 @@ def equation(run: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
     current, speed = run[CURRENT], run["spindle_velocity_rad_s"]
     columns = np.column_stack([current, -run["direction"], -speed, np.ones_like(current)])
     return columns, run[TORQUE]
+
+
+def _turning(run: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    columns = [run["direction"], run["spindle_velocity_rad_s"], np.ones_like(run[CURRENT])]
+    return np.column_stack(columns), run[CURRENT]
+
+
+def _current_by_command(runs: Sequence[Mapping[str, FloatArray]]) -> Regression:
+    commands = [np.column_stack([run[COMMAND], np.ones_like(run[COMMAND])]) for run in runs]
+    return regress([(x, run[CURRENT]) for x, run in zip(commands, runs, strict=True)], LEAST_RUNS)
+
+
+def _driver(runs: Sequence[Mapping[str, FloatArray]]) -> Result:
+    """Return the line from command to current."""
+    commands = np.concatenate([run[COMMAND] for run in runs])
+    fit = _current_by_command(runs).as_fit("driver", "gain_a", "offset_a")
+    return Result(CURRENT, COMMAND, fit, float(commands.min()), float(commands.max()))
+
+
+def _late_by(measurement: Measurement, samples: int) -> Measurement:
+    """Return a measurement whose commands are so many samples older."""
+    recording = measurement.recording
+    command = recording[COMMAND]
+    older = np.concatenate([np.full(samples, command[0]), command[: len(command) - samples]])
+    return replace(
+        measurement, recording=replace(recording, columns={**recording.columns, COMMAND: older})
+    )

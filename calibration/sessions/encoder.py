@@ -17,7 +17,7 @@ from calibration.procedure import Conclusion, Measurement, Residuals, Result, St
 from calibration.quality import BadDataError, check_change, check_points
 from calibration.record import LINE, Fit
 from calibration.regression import Regression, is_better, regress
-from calibration.sessions.motion import moves, need_channel, steady
+from calibration.sessions.motion import joined, moves, residuals, steady
 from estimation.recording import FloatArray
 
 SPEEDS_RAD_S = (0.3, 0.5)
@@ -71,17 +71,17 @@ class EncoderSession:
         at = _mark_counts(marks, line.counts)
         runs = [steady(m, (pair.channel, pair.reference, pair.torque)) for m in moved]
         for name in (pair.channel, pair.reference):
-            check_change(need_channel(np.concatenate([run[name] for run in runs]), name), 0.2, name)
+            check_change(joined(runs, name), 0.2, name)
         plain = regress([(_plain(run, pair), run[pair.channel]) for run in runs])
         periods, waved = _best_wave(runs, pair)
         amplitude = float(np.hypot(*waved.values[-2:]))
         # smaller than half a count it may be the quantum's own pattern
-        has_wave = is_better(waved, plain) and amplitude > abs(line.slope) / 2
+        has_wave = is_better(waved.held_out, plain.held_out) and amplitude > abs(line.slope) / 2
         is_waved = has_wave and not self.line_only
         used = waved if is_waved else plain
         names = ["ratio", "offset_rad", "compliance_rad_n_m", "lost_motion_rad"]
         names += ["wave_sine_rad", "wave_cosine_rad"] if is_waved else []
-        angles = np.concatenate([run[pair.channel] for run in runs])
+        angles = joined(runs, pair.channel)
         error_fit = used.as_fit("encoder", *names)
         zero = float(at.mean())
         variance = float(at.var(ddof=1) / at.size)
@@ -100,10 +100,7 @@ class EncoderSession:
             else "none that predicts runs left out",
             "wave_amplitude_rad": amplitude,
         }
-        series = {
-            m.recording.name: (run[pair.channel], left * 1e3)
-            for m, run, left in zip(moved, runs, used.residuals, strict=True)
-        }
+        series = residuals(moved, [run[pair.channel] for run in runs], used)
         low, high = float(angles.min()), float(angles.max())
         error_name = f"{self.encoder}_encoder_rad"
         return Conclusion(

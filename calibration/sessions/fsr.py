@@ -10,8 +10,8 @@ from calibration.fsr_memory import CREEP_START_S, FsrMemory, fit_memory
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError, check_points
-from calibration.record import Fit
 from estimation.filters import LowPass, zero_phase
+from estimation.recording import FloatArray, Recording
 
 FSR = "fsr_v"
 SMOOTH = LowPass(cutoff_hz=5.0, order=3)
@@ -93,18 +93,10 @@ class FsrSession:
             pure, self.degree, force_at_zero_n=self.force_at_zero_n, rail_v=self.rail_v
         )
         curve = fitted.curve
-        fit = curve.as_fit()
-        size = len(fit.parameters)
-        covariance = np.zeros((size + 2, size + 2))
-        covariance[:size, :size] = fit.covariance
-        covariance[size, size] = memory.gap_standard_error_n**2
-        covariance[size + 1, size + 1] = creep.standard_error**2 if creep else 0.0
-        whole = Fit(
-            "polynomial",
-            {**fit.parameters, "loading_gap_n": memory.gap_n, "creep_ratio": memory.creep_ratio},
-            tuple(map(tuple, covariance.tolist())),
-            fit.residual_rms,
-            fit.points,
+        assert curve.fit is not None  # noqa: S101  it was fitted
+        whole = curve.fit.extended(
+            {"loading_gap_n": memory.gap_n, "creep_ratio": memory.creep_ratio},
+            [memory.gap_standard_error_n, creep.standard_error if creep else 0.0],
         )
         low, high = curve.interval_n(np.array([(curve.low_v + curve.high_v) / 2]))
         held_out = ", ".join(f"{d}: {e:.4f}" for d, e in fitted.held_out_rmse_n.items())
@@ -156,13 +148,9 @@ class FsrSession:
         return "modelled" if memory.gap_n else "not significant"
 
     def _run(self, measurement: Measurement, zero_n: float, floor_v: float) -> FsrRun:
-        """Return the pressed part of a run, both channels smoothed alike."""
+        """Return the pressed part of a run."""
         recording = measurement.recording
-        rate_hz = recording.sample_rate_hz
-        both = np.column_stack([recording[FSR], recording[self.axis] - zero_n])
-        smooth = zero_phase(both, rate_hz, SMOOTH)
-        step = max(1, round(rate_hz / KEPT_HZ))
-        smooth, time_s = smooth[::step], recording.time_s[::step]
+        time_s, smooth = self._smooth(recording, zero_n)
         pressed = smooth[:, 0] > floor_v
         if pressed.sum() < 20:
             raise BadDataError(
@@ -176,11 +164,14 @@ class FsrSession:
     def _creep(self, hold: Measurement | None, zero_n: float) -> Creep | None:
         if hold is None:
             return None
-        recording = hold.recording
-        step = max(1, round(recording.sample_rate_hz / KEPT_HZ))
-        both = np.column_stack([recording[FSR], recording[self.axis] - zero_n])
-        smooth = zero_phase(both, recording.sample_rate_hz, SMOOTH)[::step]
+        time_s, smooth = self._smooth(hold.recording, zero_n)
         on = int(np.argmax(smooth[:, 1] > 0.9 * smooth[:, 1].max()))
-        time_s = recording.time_s[::step][on:] - recording.time_s[::step][on]
-        run = FsrRun("hold", time_s + CREEP_START_S, smooth[on:, 0], smooth[on:, 1])
-        return measure_creep(run, start_s=1.0)
+        since_s = time_s[on:] - time_s[on] + CREEP_START_S
+        return measure_creep(FsrRun("hold", since_s, smooth[on:, 0], smooth[on:, 1]), start_s=1.0)
+
+    def _smooth(self, recording: Recording, zero_n: float) -> tuple[FloatArray, FloatArray]:
+        """Return time, shape (n,), and voltage and force, both smoothed alike, shape (n, 2)."""
+        both = np.column_stack([recording[FSR], recording[self.axis] - zero_n])
+        step = max(1, round(recording.sample_rate_hz / KEPT_HZ))
+        smooth = zero_phase(both, recording.sample_rate_hz, SMOOTH)
+        return recording.time_s[::step], smooth[::step]

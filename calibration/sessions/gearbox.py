@@ -20,7 +20,7 @@ from calibration.procedure import Conclusion, Measurement, Residuals, Result, St
 from calibration.quality import BadDataError, check_change
 from calibration.record import Fit
 from calibration.regression import Regression, is_better, refuse_drift, regress
-from calibration.sessions.motion import moves, need_channel, steady
+from calibration.sessions.motion import condition, joined, moves, residuals, steady
 from estimation.recording import FloatArray
 
 TORQUE, MOTOR, SPINDLE = GEAR.torque, GEAR.reference, GEAR.channel
@@ -65,7 +65,7 @@ class GearboxSession:
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
         """Return stiffness and backlash."""
-        loads = [float(m.recording.conditions["load_command_a"]) for m in measurements]
+        loads = condition(measurements, "load_command_a")
         if not (min(loads) < 0 < max(loads)):
             raise BadDataError(
                 "levels",
@@ -74,12 +74,13 @@ class GearboxSession:
                 "Load both ways: some loads of each sign.",
             )
         twists = [self._twist(m) for m in measurements]
-        every = np.concatenate([torque for torque, _ in twists])
-        check_change(need_channel(every, TORQUE), 0.05, "The torque")
+        every = joined([{TORQUE: torque} for torque, _ in twists], TORQUE)
+        check_change(every, 0.05, "The torque")
         zero_n_m, whole, without = _best_zero(twists)
         _refuse_no_slope(whole.values[0], whole.residual_rms, every)
         drift = refuse_drift(whole, float(np.ptp(every)) * abs(float(whole.values[0])))
-        has_gap = is_better(whole, without) and abs(whole.values[1]) > whole.half_widths()[1]
+        is_wide = abs(whole.values[1]) > whole.half_widths()[1]
+        has_gap = is_wide and is_better(whole.held_out, without.held_out)
         used = without if self.stiffness_only else whole
         fit = _as_fit(used, int(every.size))
         found: dict[str, float | str] = {
@@ -92,10 +93,7 @@ class GearboxSession:
             "stiffness_without_backlash_n_m_rad": float(1.0 / without.values[0]),
         }
         carried = [torque[_carries(torque, zero_n_m)] for torque, _ in twists]
-        series = {
-            m.recording.name: (torque, left * 1e3)
-            for m, torque, left in zip(measurements, carried, used.residuals, strict=True)
-        }
+        series = residuals(measurements, carried, used)
         result = Result("gear_twist_rad", TORQUE, fit, float(every.min()), float(every.max()))
         return Conclusion((result,), found, Residuals("torque, N m", "residual, mrad", series))
 
@@ -110,13 +108,8 @@ def _as_fit(found: Regression, points: int) -> Fit:
     values["offset_rad"] = found.values[-1]
     jacobian = np.diag([*slopes, 1.0])
     covariance = jacobian @ found.covariance @ jacobian.T
-    return Fit(
-        "gearbox",
-        {name: float(value) for name, value in values.items()},
-        tuple(map(tuple, covariance.tolist())),
-        found.residual_rms,
-        points,
-    )
+    parameters = {name: float(value) for name, value in values.items()}
+    return Fit.of("gearbox", parameters, covariance, found.residual_rms, points)
 
 
 def _carries(torque_n_m: FloatArray, zero_n_m: float) -> NDArray[np.bool_]:

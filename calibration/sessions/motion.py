@@ -1,13 +1,14 @@
 """Trajectories of guided calibrations, and the samples of them that a fit may use."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibration.procedure import Measurement, Step
 from calibration.quality import BadDataError
+from calibration.regression import Regression
 from estimation.filters import zero_phase
 from estimation.recording import FloatArray
 
@@ -79,8 +80,9 @@ def stands(velocity_rad_s: FloatArray, rate_hz: float) -> NDArray[np.bool_]:
     return np.asarray(np.convolve(slow, kernel, mode="same") > 0)
 
 
-def need_channel(values: FloatArray, name: str) -> FloatArray:
-    """Return values as they are, refusing those of a sensor that shows nothing at all."""
+def joined(runs: Sequence[Mapping[str, FloatArray]], name: str) -> FloatArray:
+    """Return a channel of all runs, refusing that of a sensor that shows nothing at all."""
+    values = np.concatenate([run[name] for run in runs])
     if np.ptp(values) == 0.0:
         raise BadDataError(
             "no_change",
@@ -89,3 +91,16 @@ def need_channel(values: FloatArray, name: str) -> FloatArray:
             "Check its plug and its supply.",
         )
     return values
+
+
+def condition(measurements: Sequence[Measurement], name: str) -> FloatArray:
+    """Return the number that each step was measured at, shape (runs,)."""
+    return np.array([float(m.recording.conditions[name]) for m in measurements])
+
+
+def residuals(
+    measurements: Sequence[Measurement], variables: Sequence[FloatArray], fit: Regression
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return each run's variable and residual, the latter in thousandths, for the figure."""
+    rows = zip(measurements, variables, fit.residuals, strict=True)
+    return {m.recording.name: (values, left * 1e3) for m, values, left in rows}

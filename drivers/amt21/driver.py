@@ -177,13 +177,8 @@ def open_amt21(
 ) -> Amt21:
     """Open the encoder on a serial adapter.
 
-    Args:
-        url: The adapter.
-        address: The encoder's address, a multiple of 4.
-        multi_turn: Whether the encoder also counts turns.
-        rate_hz: How often it is asked.
-        baud_rate: 2 Mbit/s for types A to D; types E to H are set to 9600 to 115200.
-        top_speed_rad_s: The fastest the shaft turns, by which damaged readings are found.
+    Options are those of `Amt21`, and the bit rate: 2 Mbit/s for types A to D; types E to H are set
+    to 9600 to 115200.
 
     Raises:
         LinkError: The adapter cannot be opened, or the options are no encoder's.

@@ -7,10 +7,10 @@ from drivers.amt21 import protocol
 from drivers.amt21.driver import Amt21
 from drivers.device import Device
 from drivers.transport.faulty import Faults, FaultyTransport
-from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.simulated import Outbox, SimulatedTransport
 
 
-class Amt21Fake:
+class Amt21Fake(Outbox):
     """An encoder, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
@@ -27,12 +27,12 @@ class Amt21Fake:
         multi_turn: bool = False,
         echo: bool = False,
     ) -> None:
+        super().__init__()
         self._position = protocol.request(address)[0]
         self._turns = protocol.request(address, turns=True)[0]
         self._counts_a_tick = counts_a_tick
         self._multi_turn = multi_turn
         self._echo = echo
-        self._out = b""
         self.count = 0
         """Where the shaft stands, counts over all turns."""
 
@@ -49,11 +49,6 @@ class Amt21Fake:
     def advance(self, ticks: int) -> None:
         """Turn the shaft for `ticks` milliseconds."""
         self.count += ticks * self._counts_a_tick
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        out, self._out = self._out, b""
-        return out
 
 
 def open_fake(faults: Faults) -> Device:

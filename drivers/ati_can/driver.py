@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.ati_can import protocol
-from drivers.ati_can.wrench import wrench_of
-from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT
-from drivers.device import Channel, DeviceIdentity, SampleFlag
+from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT, slopes
+from drivers.device import Channel, DeviceIdentity, SampleFlag, wrench_channels
 from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
 from drivers.polling import PolledDevice
 from drivers.registry import CanUse, Driver, RateOption
@@ -70,11 +69,7 @@ class AtiCan(PolledDevice):
         if self._matrix is not None:
             reach = np.abs(self._matrix) @ (2.0**15 + np.abs(self.bias))
             tops = reach * self._unit_per_count
-        units = [("N", "force")] * 3 + [("N m", "torque")] * 3
-        return tuple(
-            Channel(name, unit, self._rate_hz, -top, top, text)
-            for name, (unit, text), top in zip(protocol.AXES, units, tops.tolist(), strict=True)
-        )
+        return wrench_channels(self._rate_hz, tops.tolist())
 
     @property
     def counters(self) -> dict[str, int]:
@@ -128,7 +123,7 @@ class AtiCan(PolledDevice):
         except LinkTimeoutError:
             self._check_at_s = -np.inf  # it may be silent because it restarts
             raise
-        wrench = wrench_of(gauges, self.bias, self._matrix, self._unit_per_count)
+        wrench = (self._matrix @ (gauges - self.bias)) * self._unit_per_count
         return wrench.tolist(), self._flag(gauges)
 
     def set_bias(self, readings: int = 16) -> None:
@@ -200,8 +195,7 @@ class AtiCan(PolledDevice):
         codes = self._ask(protocol.UNIT_CODES)[0]
         if len(codes) != 2 or codes[0] not in N_PER_UNIT or codes[1] not in N_M_PER_UNIT:
             raise FrameError(f"The sensor's units have the unknown codes {codes.hex(' ')}.")
-        slopes = [N_PER_UNIT[codes[0]] / force, N_M_PER_UNIT[codes[1]] / torque]
-        return np.repeat(slopes, 3)
+        return slopes(codes[0], codes[1], force, torque)
 
     def _flag(self, gauges: NDArray[np.int16]) -> int:
         if protocol.is_saturated(gauges):
@@ -275,11 +269,8 @@ def open_ati_can(
 ) -> AtiCan:
     """Open the sensor on a CAN bus.
 
-    Args:
-        url: The bus, e.g. `can:socketcan:can0`.
-        base: The sensor's base identifier; 0x20 from the factory.
-        calibration: Which of its 16 calibrations to use.
-        rate_hz: How often it is asked; at 250 kbit/s a question takes above 1 ms of the bus.
+    Options are those of `AtiCan`; at 250 kbit/s a question takes above 1 ms of the bus. A URL is
+    e.g. `can:socketcan:can0`.
 
     Raises:
         LinkError: The bus cannot be opened, or the options are no sensor's.

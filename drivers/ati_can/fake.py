@@ -12,8 +12,7 @@ from drivers.ati_can import protocol
 from drivers.ati_can.driver import AtiCan
 from drivers.device import Device
 from drivers.transport.can_bus import CanFrame
-from drivers.transport.faulty import Faults
-from drivers.transport.faulty_can import FaultyCanBus
+from drivers.transport.faulty import Faults, FaultyCanBus
 from drivers.transport.simulated_can import SimulatedCanBus
 
 Load = Callable[[int], NDArray[np.int64]]

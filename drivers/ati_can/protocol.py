@@ -25,7 +25,6 @@ TELLS_UNITS = (3, 7)
 """First firmware that answers for counts per unit and unit codes."""
 GAUGES = 6
 GAUGE_MIN, GAUGE_MAX = -(2**15), 2**15 - 1
-AXES = ("force_x_n", "force_y_n", "force_z_n", "torque_x_n_m", "torque_y_n_m", "torque_z_n_m")
 
 STATUS_BITS = {
     0: "watchdog reset the board",

@@ -1,6 +1,7 @@
 """The driver of a Net F/T: calibration by TCP, then a stream of records by UDP."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -8,23 +9,21 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.ati_net import protocol
-from drivers.ati_net.sequence import RecordSequence
-from drivers.ati_net.stream_watch import StreamWatch
-from drivers.counters import Arrivals, DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
-from drivers.errors import DriverError, FrameError, LinkTimeoutError
+from drivers.ati_net.stream import RecordSequence, StreamWatch
+from drivers.device import AXES, Batch, Channel, DeviceIdentity, SampleFlag, wrench_channels
+from drivers.errors import FrameError, LinkTimeoutError
 from drivers.registry import Driver
+from drivers.streaming import StreamedDevice
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 from drivers.transport.udp import split_address
 
 ANSWER_TIMEOUT_S = 1.0
-LONGEST_SILENCE_S = 0.1
 MOST_DATAGRAMS = 10_000
 """Datagrams taken in one read: a second and a half of the fastest stream."""
 
 
-class AtiNet:
+class AtiNet(StreamedDevice):
     """One force/torque sensor with a Net Box, or an Ethernet Axia.
 
     Args:
@@ -41,47 +40,29 @@ class AtiNet:
         open_calibration: Callable[[], Transport],
         rate_hz: float = 1000.0,
     ) -> None:
-        self._transport = transport
+        super().__init__(transport, rate_hz, "force/torque sensor")
         self._open_calibration = open_calibration
-        self._rate_hz = rate_hz
         self._calibration: protocol.Calibration | None = None
-        self._counters = DeviceCounters()
+        self._slopes = np.full(6, np.inf)
         self._sequence = RecordSequence(self._counters)
-        self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
+        self._numbers = np.empty(0, np.int64)
         self._watch = StreamWatch(transport.url, rate_hz, self._counters)
         self._streams = False
-        self._closed = False
         self.status = 0
         """Status word of the newest record; `protocol.status_words` puts it in words."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Three forces and three torques; their range is known once the calibration is."""
-        tops = np.full(6, np.inf)
-        if self._calibration is not None:
-            tops = self._calibration.slopes() * 2.0**31
-        return tuple(
-            Channel(name, unit, self._rate_hz, -top, top, text)
-            for name, (unit, text), top in zip(
-                protocol.AXES,
-                [("N", "force")] * 3 + [("N m", "torque")] * 3,
-                tops.tolist(),
-                strict=True,
-            )
-        )
+        return wrench_channels(self._rate_hz, (self._slopes * 2.0**31).tolist())
 
     @property
     def counts_per_unit(self) -> dict[str, float]:
         """Counts per newton and newton metre, from the device; empty before they are read."""
         if self._calibration is None:
             return {}
-        slopes = self._calibration.slopes()
-        return {"counts_per_n": 1.0 / float(slopes[0]), "counts_per_n_m": 1.0 / float(slopes[3])}
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Counters of the network."""
-        return self._counters.as_dict()
+        force, torque = float(self._slopes[0]), float(self._slopes[3])
+        return {"counts_per_n": 1.0 / force, "counts_per_n_m": 1.0 / torque}
 
     def identify(self) -> DeviceIdentity:
         """Read the calibration: units and counts per unit. Serial and firmware are not available.
@@ -107,18 +88,17 @@ class AtiNet:
                 "Check its power, the cable, and that this computer is in its network.",
             )
         self._calibration = protocol.decode_calibration(answer)
+        self._slopes = self._calibration.slopes()
+        self._identified = True
         return DeviceIdentity("ATI Net F/T", "", "")
 
-    def start(self) -> None:
+    def begin(self) -> None:
         """Ask for the stream; the first record that comes has the number 0."""
-        if self._calibration is None:
-            self.identify()
-        self._transport.write(protocol.encode_command(protocol.STOP))
+        self.stop()
         while self._transport.read(0.0):
             pass  # of an earlier stream
         self._sequence.restart()
         self._transport.write(protocol.encode_command(protocol.STREAM))
-        self._arrivals.restart(self._transport.now_s)
         self._watch.restart(self._transport.now_s)
         self._streams = True
 
@@ -131,26 +111,22 @@ class AtiNet:
             LinkTimeoutError: It stays silent.
             DriverError: The sensor is frozen; or neither `identify` nor `start` has been called.
         """
-        if self._calibration is None:
-            raise DriverError("The sensor's calibration is not known.", fix="Call start first.")
-        records = self._receive(timeout_s)
+        batch = super().read(timeout_s)
+        return replace(batch, sequence=self._numbers, lost=self._sequence.lost)
+
+    def receive(
+        self, timeout_s: float
+    ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
+        """Return the values and flags of the records that are new and in order."""
+        records = self._records(timeout_s)
         if self._streams:
             self._follow(records["ft_sequence"].astype(np.uint32))
-        kept, numbers = self._sequence.follow(records["rdt_sequence"])
+        kept, self._numbers = self._sequence.follow(records["rdt_sequence"])
         records = records[kept]
-        now_s = self._transport.now_s
-        self._arrivals.number(len(records), now_s)
         self._counters.frames += len(records)
-        status = records["status"].astype(np.uint32)
-        values = records["counts"] * self._calibration.slopes()
-        return Batch(
-            {name: values[:, axis] for axis, name in enumerate(protocol.AXES)},
-            np.full(len(records), now_s),
-            "host",
-            numbers,
-            self._flags(status),
-            self._sequence.lost,
-        )
+        values = records["counts"] * self._slopes
+        flags = self._flags(records["status"].astype(np.uint32))
+        return dict(zip(AXES, values.T, strict=True)), flags
 
     def set_bias(self) -> None:
         """Take the present load for zero, in the device; it does not answer.
@@ -170,13 +146,6 @@ class AtiNet:
         self._streams = False
         self._transport.write(protocol.encode_command(protocol.STOP))
 
-    def close(self) -> None:
-        """End the stream where the device can still be reached, and let go of the link."""
-        if self._closed:
-            return
-        self._closed = True
-        stop_and_let_go(self.stop, self._transport.close)
-
     def _ask_again(self) -> None:
         """Request the stream again where it is to run; its records are numbered from 1 again."""
         if self._streams:
@@ -189,7 +158,7 @@ class AtiNet:
             self._ask_again()
         self._watch.follow(internal, now_s)
 
-    def _receive(self, timeout_s: float) -> NDArray[np.void]:
+    def _records(self, timeout_s: float) -> NDArray[np.void]:
         """Return the records of the datagrams that are there, waiting for the first."""
         good = []
         datagram = self._transport.read(timeout_s)

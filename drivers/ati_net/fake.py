@@ -12,7 +12,7 @@ from drivers.ati_net.protocol import Calibration
 from drivers.device import Device
 from drivers.errors import FrameError
 from drivers.transport.faulty import Faults, FaultyTransport
-from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.simulated import Outbox, SimulatedTransport
 from drivers.transport.transport import Transport
 
 NEWTON_AND_NEWTON_METRE = Calibration(2, 3, 1_000_000, 1_000_000)
@@ -91,7 +91,7 @@ class RdtFake:
         return record.tobytes()
 
 
-class CalibrationFake:
+class CalibrationFake(Outbox):
     """The TCP side, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
@@ -99,9 +99,9 @@ class CalibrationFake:
     """
 
     def __init__(self, calibration: Calibration = NEWTON_AND_NEWTON_METRE) -> None:
+        super().__init__()
         self._calibration = calibration
         self._in = b""
-        self._out = b""
 
     def receive(self, data: bytes) -> None:
         """Answer a whole request."""
@@ -109,14 +109,6 @@ class CalibrationFake:
         if self._in == protocol.READ_CALIBRATION:
             self._in = b""
             self._out += protocol.encode_calibration(self._calibration)
-
-    def advance(self, ticks: int) -> None:
-        """Let `ticks` milliseconds pass."""
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        out, self._out = self._out, b""
-        return out
 
 
 def fake_calibration() -> Transport:

@@ -17,7 +17,6 @@ CALIBRATION_PORT = 49151
 HEADER = 0x1234
 STOP, STREAM, RESET_LATCH, SET_BIAS = 0x0000, 0x0002, 0x0041, 0x0042
 """Commands; setting the bias is not answered."""
-AXES = ("force_x_n", "force_y_n", "force_z_n", "torque_x_n_m", "torque_y_n_m", "torque_z_n_m")
 RECORD_DTYPE = np.dtype(
     [("rdt_sequence", ">u4"), ("ft_sequence", ">u4"), ("status", ">u4"), ("counts", ">i4", (6,))]
 )
@@ -86,9 +85,24 @@ class Calibration:
 
     def slopes(self) -> NDArray[np.float64]:
         """Return N a count three times, then N m a count three times, shape (6,)."""
-        force = N_PER_UNIT[self.force_unit] / self.counts_per_force
-        torque = N_M_PER_UNIT[self.torque_unit] / self.counts_per_torque
-        return np.repeat([force, torque], 3)
+        return slopes(
+            self.force_unit, self.torque_unit, self.counts_per_force, self.counts_per_torque
+        )
+
+
+def slopes(
+    force_unit: int, torque_unit: int, counts_per_force: int, counts_per_torque: int
+) -> NDArray[np.float64]:
+    """Return N a count three times, then N m a count three times, shape (6,).
+
+    Args:
+        force_unit: Code of the force unit, a key of `N_PER_UNIT`.
+        torque_unit: Code of the torque unit, a key of `N_M_PER_UNIT`.
+        counts_per_force: Counts a unit of force.
+        counts_per_torque: Counts a unit of torque.
+    """
+    force = N_PER_UNIT[force_unit] / counts_per_force
+    return np.repeat([force, N_M_PER_UNIT[torque_unit] / counts_per_torque], 3)
 
 
 def encode_command(command: int, samples: int = 0) -> bytes:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT
+from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT, slopes
 from drivers.ati_serial import protocol
 from drivers.device import DeviceIdentity, SampleFlag
 from drivers.errors import DriverError
-from drivers.modbus import QUIET_S, Stream, StreamedSensor
+from drivers.modbus import Stream, StreamedSensor
 from drivers.registry import BaudOption, Driver, RateOption
+from drivers.streaming import QUIET_S
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
@@ -93,7 +94,7 @@ class AtiSerial(StreamedSensor):
             LinkTimeoutError: Nobody answers.
             DriverError: The calibration is empty, or in unknown units.
         """
-        self._line.quieten()
+        self.quieten()
         first = protocol.FIRST_CALIBRATION + (self._number - 1) * protocol.CALIBRATION_STEP
         registers = b"".join(
             self._line.read(first + offset, count) for offset, count in protocol.PIECES
@@ -111,14 +112,10 @@ class AtiSerial(StreamedSensor):
                 f"Their codes are {found.force_unit} and {found.torque_unit}.",
                 "Choose another calibration, or set `force_unit` and `torque_unit`.",
             )
-        slopes = np.repeat(
-            [
-                N_PER_UNIT[found.force_unit] / found.counts_per_force,
-                N_M_PER_UNIT[found.torque_unit] / found.counts_per_torque,
-            ],
-            3,
+        per_count = slopes(
+            found.force_unit, found.torque_unit, found.counts_per_force, found.counts_per_torque
         )
-        self._matrix = found.matrix * slopes[:, np.newaxis]
+        self._matrix = found.matrix * per_count[:, np.newaxis]
         self._calibration = found
         self._identified = True
         return DeviceIdentity(f"ATI digital F/T {found.part_number}".strip(), found.serial, "")
@@ -172,15 +169,8 @@ def open_ati_serial(
 ) -> AtiSerial:
     """Open the sensor on an RS-485 adapter, 8 bits, even parity.
 
-    Args:
-        url: The adapter.
-        calibration: Which of its calibrations to use, from 1.
-        rate_hz: Frames a second it sends.
-        baud_rate: 1250000 as delivered; 115200 and 19200 can be set.
-        matrix_by_rows: See `Assumptions`; the next three too. Check them with a known weight.
-        force_unit: Code of the force unit where the sensor's own is not to be believed.
-        torque_unit: Code of the torque unit, likewise.
-        lock_answers: Whether it answers the function that locks its storage.
+    Options are those of `AtiSerial` and its `Assumptions`, which a known weight checks, and the bit
+    rate: 1250000 as delivered; 115200 and 19200 can be set.
 
     Raises:
         LinkError: The adapter cannot be opened or has no such speed.

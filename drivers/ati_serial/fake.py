@@ -16,7 +16,7 @@ from drivers.ati_serial.protocol import Calibration
 from drivers.device import Device
 from drivers.errors import MissingExtraError
 from drivers.transport.faulty import Faults, FaultyTransport
-from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.simulated import Outbox, SimulatedTransport
 
 if TYPE_CHECKING:
     from drivers.ati_serial.fake_modbus import ModbusServer
@@ -31,7 +31,7 @@ def example_calibration() -> Calibration:
     return Calibration("FT99999", "SI-145-5", matrix, 2, 3, 1_000_000, 1_000_000, gains, offsets)
 
 
-class AtiSerialFake:
+class AtiSerialFake(Outbox):
     """A sensor, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
@@ -39,11 +39,11 @@ class AtiSerialFake:
     """
 
     def __init__(self, calibration: Calibration | None = None) -> None:
+        super().__init__()
         block = protocol.encode_calibration(calibration or example_calibration())
         self.server = _server(block)
         self.status_bad = False
         self._sent = 0
-        self._out = bytearray()
 
     def receive(self, data: bytes) -> None:
         """Take one message; one that does not pass its check is not answered."""
@@ -59,12 +59,6 @@ class AtiSerialFake:
             gauges = self.gauges(np.arange(self._sent, self._sent + count))
             self._out += protocol.encode_frames(gauges, self.status_bad)
         self._sent += count
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        data = bytes(self._out)
-        self._out.clear()
-        return data
 
     def gauges(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the gauges in the frames with the given numbers, shape (n, 6)."""

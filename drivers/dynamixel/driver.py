@@ -220,13 +220,7 @@ def open_dynamixel(
 ) -> Dynamixel:
     """Open the drive on a serial adapter.
 
-    Args:
-        url: The adapter.
-        device_id: The drive's identifier, 0 to 252.
-        rate_hz: How often it is asked.
-        baud_rate: 57600 from the factory.
-        watchdog_ms: Silence after which an armed drive stops by itself.
-        current_unit_a: Amperes a unit of current; 0 for what the model's e-Manual says.
+    Options are those of `Dynamixel`, and the bit rate: 57600 from the factory.
 
     Raises:
         LinkError: The adapter cannot be opened, or the options are no drive's.

@@ -9,7 +9,7 @@ from drivers.dynamixel.driver import Dynamixel
 from drivers.dynamixel.protocol import Present, Register
 from drivers.errors import FrameError
 from drivers.transport.faulty import Faults, FaultyTransport
-from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.simulated import Outbox, SimulatedTransport
 
 XL330_M288 = 1200
 ROM_END = 64
@@ -20,7 +20,7 @@ _ACCELERATION, _FRICTION = 40.0, 4.0
 """Speed units gained in a second by a unit of current, and lost by a unit of speed."""
 
 
-class DynamixelFake:
+class DynamixelFake(Outbox):
     """A drive, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
@@ -30,10 +30,10 @@ class DynamixelFake:
     """
 
     def __init__(self, device_id: int = 1, model: int = XL330_M288, echo: bool = False) -> None:
+        super().__init__()
         self._id = device_id
         self._model = model
         self._echo = echo
-        self._out = b""
         self._held = b""
         self._silent_ms = 0
         self._speed = self._position = 0.0
@@ -70,11 +70,6 @@ class DynamixelFake:
         values = Present(self.current, round(self._speed), round(self._position), 50, 31)
         at = protocol.PRESENT.address
         self.table[at : at + protocol.PRESENT.size] = protocol.encode_present(values)
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        out, self._out = self._out, b""
-        return out
 
     @property
     def in_force(self) -> bool:

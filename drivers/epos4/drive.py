@@ -8,16 +8,12 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from drivers.device import Axis, Channel, DeviceIdentity
+from drivers.device import Axis, Channel, DeviceIdentity, SampleFlag
 from drivers.epos4 import protocol
-from drivers.epos4.cycle import Cycle
 from drivers.epos4.faults import DriveFaultError, fault
-from drivers.epos4.identity import identify
-from drivers.epos4.node import HOST_NODE, Node
-from drivers.epos4.power_stage import PowerStage
-from drivers.epos4.protocol import Feedback, Ratings, State
-from drivers.epos4.samples import channels_of, flags_of, values_of
-from drivers.epos4.setup import set_up
+from drivers.epos4.node import HOST_NODE, Cycle, Node
+from drivers.epos4.objects import PowerStage, identify, set_up
+from drivers.epos4.protocol import FAULTY, Feedback, Ratings, State
 from drivers.errors import DisarmUnconfirmedError, DriverError, LinkTimeoutError, MissingExtraError
 from drivers.polling import PolledDrive
 from drivers.transport.can_bus import CanBus
@@ -77,7 +73,15 @@ class Epos4(PolledDrive):
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Position, torque and current of the motor, and the torque commanded."""
-        return channels_of(self._ratings, self._rate_hz)
+        rate, torque, current = self._rate_hz, math.inf, math.inf
+        if self._ratings is not None:
+            torque, current = self._ratings.torque_n_m(2**15), self._ratings.current_a(2**15)
+        return (
+            Channel("position_count", "count", rate, -(2.0**31), 2.0**31 - 1, "motor encoder"),
+            Channel("motor_torque_n_m", "N m", rate, -torque, torque, "averaged motor torque"),
+            Channel("motor_current_a", "A", rate, -current, current, "by the torque constant"),
+            Channel("command_torque_n_m", "N m", rate, -torque, torque, "torque commanded"),
+        )
 
     @property
     def counters(self) -> dict[str, int]:
@@ -196,7 +200,15 @@ class Epos4(PolledDrive):
         if self._feedback is None:
             self._counters.timeouts += 1
             raise LinkTimeoutError("The drive does not answer a SYNC.")
-        return values_of(self.ratings, self._feedback, self._target), flags_of(self._feedback)
+        position, torque = self._feedback.position_count, self._feedback.torque_per_mille
+        values = (
+            float(position),
+            self.ratings.torque_n_m(torque),
+            self.ratings.current_a(torque),
+            self.ratings.torque_n_m(self._target),
+        )
+        is_faulty = protocol.state_of(self._feedback.statusword) in FAULTY
+        return values, SampleFlag.SUSPECT if is_faulty else 0
 
     def judge(self) -> None:
         """Look at the drive behind a SYNC.
@@ -289,7 +301,7 @@ class Epos4(PolledDrive):
         if state is State.OPERATION_ENABLED:
             return
         self._armed = False
-        if state in (State.FAULT, State.FAULT_REACTION):
+        if state in FAULTY:
             self._node.reported()
             raise fault(self.last_error or self._power.error_code())
         raise DriveFaultError(

@@ -20,11 +20,8 @@ def open_epos4(
 ) -> Epos4:
     """Open the drive on a CAN bus.
 
-    Args:
-        url: The bus, e.g. `can:socketcan:can0`.
-        node_id: The drive's node number, 1 to 126.
-        rate_hz: How often SYNC is sent; at 1 Mbit/s one node at 1 kHz takes a quarter of the bus.
-        host_timeout_ms: Silence of the host after which the drive stops by itself; 0 for never.
+    Options are those of `Epos4`; at 1 Mbit/s one node at 1 kHz takes a quarter of the bus. A URL is
+    e.g. `can:socketcan:can0`.
 
     Raises:
         LinkError: The bus cannot be opened, an option is unknown, or `canopen` is missing.

@@ -24,8 +24,7 @@ from drivers.epos4.drive import Epos4
 from drivers.epos4.fake_network import FrameNetwork
 from drivers.epos4.protocol import State
 from drivers.transport.can_bus import CanFrame
-from drivers.transport.faulty import Faults
-from drivers.transport.faulty_can import FaultyCanBus
+from drivers.transport.faulty import Faults, FaultyCanBus
 from drivers.transport.simulated_can import SimulatedCanBus
 
 Motor = Callable[[float, int], int]

@@ -58,6 +58,7 @@ class State(Enum):
 
 POWERLESS = (State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT)
 """States in which the power stage is off."""
+FAULTY = (State.FAULT, State.FAULT_REACTION)
 
 _STATES = (
     (0x4F, 0x00, State.NOT_READY),

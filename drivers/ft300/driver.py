@@ -48,7 +48,7 @@ class Ft300(StreamedSensor):
             LinkTimeoutError: Nobody answers.
             DriverError: It is another device.
         """
-        self._line.quieten()
+        self.quieten()
         firmware, serial = (
             self._line.read(*place) for place in (protocol.FIRMWARE, protocol.SERIAL)
         )

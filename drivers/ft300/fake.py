@@ -14,14 +14,14 @@ from drivers.ft300 import protocol
 from drivers.ft300.driver import Ft300
 from drivers.modbus import READ, WRITE, decode, encode
 from drivers.transport.faulty import Faults, FaultyTransport
-from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.simulated import Outbox, SimulatedTransport
 
 MESSAGE_TICKS = 10
 """Milliseconds between messages."""
 ILLEGAL_FUNCTION, FAILED = b"\x01", 0x80
 
 
-class Ft300Fake:
+class Ft300Fake(Outbox):
     """A sensor, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
@@ -29,6 +29,7 @@ class Ft300Fake:
     """
 
     def __init__(self, firmware: bytes = b"FTS\x02\x00\x09") -> None:
+        super().__init__()
         self._registers = {
             protocol.FIRMWARE: firmware,
             protocol.SERIAL: b"FTS\x00" + struct.pack(">HH", 1234, 0),
@@ -36,7 +37,6 @@ class Ft300Fake:
         self.counts = np.array([2000, -1500, 9000, 300, -200, 100])
         self.streaming = False
         self._ticks = 0
-        self._out = bytearray()
 
     def receive(self, data: bytes) -> None:
         """Take one message; one that does not pass its check is not answered."""
@@ -65,11 +65,6 @@ class Ft300Fake:
         if self.streaming:
             turn = np.sin(2 * np.pi * numbers / 100)[:, np.newaxis]
             self._out += protocol.encode_messages(np.round(turn * self.counts).astype(np.int64))
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        out, self._out = bytes(self._out), bytearray()
-        return out
 
 
 def open_fake(faults: Faults) -> Device:

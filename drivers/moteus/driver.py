@@ -213,12 +213,7 @@ def open_moteus(
 ) -> Moteus:
     """Open the controller behind an fdcanusb.
 
-    Args:
-        url: The fdcanusb's port.
-        device_id: The controller's identifier, 1 to 126.
-        rate_hz: How often it is asked.
-        torque_limit_n_m: The most it may be commanded, at the output.
-        watchdog_s: How long a command is valid.
+    The URL is the fdcanusb's port; options are those of `Moteus`.
 
     Raises:
         LinkError: The port cannot be opened, or the options are no controller's.

@@ -11,7 +11,7 @@ from drivers.moteus import protocol
 from drivers.moteus.driver import Moteus
 from drivers.moteus.protocol import State
 from drivers.transport.faulty import Faults, FaultyTransport
-from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.simulated import Outbox, SimulatedTransport
 
 PREPARES_MS = 20
 """Time between stopped and position mode, in which it measures its current sensors."""
@@ -20,7 +20,7 @@ _TORQUE_CONSTANT_N_M_A = 0.03
 _MEASURED = 4
 
 
-class MoteusFake:
+class MoteusFake(Outbox):
     """A controller and its fdcanusb, with `drivers.transport.simulated.Board`'s interface.
 
     Args:
@@ -28,9 +28,9 @@ class MoteusFake:
     """
 
     def __init__(self, device_id: int = 1) -> None:
+        super().__init__()
         self._id = device_id
         self._held = b""
-        self._out = b""
         self._speed_rad_s = self._angle_rad = 0.0
         self._valid_ms = math.inf
         self._prepares_ms = 0
@@ -67,11 +67,6 @@ class MoteusFake:
             torque_n_m = self.torque_n_m - _FRICTION_N_M_S * self._speed_rad_s
             self._speed_rad_s += 1e-3 * torque_n_m / _INERTIA_KG_M2
             self._angle_rad += 1e-3 * self._speed_rad_s
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        out, self._out = self._out, b""
-        return out
 
     @property
     def torque_n_m(self) -> float:

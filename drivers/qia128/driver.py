@@ -1,29 +1,27 @@
 """The driver of a QIA128: its calibration is read from it, then it streams."""
 
+from collections.abc import Mapping
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.counters import Arrivals, DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
+from drivers.device import Channel, DeviceIdentity, SampleFlag
 from drivers.errors import DriverError, LinkTimeoutError
 from drivers.qia128 import protocol
 from drivers.registry import BaudOption, Driver, RateOption
 from drivers.sliding import SlidingFrames
+from drivers.streaming import StreamedDevice
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
 TRIES = 3
 RATE_HZ = 1300.0
 REPLY_TIMEOUT_S = 0.2
-QUIET_S = 0.05
-"""A stopped stream has ended when nothing arrives for this long, s."""
-LONGEST_SILENCE_S = 0.1
 
 
-class Qia128:
+class Qia128(StreamedDevice):
     """One amplifier on a UART.
 
     Args:
@@ -45,17 +43,12 @@ class Qia128:
         rate_hz: float = RATE_HZ,
         serial: str = "",
     ) -> None:
-        self._transport = transport
+        super().__init__(transport, rate_hz, "QIA128")
         self._rated_load = rated_load
         self._unit = unit
-        self._rate_hz = rate_hz
         self._serial = serial
-        self._counters = DeviceCounters()
-        self._arrivals = Arrivals(self._counters, max(LONGEST_SILENCE_S, 5 / rate_hz))
         self._frames = SlidingFrames(protocol.FRAME_SIZE, protocol.frame_checks, self._counters)
         self._points: tuple[int, int] | None = None
-        self._errors_at_start = 0
-        self._closed = False
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -65,11 +58,6 @@ class Qia128:
             low, high = np.sort(self._load(np.array([0.0, protocol.TOP]))).tolist()
         return (Channel("load", self._unit, self._rate_hz, low, high, "load on the sensor"),)
 
-    @property
-    def counters(self) -> dict[str, int]:
-        """Counters of the line."""
-        return self._counters.as_dict()
-
     def identify(self) -> DeviceIdentity:
         """End the stream, ask for the serial number and the calibration.
 
@@ -77,7 +65,7 @@ class Qia128:
             LinkTimeoutError: Nobody answers.
             DriverError: The calibration's two points are the same.
         """
-        self._quieten()
+        self.quieten()
         asked = "" if self._serial else self._number(protocol.get_serial(), protocol.GET_SERIAL)
         serial = self._serial or str(asked)
         zero, full = (
@@ -91,64 +79,34 @@ class Qia128:
                 "Calibrate it with FUTEK's software, or give it its certificate's values.",
             )
         self._points = zero, full
+        self._identified = True
         return DeviceIdentity("QIA128", serial, "")
 
-    def start(self) -> None:
+    def begin(self) -> None:
         """Switch the stream on."""
-        if self._points is None:
-            self.identify()
         if self._rate_hz == RATE_HZ:
             self._transport.write(protocol.set_rate())
-        self._quieten()
+        self.quieten()
         self._frames.restart()
-        self._errors_at_start = self._counters.crc_errors
         self._transport.write(protocol.set_stream(True))
-        self._arrivals.restart(self._transport.now_s)
 
-    def read(self, timeout_s: float) -> Batch:
-        """Return the readings that have come, stamped with the time of this read."""
-        if self._points is None:
-            self.identify()
+    def receive(
+        self, timeout_s: float
+    ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
+        """Return the loads that have come; a reading at an end of the range is saturated."""
         raw = protocol.readings(self._frames.read(self._transport, timeout_s))
-        now_s = self._transport.now_s
         flags = np.zeros(raw.size, np.uint8)
         flags[(raw == 0) | (raw == protocol.TOP)] = np.uint8(SampleFlag.SATURATED)
-        return Batch(
-            {"load": self._load(raw.astype(np.float64))},
-            np.full(raw.size, now_s),
-            "host",
-            self._arrivals.number(raw.size, now_s),
-            flags,
-            self._counters.crc_errors - self._errors_at_start,
-        )
+        return {"load": self._load(raw.astype(np.float64))}, flags
 
     def stop(self) -> None:
         """Switch the stream off."""
         self._transport.write(protocol.set_stream(False))
 
-    def close(self) -> None:
-        """Switch the stream off where that can still be done, and let go of the line."""
-        if self._closed:
-            return
-        self._closed = True
-        stop_and_let_go(self.stop, self._transport.close)
-
     def _load(self, raw: NDArray[np.float64]) -> NDArray[np.float64]:
         assert self._points is not None  # noqa: S101
         zero, full = self._points
         return (raw - zero) * (self._rated_load / (full - zero))
-
-    def _quieten(self) -> None:
-        """Switch the stream off and wait until nothing more comes."""
-        self.stop()
-        give_up_s = self._transport.now_s + 1.0
-        while self._transport.read(QUIET_S):
-            if self._transport.now_s > give_up_s:
-                raise LinkTimeoutError(
-                    f"The QIA128 at {self._transport.url} does not end its stream.",
-                    "It continued for 1 s after the stop command.",
-                    "Check the line to its receiver, and the bit rate.",
-                )
 
     def _number(self, question: bytes, command: tuple[int, int]) -> int:
         """Return the 32-bit number a question is answered with."""
@@ -182,13 +140,7 @@ def open_qia128(
 ) -> Qia128:
     """Open the amplifier on a serial adapter.
 
-    Args:
-        url: The adapter.
-        rated_load: Load at full scale, from the certificate.
-        unit: Unit of `rated_load`.
-        rate_hz: Rate it is set to, samples a second.
-        baud_rate: Bit rate of its UART; no public source gives it.
-        serial: Serial number from its label, for one that does not report it as assumed.
+    Options are those of `Qia128`, and the bit rate of its UART; no public source gives it.
 
     Raises:
         LinkError: The adapter cannot be opened.

@@ -10,10 +10,10 @@ from drivers.errors import FrameError
 from drivers.qia128 import protocol
 from drivers.qia128.driver import Qia128
 from drivers.transport.faulty import Faults, FaultyTransport
-from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.simulated import Outbox, SimulatedTransport
 
 
-class Qia128Fake:
+class Qia128Fake(Outbox):
     """An amplifier, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
@@ -30,6 +30,7 @@ class Qia128Fake:
         full_scale: int = protocol.MIDDLE + 3_355_443,
         rate_hz: int = 1300,
     ) -> None:
+        super().__init__()
         self._numbers = {
             (*protocol.GET_SERIAL, b""): serial,
             (*protocol.GET_CALIBRATION, bytes([0, protocol.ZERO_POINT])): zero,
@@ -41,7 +42,6 @@ class Qia128Fake:
         self._ticks = 0
         self._sent = 0
         self._in = b""
-        self._out = bytearray()
         self.streaming = False
 
     def receive(self, data: bytes) -> None:
@@ -64,12 +64,6 @@ class Qia128Fake:
         if self.streaming:
             self._out += protocol.encode_frames(self.raw(np.arange(self._sent, made)))
         self._sent = made
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        data = bytes(self._out)
-        self._out.clear()
-        return data
 
     def raw(self, numbers: np.ndarray) -> np.ndarray:
         """Return the readings with the given numbers since power-up, shape (n,)."""

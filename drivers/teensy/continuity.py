@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.link import LinkCounters
+from drivers.counters import LinkCounters
 
 _WRAP = 2**32
 

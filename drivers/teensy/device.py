@@ -1,14 +1,15 @@
 """The logger as a device among others: it only measures; `TeensyLogger` also moves things."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.counters import Arrivals, DeviceCounters
+from drivers.counters import DeviceCounters
 from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
 from drivers.registry import Driver
-from drivers.teensy.channels import TeensyChannel, raw_channels
+from drivers.streaming import LONGEST_SILENCE_S, Arrivals
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, STATUS_SATURATED, STATUS_WATCHDOG_TRIPPED
@@ -16,8 +17,38 @@ from drivers.teensy.reference import REFERENCE
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 
-LONGEST_SILENCE_S = 0.1
-"""A hundred samples."""
+ADC_BITS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class TeensyChannel:
+    """The counts of one field of a sample.
+
+    Attributes:
+        field: Field of a sample, see `drivers.teensy.reference.SAMPLE_DTYPE`.
+        channel: Name, rate and range.
+    """
+
+    field: str
+    channel: Channel
+
+
+def raw_channel(
+    name: str, field: str, profile: Profile = REFERENCE, description: str = ""
+) -> TeensyChannel:
+    """Return a field of a board's samples as a channel."""
+    low, high = 0, 2**ADC_BITS - 1
+    if not field.startswith(("fsr", "force_")):
+        bounds = np.iinfo(profile.sample[field])
+        low, high = int(bounds.min), int(bounds.max)
+    about = description or f"field {field}"
+    return TeensyChannel(field, Channel(name, "count", profile.rate_hz, low, high, about))
+
+
+def raw_channels(profile: Profile = REFERENCE) -> tuple[TeensyChannel, ...]:
+    """Return every input of a board."""
+    inputs = [*profile.input_names, *(["fsr"] if profile is REFERENCE else [])]
+    return tuple(raw_channel(f"{field}_count", field, profile) for field in inputs)
 
 
 class TeensyDevice:
@@ -74,7 +105,10 @@ class TeensyDevice:
         batch = self.logger.read(timeout_s)
         self._arrivals.number(len(batch.samples), self._transport.now_s)
         return Batch(
-            {wired.channel.name: wired.values(batch.samples) for wired in self._wired},
+            {
+                wired.channel.name: batch.samples[wired.field].astype(np.float64)
+                for wired in self._wired
+            },
             np.multiply(batch.tick_us, 1e-6),
             "device",
             batch.samples["sequence"].astype(np.int64),

@@ -8,20 +8,20 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.counters import LinkCounters
 from drivers.errors import (
     CommandRefusedError,
     DisarmUnconfirmedError,
     DriverError,
     FrameError,
 )
-from drivers.link import FramedLink, LinkCounters
+from drivers.link import FramedLink
 from drivers.teensy import protocol
 from drivers.teensy.continuity import Continuity
 from drivers.teensy.profile import ArmLimits, Profile
 from drivers.teensy.protocol import Ack, Identity, Kind, Result, TripReport
 from drivers.teensy.reference import REFERENCE
 from drivers.teensy.refusals import other_layout, other_protocol, refused
-from drivers.teensy.setpoints import whole_setpoints
 from drivers.transport.transport import Transport
 
 
@@ -102,7 +102,7 @@ class TeensyLogger:
             ProtocolMismatchError: Its protocol differs; the message names both.
         """
         self._link.break_frame()
-        hello = protocol.encode_command(Kind.HELLO, self._number())
+        hello = protocol.encode(Kind.HELLO, self._number())
         try:
             identity = protocol.decode_identity(self._request(Kind.HELLO_REPLY, hello))
         except FrameError as error:
@@ -154,7 +154,7 @@ class TeensyLogger:
             CommandRefusedError: It is armed, or has tripped over something else.
         """
         self._require_identity()
-        self._command(Kind.CLEAR, protocol.encode_clear(self._number(), code))
+        self._command(Kind.CLEAR, protocol.encode(Kind.CLEAR, self._number(), code))
 
     def reference(self, counts: Sequence[int], at_index: bool = False) -> None:
         """Give the encoders their counts; the board must be at rest.
@@ -168,7 +168,7 @@ class TeensyLogger:
             CommandRefusedError: The board is armed, a shaft is turning, or no index came.
         """
         self._require_identity()
-        payload = protocol.encode_reference(self._number(), counts, at_index)
+        payload = protocol.encode(Kind.REFERENCE, self._number(), *counts, at_index)
         self._command(Kind.REFERENCE, payload)
 
     def start(self) -> None:
@@ -200,7 +200,7 @@ class TeensyLogger:
             DriverError: The arrays do not fit each other or the board's number range.
         """
         self._require_identity()
-        whole = whole_setpoints(columns, self._profile)
+        whole = self._profile.whole_setpoints(columns)
         for first in range(0, whole[0].size, self._profile.max_setpoints):
             block = [values[first : first + self._profile.max_setpoints] for values in whole]
             payload = self._profile.encode_setpoints(self._number(), block, self._session)
@@ -232,7 +232,7 @@ class TeensyLogger:
         number = self._number()
         self._pings = dict(list(self._pings.items())[-7:])  # a lost pong is not waited for
         self._pings[number] = self._link.transport.now_s
-        self._link.send(protocol.encode_ping(number, number, self._session))
+        self._link.send(protocol.encode(Kind.PING, number, self._session, number))
 
     def disarm(self) -> None:
         """Take the motors out of force: command 0, load 0, the queue cleared.
@@ -252,7 +252,7 @@ class TeensyLogger:
 
     def trip(self) -> TripReport:
         """Read the first limit crossed since the board was cleared."""
-        question = protocol.encode_command(Kind.TRIP, self._number())
+        question = protocol.encode(Kind.TRIP, self._number())
         return self._profile.decode_trip_report(self._request(Kind.TRIP_REPORT, question))
 
     def close(self) -> None:
@@ -284,7 +284,7 @@ class TeensyLogger:
         return self._command_number
 
     def _simple(self, kind: Kind) -> Ack:
-        return self._command(kind, protocol.encode_command(kind, self._number()))
+        return self._command(kind, protocol.encode(kind, self._number()))
 
     def _command(self, kind: Kind, payload: bytes) -> Ack:
         """Send a command and return its acknowledgement.

@@ -11,7 +11,7 @@ refuses REFERENCE.
 Not modelled: the time bytes take on the wire, jitter of the 1 kHz timer, and a crystal that is off.
 """
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ from drivers.teensy.protocol import (
     Trip,
 )
 from drivers.teensy.reference_board import REFERENCE_LOGIC
+from drivers.transport.simulated import Outbox
 
 TRANSMIT_CAPACITY = 65536
 """Bytes the board holds for a host that does not read."""
@@ -45,7 +46,7 @@ _ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 _SILENT = STATUS_WATCHDOG_TRIPPED | Trip.HOST_SILENT << TRIP_SHIFT
 
 
-class PythonBoard:
+class PythonBoard(Outbox):
     """A board for simulation on a bench, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
@@ -62,6 +63,7 @@ class PythonBoard:
         protocol_hash: int | None = None,
         logic: BoardLogic = REFERENCE_LOGIC,
     ) -> None:
+        super().__init__()
         self._bench = bench
         self._logic = logic
         self._profile = logic.profile
@@ -69,7 +71,6 @@ class PythonBoard:
         self._identity = Identity("SIM-0001", "", own_hash, boot=1)
         self._next_tick_us = start_tick_us
         self._stream = FrameStream(0)  # no command is frequent
-        self._out = bytearray()
         self._dropped = 0
         self._streaming = False
         self._sequence = 0
@@ -91,12 +92,6 @@ class PythonBoard:
         """Take bytes from the host and carry out the commands they complete."""
         for payload in self._stream.feed(data).others:
             self._answer(payload)
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        data = bytes(self._out)
-        self._out.clear()
-        return data
 
     def advance(self, ticks: int) -> None:
         """Let that many of the profile's ticks pass."""
@@ -129,11 +124,11 @@ class PythonBoard:
         if kind is Kind.HELLO:
             self._last_command = None  # another program, whose numbers begin anew
             now = replace(self._identity, status=self._status, offer=self._offer)
-            self._send(protocol.encode_hello_reply(sequence, now))
+            self._send(_hello_reply(sequence, now))
         elif kind is Kind.PING:
             if self._is_live(int(fields["session"])) and self._is_new(sequence):
                 self._hear(sequence)
-            self._send(protocol.encode_pong(sequence, int(fields["token"]), self._now_us))
+            self._send(protocol.encode(Kind.PONG, sequence, fields["token"], self._now_us))
         elif kind is Kind.TRIP:
             self._send(self._trip_report(sequence))
         elif self._last_command is not None and self._last_command[:2] == (kind, sequence):
@@ -145,10 +140,12 @@ class PythonBoard:
             self._acknowledge(kind, sequence, result)
 
     def _trip_report(self, sequence: int) -> bytes:
-        silent_us = self._silent_us
+        silent_us = min(self._silent_us, protocol.TOP)
         numbers = (silent_us, self._watchdog_us, self._trip_us, silent_us)
         code = self._trip
-        return protocol.encode_trip_report(sequence, code, 255, numbers if code else (0, 0, 0, 0))
+        return protocol.encode(
+            Kind.TRIP_REPORT, sequence, code, 255, *(numbers if code else (0, 0, 0, 0))
+        )
 
     def _execute(self, kind: Kind, payload: bytes, fields: np.void) -> Result:
         if kind is Kind.ARM:
@@ -239,7 +236,7 @@ class PythonBoard:
 
     def _acknowledge(self, command: int, sequence: int, result: Result) -> None:
         ack = Ack(sequence, command, result, self._status, self._queue_free())
-        self._send(protocol.encode_ack(ack))
+        self._send(protocol.encode(Kind.ACK, *astuple(ack)))
 
     def _send(self, payload: bytes) -> None:
         frame = encode_frame(payload)
@@ -330,6 +327,12 @@ class PythonBoard:
         self._dropped = (self._dropped + ticks - fitting) % 2**16
         if fitting:
             self._out += encode_frames(samples.view(np.uint8).reshape(fitting, -1))
+
+
+def _hello_reply(sequence: int, identity: Identity) -> bytes:
+    numbers = (identity.protocol_hash, protocol.FIRMWARE_VERSION, identity.build_hash)
+    state = (identity.serial.encode(), identity.boot, identity.status, identity.offer)
+    return protocol.encode(Kind.HELLO_REPLY, sequence, *numbers, *state)
 
 
 def _reason_of_refusal(payload: bytes) -> Result:

@@ -13,15 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.errors import FrameError
+from drivers.errors import DriverError, FrameError
 from drivers.teensy.protocol import (
-    ACK_DTYPE,
-    CLEAR_DTYPE,
     HEADER_DTYPE,
-    HELLO_REPLY_DTYPE,
-    PING_DTYPE,
-    PONG_DTYPE,
-    REFERENCE_DTYPE,
+    LAYOUTS,
     SESSION_DTYPE,
     STATUS_ARMED,
     STATUS_HOLDING,
@@ -30,7 +25,6 @@ from drivers.teensy.protocol import (
     STATUS_REFERENCED,
     STATUS_SATURATED,
     STATUS_WATCHDOG_TRIPPED,
-    TRIP_REPORT_DTYPE,
     TRIP_SHIFT,
     VERSION,
     Kind,
@@ -63,6 +57,7 @@ class Profile:
         motors: Motors with a position loop.
         input_names: Fields of a sample that the guards check, in the order of their channels.
         further_names: Fields a trip can name behind those.
+        sampled_hz: Samples a second where they are not those of the core's ticks.
     """
 
     name: str
@@ -75,11 +70,12 @@ class Profile:
     motors: int
     input_names: tuple[str, ...]
     further_names: tuple[str, ...] = ()
+    sampled_hz: float | None = None
 
     @property
     def rate_hz(self) -> float:
-        """Samples and control ticks a second."""
-        return 1e6 / self.tick_us
+        """Samples a second, by default one each control tick."""
+        return self.sampled_hz or 1e6 / self.tick_us
 
     @property
     def setpoint_names(self) -> tuple[str, ...]:
@@ -89,23 +85,8 @@ class Profile:
     @cached_property
     def layouts(self) -> dict[Kind, np.dtype[np.void]]:
         """Layout of every frame kind; that of setpoints is the header before them."""
-        return {
-            Kind.SAMPLE: self.sample,
-            Kind.HELLO_REPLY: HELLO_REPLY_DTYPE,
-            Kind.ACK: ACK_DTYPE,
-            Kind.PONG: PONG_DTYPE,
-            Kind.TRIP_REPORT: TRIP_REPORT_DTYPE,
-            Kind.HELLO: HEADER_DTYPE,
-            Kind.ARM: self.arm,
-            Kind.START: HEADER_DTYPE,
-            Kind.SETPOINTS: SESSION_DTYPE,
-            Kind.STOP: HEADER_DTYPE,
-            Kind.DISARM: HEADER_DTYPE,
-            Kind.PING: PING_DTYPE,
-            Kind.TRIP: HEADER_DTYPE,
-            Kind.REFERENCE: REFERENCE_DTYPE,
-            Kind.CLEAR: CLEAR_DTYPE,
-        }
+        own = {Kind.SAMPLE: self.sample, Kind.ARM: self.arm}
+        return {kind: (own | LAYOUTS)[kind] for kind in Kind}
 
     @cached_property
     def text(self) -> str:
@@ -136,6 +117,25 @@ class Profile:
         """Return the payload of the arm command; gains motor after motor."""
         values = (*gains.ravel().tolist(), *limits.as_array().tolist())
         return np.array((VERSION, Kind.ARM, sequence, session, *values), self.arm).tobytes()
+
+    def whole_setpoints(self, columns: Sequence[NDArray[np.integer]]) -> list[NDArray[Any]]:
+        """Return the fields of setpoints in the board's number types, each of shape (n,).
+
+        Args:
+            columns: The fields, in the order of `setpoint`.
+
+        Raises:
+            DriverError: The arrays do not fit each other or the board's number range.
+        """
+        names = self.setpoint_names
+        if len(columns) != len(names):
+            raise DriverError(f"A setpoint has {', '.join(names)}; {len(columns)} were given.")
+        pairs = list(zip(names, columns, strict=True))
+        whole = [_whole(values, self.setpoint[name], name) for name, values in pairs]
+        if len({values.shape for values in whole}) > 1:
+            sizes = ", ".join(f"{v.size} of {n}" for n, v in zip(names, whole, strict=True))
+            raise DriverError(f"The fields of the setpoints differ in number: {sizes}.")
+        return whole
 
     def encode_setpoints(
         self, sequence: int, columns: Sequence[NDArray[Any]], session: int
@@ -185,16 +185,28 @@ class Profile:
         named = self.input_names + self.further_names
         if code not in Trip.__members__.values():
             raise FrameError(f"A board tripped for the unknown reason {code}.")
-        return TripReport(
-            code=Trip(code),
-            channel=named[channel] if channel < len(named) else "",
-            value=int(fields["value"]),
-            limit=int(fields["limit"]),
-            tick_us=int(fields["tick_us"]),
-            late_us=int(fields["late_us"]),
-        )
+        numbers = (int(fields[name]) for name in ("value", "limit", "tick_us", "late_us"))
+        return TripReport(Trip(code), named[channel] if channel < len(named) else "", *numbers)
 
 
 def _fields(layout: np.dtype[np.void]) -> str:
     assert layout.names is not None  # noqa: S101
     return ", ".join(f"{name} {layout[name].str.lstrip('<|')}" for name in layout.names)
+
+
+def _whole(values: NDArray[np.integer], kind: np.dtype[Any], name: str) -> NDArray[Any]:
+    """Return setpoints, whole numbers in one dimension, in the board's number type."""
+    array = np.atleast_1d(np.asarray(values))
+    bounds = np.iinfo(kind)
+    if not np.issubdtype(array.dtype, np.integer) or array.ndim != 1:
+        raise DriverError(
+            f"A {name} setpoint is a whole number, not {array.dtype} of {array.ndim} dimensions.",
+            fix="Round to counts first.",
+        )
+    if array.size and not (bounds.min <= array.min() and array.max() <= bounds.max):
+        raise DriverError(
+            f"A {name} setpoint lies outside {bounds.min}..{bounds.max}.",
+            f"The setpoints reach from {array.min()} to {array.max()}.",
+        )
+    whole: NDArray[Any] = array.astype(kind)
+    return whole

@@ -5,9 +5,9 @@ host's command number, which the answer repeats. A board's profile (`drivers.tee
 defines the sample, setpoints and limits of these frames: the reference rig's, or the grasper's.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -136,69 +136,34 @@ HELLO_REPLY_DTYPE = layout(
     "status u2",
     "offer u4",
 )
-ACK_DTYPE = layout(*HEADER_FIELDS, "command u1", "result u1", "status u2", "queue_free u2")
-PONG_DTYPE = layout(*HEADER_FIELDS, "token u8", "tick_us u4")
 SESSION_DTYPE = layout(*SESSION_FIELDS)
+LAYOUTS: dict[Kind, np.dtype[np.void]] = {
+    Kind.HELLO_REPLY: HELLO_REPLY_DTYPE,
+    Kind.ACK: layout(*HEADER_FIELDS, "command u1", "result u1", "status u2", "queue_free u2"),
+    Kind.PONG: layout(*HEADER_FIELDS, "token u8", "tick_us u4"),
+    Kind.TRIP_REPORT: layout(
+        *(*HEADER_FIELDS, "code u1", "channel u1"),
+        *("value i4", "limit i4", "tick_us u4", "late_us u4"),
+    ),
+    Kind.HELLO: HEADER_DTYPE,
+    Kind.START: HEADER_DTYPE,
+    Kind.SETPOINTS: SESSION_DTYPE,
+    Kind.STOP: HEADER_DTYPE,
+    Kind.DISARM: HEADER_DTYPE,
+    Kind.PING: layout(*SESSION_FIELDS, "token u8"),
+    Kind.TRIP: HEADER_DTYPE,
+    Kind.REFERENCE: layout(*HEADER_FIELDS, "count_1 i4", "count_2 i4", "count_3 i4", "at_index u1"),
+    Kind.CLEAR: layout(*HEADER_FIELDS, "code u1"),
+}
+"""Layouts that every board has; setpoints follow their header.
+
+The counts of a reference are each encoder's, ordered as in a sample: at the present place, or where
+the index came.
+"""
 GAIN_NAMES = ("kp", "ki", "kd", "velocity_filter", "limit")
 """Of one position loop."""
-MOTOR_LIMIT_NAMES = (
-    "max_motor_step",
-    "continuous_current",
-    "i2t",
-    "stall_current",
-    "stall_motion",
-)
-"""What is watched over time of every motor with a position loop."""
-LOOP_LIMIT_NAMES = (
-    "max_motor_jump",
-    "max_target_step",
-    "max_following",
-    "following_ticks",
-    "full_scale_current",
-    "current_offset",
-    "max_current_error",
-    "current_ticks",
-    "frozen_current",
-    "frozen_motion",
-)
-"""What a motor's position loop is believed by, see `drivers.teensy.reference.Limits`."""
-CHOICE_NAMES = (
-    "stall_ticks",
-    "saturated_ticks",
-    "stale_ticks",
-    "dry_ticks",
-    "watchdog_us",
-    "safe_state",
-    "hold_command_e4",
-    "hold_ticks",
-    "seek",
-)
-"""How the limits of every profile end: how long each watch lasts, and what a tripped board does."""
-LEAST_LIMITS = ("min_spindle", "min_jaw", "min_motor")
-"""Limits that are the stricter the larger they are."""
-HIGHEST_LIMITS = ("max_spindle", "max_jaw", "max_motor")
-"""The other ends, which may be negative; all other limits are sizes, the stricter the smaller."""
-FIXED_LIMITS = (
-    *("full_scale_current", "motor_per_turn", "spindle_per_turn", "jaw_per_turn", "torque_e3"),
-)
-"""What a rig is built like: a board that holds such a number takes no other."""
-FREE_LIMITS = (
-    *("stall_motion", "current_offset", "frozen_motion", "twist_e6", "stretch_e6", "jaw_zero"),
-    *("probe_within", "safe_state", "seek"),
-)
-"""What a host may choose on any board."""
-PING_DTYPE = layout(*SESSION_FIELDS, "token u8")
-CLEAR_DTYPE = layout(*HEADER_FIELDS, "code u1")
-REFERENCE_DTYPE = layout(*HEADER_FIELDS, "count_1 i4", "count_2 i4", "count_3 i4", "at_index u1")
-"""Counts of each encoder, ordered as in a sample: at the present place, or where the index came."""
-TRIP_REPORT_DTYPE = layout(
-    *HEADER_FIELDS, "code u1", "channel u1", "value i4", "limit i4", "tick_us u4", "late_us u4"
-)
-
 FIRMWARE_VERSION = 0x000500
 """Version of the firmware that goes with this program: major, minor, patch, one byte each."""
-
-
 TOP = 2**31 - 1
 """A limit that nothing crosses."""
 
@@ -253,7 +218,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Ack:
-    """The board's answer to a command.
+    """The board's answer to a command, in the order of its layout.
 
     Attributes:
         sequence: Number of the command.
@@ -275,65 +240,15 @@ def version_text(version: int) -> str:
     return f"{version >> 16 & 255}.{version >> 8 & 255}.{version & 255}"
 
 
-def encode_command(kind: Kind, sequence: int) -> bytes:
-    """Return the payload of a command that is all header: hello, start, stop, disarm."""
-    return np.array((VERSION, kind, sequence), HEADER_DTYPE).tobytes()
-
-
-def encode_ping(sequence: int, token: int, session: int = 0) -> bytes:
-    """Return the payload of a clock ping; `token` comes back in the pong.
-
-    Only one with the session that armed is a sign of life to the board's watchdog.
-    """
-    return np.array((VERSION, Kind.PING, sequence, session, token), PING_DTYPE).tobytes()
-
-
-def encode_clear(sequence: int, code: int) -> bytes:
-    """Return the payload of the command that clears a trip, by the trip's code."""
-    return np.array((VERSION, Kind.CLEAR, sequence, code), CLEAR_DTYPE).tobytes()
-
-
-def encode_reference(sequence: int, counts: Sequence[int], at_index: bool = False) -> bytes:
-    """Return the payload of the command that gives the encoders their counts."""
-    fields = (VERSION, Kind.REFERENCE, sequence, *counts, at_index)
-    return np.array(fields, REFERENCE_DTYPE).tobytes()
-
-
-def encode_hello_reply(sequence: int, identity: Identity) -> bytes:
-    """Return the payload of the answer to a hello, with this program's firmware version."""
-    numbers = (identity.protocol_hash, FIRMWARE_VERSION, identity.build_hash)
-    state = (identity.serial.encode()[:24], identity.boot, identity.status, identity.offer)
-    fields = (VERSION, Kind.HELLO_REPLY, sequence, *numbers, *state)
-    return np.array(fields, HELLO_REPLY_DTYPE).tobytes()
-
-
-def encode_ack(ack: Ack) -> bytes:
-    """Return the payload of an acknowledgement."""
-    fields = (ack.sequence, ack.command, ack.result, ack.status, ack.queue_free)
-    return np.array((VERSION, Kind.ACK, *fields), ACK_DTYPE).tobytes()
-
-
-def encode_trip_report(
-    sequence: int, code: int, channel: int, numbers: tuple[int, int, int, int]
-) -> bytes:
-    """Return the payload of the answer to a question for the trip.
+def encode(kind: Kind, sequence: int, *fields: Any) -> bytes:
+    """Return the payload of a frame whose layout every board has.
 
     Args:
-        sequence: Number of the question.
-        code: What the board tripped over.
-        channel: Place of the count that crossed.
-        numbers: That count and its limit, cut to 32 bits; time of the trip and lateness, us.
+        kind: Its kind.
+        sequence: Number of the command that it is or answers.
+        *fields: What follows in `LAYOUTS`.
     """
-    value, limit, tick_us, late_us = numbers
-    whole = [max(MISSING, min(number, TOP)) for number in (value, limit)]
-    whole += [tick_us, min(late_us, 2**32 - 1)]
-    fields = (VERSION, Kind.TRIP_REPORT, sequence, code, channel, *whole)
-    return np.array(fields, TRIP_REPORT_DTYPE).tobytes()
-
-
-def encode_pong(sequence: int, token: int, tick_us: int) -> bytes:
-    """Return the payload of the answer to a ping."""
-    return np.array((VERSION, Kind.PONG, sequence, token, tick_us), PONG_DTYPE).tobytes()
+    return np.array((VERSION, kind, sequence, *fields), LAYOUTS[kind]).tobytes()
 
 
 def decode_identity(fields: np.void) -> Identity:

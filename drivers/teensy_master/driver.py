@@ -1,8 +1,7 @@
 """The master's three potentiometers, read by the converter of a Teensy that drives no motor."""
 
 from drivers.registry import Driver
-from drivers.teensy.channels import raw_channel
-from drivers.teensy.device import TeensyDevice
+from drivers.teensy.device import TeensyDevice, raw_channel
 from drivers.teensy.grasper import GRASPER
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport

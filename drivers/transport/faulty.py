@@ -1,4 +1,4 @@
-"""A bad cable: faults on what a device sends, around any transport, repeatable by a seed.
+"""A bad cable: faults on what a device sends, around any transport or bus, repeatable by a seed.
 
 Time is the inner transport's own, so that a fault that lasts takes no real time on a simulated one.
 `Faults` is independent of transports; a bus can use it for each message, too.
@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from enum import StrEnum
 
 from drivers.errors import LinkLostError
+from drivers.transport.can_bus import CanBus, CanFrame
 from drivers.transport.transport import Transport
 
 LONGEST_RUN = 16
@@ -136,22 +137,24 @@ class FaultyTransport:
         inner: The transport.
         faults: The faults that strike; more can be injected at any time.
         packets: Whether each read of `inner` is one packet rather than part of a stream.
+        instant_s: Waits up to this are the rounding of a sum, and none.
     """
 
     def __init__(
-        self, inner: Transport, faults: Faults | None = None, packets: bool = False
+        self,
+        inner: Transport,
+        faults: Faults | None = None,
+        packets: bool = False,
+        instant_s: float = 0.0,
     ) -> None:
+        self.url = inner.url
         self._inner = inner
         self.faults = faults or Faults()
         self._packets = packets
+        self._instant_s = instant_s
         self._held: list[tuple[float, bytes]] = []
         self.incoming: Tap = unchanged
         self.outgoing: Tap = unchanged
-
-    @property
-    def url(self) -> str:
-        """The URL of the inner transport."""
-        return self._inner.url
 
     @property
     def now_s(self) -> float:
@@ -166,9 +169,9 @@ class FaultyTransport:
             due = self._due()
             if due:
                 return due
-            remaining_s = max(0.0, give_up_s - self.now_s)
+            remaining_s = self._wait(give_up_s - self.now_s)
             next_due_s = min((due_s for due_s, _ in self._held), default=float("inf"))
-            chunk = self._inner.read(max(0.0, min(remaining_s, next_due_s - self.now_s)))
+            chunk = self._inner.read(min(remaining_s, self._wait(next_due_s - self.now_s)))
             if chunk:
                 arrived = self.incoming(chunk)
                 if arrived:
@@ -188,11 +191,14 @@ class FaultyTransport:
         """Close the inner transport."""
         self._inner.close()
 
+    def _wait(self, wait_s: float) -> float:
+        return wait_s if wait_s > self._instant_s else 0.0
+
     def _due(self) -> bytes:
         now_s = self.now_s
         if now_s < self.faults.stalled_until_s(now_s):
             return b""
-        due = [entry for entry in self._held if entry[0] <= now_s]
+        due = [entry for entry in self._held if not self._wait(entry[0] - now_s)]
         if self._packets:
             due = due[:1]
         for entry in due:
@@ -204,9 +210,60 @@ class FaultyTransport:
             self._inner.close()
             raise LinkLostError(
                 f"The link to {self.url} is gone.",
-                "The device was unplugged.",
+                "The device or its adapter was unplugged.",
                 "Check the cable and start again.",
             )
+
+
+class FaultyCanBus:
+    """Any bus behind a bad cable. A frame is hit as a whole: CAN's checksum drops a damaged one.
+
+    Args:
+        inner: The bus.
+        faults: The faults that strike; more can be injected at any time.
+    """
+
+    def __init__(self, inner: CanBus, faults: Faults | None = None) -> None:
+        self.url = inner.url
+        self.counters = inner.counters
+        """The inner bus's counters."""
+        self._cable = FaultyTransport(_Packets(inner), faults, packets=True, instant_s=1e-9)
+        self.faults = self._cable.faults
+        self.close = inner.close
+
+    @property
+    def now_s(self) -> float:
+        """The clock of the inner bus, seconds."""
+        return self._cable.now_s
+
+    def send(self, frame: CanFrame) -> None:
+        """Send a frame."""
+        self._cable.write(frame.to_bytes())
+
+    def read(self, timeout_s: float) -> CanFrame | None:
+        """Return the next frame that gets through, waiting at most `timeout_s` for it."""
+        packet = self._cable.read(timeout_s)
+        return CanFrame.from_bytes(packet) if packet else None
+
+
+class _Packets:
+    """The frames of a bus as packets of a transport."""
+
+    def __init__(self, bus: CanBus) -> None:
+        self._bus = bus
+        self.url = bus.url
+        self.close = bus.close
+
+    @property
+    def now_s(self) -> float:
+        return self._bus.now_s
+
+    def read(self, timeout_s: float) -> bytes:
+        frame = self._bus.read(timeout_s)
+        return frame.to_bytes() if frame else b""
+
+    def write(self, data: bytes) -> None:
+        self._bus.send(CanFrame.from_bytes(data))
 
 
 def unchanged(data: bytes) -> bytes:

@@ -8,7 +8,7 @@ world is late then, and nothing in it is lost or torn.
 import time
 from collections.abc import Sequence
 
-from drivers.transport.can_bus import CanBus, CanCounters, CanFrame
+from drivers.transport.can_bus import CanBus, CanFrame
 from drivers.transport.simulated_can import TICK_S, CanNode
 
 
@@ -22,6 +22,9 @@ class LiveCanBus:
     """
 
     def __init__(self, bus: CanBus, theirs: CanBus, nodes: Sequence[CanNode]) -> None:
+        self.url = bus.url
+        self.counters = bus.counters
+        """Counters of the bus."""
         self._bus = bus
         self._theirs = theirs
         self._nodes = list(nodes)
@@ -30,19 +33,9 @@ class LiveCanBus:
         self._answer()  # that they have booted
 
     @property
-    def url(self) -> str:
-        """The bus's URL."""
-        return self._bus.url
-
-    @property
     def now_s(self) -> float:
         """The host's monotonic clock at the newest tick, seconds."""
         return self._began_s + self._ticks * TICK_S
-
-    @property
-    def counters(self) -> CanCounters:
-        """Counters of the bus."""
-        return self._bus.counters
 
     def send(self, frame: CanFrame) -> None:
         """Send a frame; the nodes take it at once."""

@@ -29,6 +29,7 @@ from drivers.errors import (
     UnknownSchemeError,
 )
 from drivers.transport.can_bus import MAX_DATA, CanBus, CanCounters, CanFrame
+from drivers.transport.transport import HostLink
 
 SEND_TIMEOUT_S = 0.1
 _EXAMPLES = "can:socketcan:can0 or can:slcan:/dev/ttyACM0@115200?bitrate=1000000"
@@ -63,7 +64,7 @@ _INTERFACES = {
 }
 
 
-class PythonCanBus:
+class PythonCanBus(HostLink):
     """A bus over an open python-can interface.
 
     Args:
@@ -73,27 +74,11 @@ class PythonCanBus:
     """
 
     def __init__(self, url: str, bus: can.BusABC, echoes: bool = False) -> None:
-        self._url = url
+        super().__init__(url)
         self._bus = bus
         self._own: deque[tuple[int, bytes]] | None = deque(maxlen=_ECHOES_KEPT) if echoes else None
-        self._lost: LinkLostError | None = None
-        self._closed = False
-        self._counters = CanCounters()
-
-    @property
-    def url(self) -> str:
-        """The URL the bus was opened by."""
-        return self._url
-
-    @property
-    def now_s(self) -> float:
-        """The host's monotonic clock, seconds."""
-        return monotonic()
-
-    @property
-    def counters(self) -> CanCounters:
+        self.counters = CanCounters()
         """Counters of the bus."""
-        return self._counters
 
     def send(self, frame: CanFrame) -> None:
         """Send one frame."""
@@ -108,8 +93,8 @@ class PythonCanBus:
         except (can.CanError, OSError) as error:
             if getattr(error, "error_code", None) == errno.ENOBUFS:
                 raise self._stuck() from error
-            raise self._lose(error) from error
-        self._counters.sent += 1
+            raise self._gone(error) from error
+        self.counters.sent += 1
         if self._own is not None:
             self._own.append((frame.can_id, frame.data))
 
@@ -125,30 +110,23 @@ class PythonCanBus:
             try:
                 message = self._bus.recv(max(0.0, give_up_s - monotonic()))
             except (can.CanError, OSError, ValueError) as error:
-                raise self._lose(error) from error
+                raise self._gone(error) from error
             if message is None:
                 return None
             if message.is_error_frame:
                 self._note_error(message)
             elif message.is_remote_frame or len(message.data) > MAX_DATA:
-                self._counters.ignored += 1
+                self.counters.ignored += 1
             elif self._is_echo(message):
-                self._counters.echoes += 1
+                self.counters.echoes += 1
             else:
-                self._counters.received += 1
+                self.counters.received += 1
                 return CanFrame(message.arbitration_id, bytes(message.data), message.is_extended_id)
 
     def close(self) -> None:
         """Let go of the interface."""
-        if self._closed:
-            return
-        self._closed = True
-        self._lost = self._lost or LinkLostError(f"{self._url} is closed.")
+        self._closes()
         self._bus.shutdown()
-
-    def _require_link(self) -> None:
-        if self._lost is not None:
-            raise type(self._lost)(self._lost.what, self._lost.why, self._lost.fix)
 
     def _is_echo(self, message: can.Message) -> bool:
         key = (message.arbitration_id, bytes(message.data))
@@ -159,34 +137,37 @@ class PythonCanBus:
 
     def _note_error(self, message: can.Message) -> None:
         """Count an error frame; raise when the controller has left the bus."""
-        self._counters.error_frames += 1
+        self.counters.error_frames += 1
         kind, data = message.arbitration_id, bytes(message.data)
         if kind & _CONTROLLER and len(data) > 1 and data[1] & _RX_OVERFLOW:
-            self._counters.overruns += 1
+            self.counters.overruns += 1
         if kind & _BUS_OFF:
-            self._counters.bus_off += 1
-            self._lost = BusOffError(
-                f"The CAN controller of {self._url} has taken itself off the bus.",
-                "It could not get its frames through: a short, a missing terminator,"
-                " swapped wires, or another bit rate.",
-                "Check CAN_H, CAN_L, both 120 ohm terminators and the bit rates, then start again.",
+            self.counters.bus_off += 1
+            raise self._lose(
+                BusOffError(
+                    f"The CAN controller of {self.url} has taken itself off the bus.",
+                    "It could not get its frames through: a short, a missing terminator,"
+                    " swapped wires, or another bit rate.",
+                    "Check CAN_H, CAN_L, both 120 ohm terminators and the bit rates,"
+                    " then start again.",
+                )
             )
-            self._require_link()
 
     def _stuck(self) -> LinkTimeoutError:
         return LinkTimeoutError(
-            f"{self._url} took no frame for {SEND_TIMEOUT_S:g} s.",
+            f"{self.url} took no frame for {SEND_TIMEOUT_S:g} s.",
             "No other node acknowledges, or the bus is full.",
             "Check that a device is powered, and that both ends have one bit rate.",
         )
 
-    def _lose(self, error: Exception) -> LinkLostError:
-        self._lost = LinkLostError(
-            f"The CAN bus {self._url} is gone.",
-            f"The interface was unplugged or taken down ({error}).",
-            "Check the adapter and start again.",
+    def _gone(self, error: Exception) -> LinkLostError:
+        return self._lose(
+            LinkLostError(
+                f"The CAN bus {self.url} is gone.",
+                f"The interface was unplugged or taken down ({error}).",
+                "Check the adapter and start again.",
+            )
         )
-        return self._lost
 
 
 def open_can(url: str) -> CanBus:

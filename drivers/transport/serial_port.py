@@ -11,7 +11,6 @@ import stat
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from time import monotonic
 
 import serial
 from serial.tools import list_ports
@@ -25,7 +24,7 @@ from drivers.errors import (
     PortNotFoundError,
     PortPermissionError,
 )
-from drivers.transport.transport import Transport, open_transport
+from drivers.transport.transport import HostLink, Transport, open_transport
 
 BAUD_RATE = 115200
 """Has no effect on a Teensy's USB port; a real UART behind an adapter uses it."""
@@ -40,7 +39,7 @@ else:
     _SETTING_ERRORS = (*_SETTING_ERRORS, termios.error)  # pyserial lets it through
 
 
-class SerialTransport:
+class SerialTransport(HostLink):
     """A transport over an open pyserial port.
 
     Args:
@@ -49,19 +48,8 @@ class SerialTransport:
     """
 
     def __init__(self, url: str, port: serial.SerialBase) -> None:
-        self._url = url
+        super().__init__(url)
         self._port = port
-        self._lost: LinkLostError | None = None
-
-    @property
-    def url(self) -> str:
-        """The URL the port was opened by."""
-        return self._url
-
-    @property
-    def now_s(self) -> float:
-        """The host's monotonic clock, seconds."""
-        return monotonic()
 
     def read(self, timeout_s: float) -> bytes:
         """Return the bytes that are there, waiting at most `timeout_s` for the first."""
@@ -76,7 +64,7 @@ class SerialTransport:
             self._set_timeout(0.0)
             return first + bytes(self._port.read(_READ_SIZE))
         except (serial.SerialException, OSError, TypeError) as error:
-            raise self._lose(error) from error
+            raise self._gone(error) from error
 
     def write(self, data: bytes) -> None:
         """Send all of `data`."""
@@ -85,12 +73,12 @@ class SerialTransport:
             self._port.write(data)
         except serial.SerialTimeoutException as error:
             raise LinkTimeoutError(
-                f"{self._url} took no bytes for {WRITE_TIMEOUT_S:g} s.",
+                f"{self.url} took no bytes for {WRITE_TIMEOUT_S:g} s.",
                 "The device has stopped reading.",
                 "Unplug it and plug it in again.",
             ) from error
         except (serial.SerialException, OSError) as error:
-            raise self._lose(error) from error
+            raise self._gone(error) from error
 
     def set_line(self, baud_rate: int, parity: str = "N") -> None:
         """Set the speed of the line and its parity (`N`, `E` or `O`); 8 bits, 1 stop bit."""
@@ -99,7 +87,7 @@ class SerialTransport:
 
     def close(self) -> None:
         """Close the port."""
-        self._lost = self._lost or LinkLostError(f"{self._url} is closed.")
+        self._closes()
         self._port.close()
 
     def _read_port(self, timeout_s: float) -> bytes:
@@ -119,18 +107,15 @@ class SerialTransport:
         if self._port.timeout != timeout_s:
             self._port.timeout = timeout_s
 
-    def _require_link(self) -> None:
-        if self._lost is not None:
-            raise LinkLostError(self._lost.what, self._lost.why, self._lost.fix)
-
-    def _lose(self, error: Exception) -> LinkLostError:
-        self._lost = LinkLostError(
-            f"The link to {self._url} is gone.",
-            f"The device was unplugged or reset, or another program took the port ({error}).",
-            "Check the cable and start again.",
-        )
+    def _gone(self, error: Exception) -> LinkLostError:
         self._port.close()
-        return self._lost
+        return self._lose(
+            LinkLostError(
+                f"The link to {self.url} is gone.",
+                f"The device was unplugged or reset, or another program took the port ({error}).",
+                "Check the cable and start again.",
+            )
+        )
 
 
 def open_serial(url: str) -> SerialTransport:

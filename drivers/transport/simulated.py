@@ -10,7 +10,7 @@ own tests for lost and damaged bytes).
 from time import monotonic, sleep
 from typing import Protocol
 
-from drivers.errors import LinkLostError
+from drivers.transport.transport import HostLink
 
 TICK_S = 1e-3
 """Default tick of a board."""
@@ -32,7 +32,46 @@ class Board(Protocol):
         ...
 
 
-class SimulatedTransport:
+class Outbox:
+    """A fake that sends: bytes that wait for the host, and a world that stands still."""
+
+    def __init__(self) -> None:
+        self._out = bytearray()
+
+    def advance(self, ticks: int) -> None:
+        """Let that many ticks pass: nothing happens by itself."""
+
+    def transmit(self) -> bytes:
+        """Give the bytes that wait for the host."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+
+class Pace:
+    """Keeps a simulated device from running ahead of a person who watches.
+
+    Args:
+        pace: Simulated seconds a real second; None for as fast as possible.
+    """
+
+    def __init__(self, pace: float | None) -> None:
+        self._pace = pace
+        self._from: tuple[float, float] | None = None
+
+    def keep(self, now_s: float) -> None:
+        """Wait until the simulated time is due."""
+        if self._pace is None:
+            return
+        if self._from is None:
+            self._from = (monotonic(), now_s)
+        began_s, first_s = self._from
+        early_s = began_s + (now_s - first_s) / self._pace - monotonic()
+        if early_s > 0:
+            sleep(early_s)
+
+
+class SimulatedTransport(HostLink):
     """A transport to a board in this process.
 
     Args:
@@ -51,19 +90,12 @@ class SimulatedTransport:
         pace: float | None = None,
         tick_s: float = TICK_S,
     ) -> None:
+        super().__init__(url)
         self.board = board
         self._tick_s = tick_s
-        self._url = url
         self._step_ticks = max(1, round(step_s / tick_s))
-        self._pace = pace
+        self._pace = Pace(pace)
         self._ticks = 0
-        self._closed = False
-        self._paced_from: tuple[float, int] | None = None
-
-    @property
-    def url(self) -> str:
-        """The URL the transport was opened by."""
-        return self._url
 
     @property
     def now_s(self) -> float:
@@ -81,7 +113,7 @@ class SimulatedTransport:
             self.board.advance(ticks)
             self._ticks += ticks
             remaining -= ticks
-            self._keep_pace()
+            self._pace.keep(self.now_s)
             data = self.board.transmit()
         return data
 
@@ -92,18 +124,4 @@ class SimulatedTransport:
 
     def close(self) -> None:
         """Let go of the board; its time stands still."""
-        self._closed = True
-
-    def _require_link(self) -> None:
-        if self._closed:
-            raise LinkLostError(f"{self._url} is closed.")
-
-    def _keep_pace(self) -> None:
-        if self._pace is None:
-            return
-        if self._paced_from is None:
-            self._paced_from = (monotonic(), self._ticks)
-        began_s, ticks = self._paced_from
-        late_s = monotonic() - began_s - (self._ticks - ticks) * self._tick_s / self._pace
-        if late_s < 0:
-            sleep(-late_s)
+        self._closes()

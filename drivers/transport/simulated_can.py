@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Protocol
 
-from drivers.errors import LinkLostError
 from drivers.transport.can_bus import CanCounters, CanFrame
+from drivers.transport.transport import HostLink
 
 TICK_S = 1e-3
 
@@ -31,7 +31,7 @@ class CanNode(Protocol):
         ...
 
 
-class SimulatedCanBus:
+class SimulatedCanBus(HostLink):
     """The host's place on a bus of nodes in this process.
 
     Args:
@@ -40,32 +40,22 @@ class SimulatedCanBus:
     """
 
     def __init__(self, nodes: Sequence[CanNode], url: str = "sim://can") -> None:
+        super().__init__(url)
         self._nodes = list(nodes)
-        self._url = url
         self._ticks = 0
         self._waiting: deque[CanFrame] = deque()
-        self._closed = False
-        self._counters = CanCounters()
-
-    @property
-    def url(self) -> str:
-        """The URL the bus was opened by."""
-        return self._url
+        self.counters = CanCounters()
+        """Counters of the bus."""
 
     @property
     def now_s(self) -> float:
         """Virtual seconds since the bus was made."""
         return self._ticks * TICK_S
 
-    @property
-    def counters(self) -> CanCounters:
-        """Counters of the bus."""
-        return self._counters
-
     def send(self, frame: CanFrame) -> None:
         """Hand a frame to every node."""
         self._require_link()
-        self._counters.sent += 1
+        self.counters.sent += 1
         for node in self._nodes:
             node.receive(frame)
         self._exchange()
@@ -84,12 +74,12 @@ class SimulatedCanBus:
             self._exchange()
         if not self._waiting:
             return None
-        self._counters.received += 1
+        self.counters.received += 1
         return self._waiting.popleft()
 
     def close(self) -> None:
         """Let go of the bus; its time stands still."""
-        self._closed = True
+        self._closes()
 
     def _exchange(self) -> None:
         """Carry frames until no node has any more."""
@@ -101,7 +91,3 @@ class SimulatedCanBus:
                     if node is not sender:
                         node.receive(frame)
             sent = [(node, frame) for node in self._nodes for frame in node.transmit()]
-
-    def _require_link(self) -> None:
-        if self._closed:
-            raise LinkLostError(f"{self._url} is closed.")

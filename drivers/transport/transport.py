@@ -2,9 +2,10 @@
 
 import re
 from collections.abc import Callable
+from time import monotonic
 from typing import Protocol
 
-from drivers.errors import UnknownSchemeError
+from drivers.errors import LinkLostError, UnknownSchemeError
 
 _SCHEME = re.compile(r"([a-z][a-z0-9+.-]*):", re.IGNORECASE)
 
@@ -44,6 +45,35 @@ class Transport(Protocol):
     def close(self) -> None:
         """Let go of the link. Closing twice does nothing."""
         ...
+
+
+class HostLink:
+    """What every link of this computer has: its URL, the host's clock, and that it may be lost.
+
+    Args:
+        url: The URL the user gave, for messages.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        self._lost: LinkLostError | None = None
+
+    @property
+    def now_s(self) -> float:
+        """The host's monotonic clock, seconds."""
+        return monotonic()
+
+    def _lose(self, error: LinkLostError) -> LinkLostError:
+        """Take the link for gone: every later call raises this error again."""
+        self._lost = error
+        return error
+
+    def _closes(self) -> None:
+        self._lost = self._lost or LinkLostError(f"{self.url} is closed.")
+
+    def _require_link(self) -> None:
+        if self._lost is not None:
+            raise type(self._lost)(self._lost.what, self._lost.why, self._lost.fix)
 
 
 Opener = Callable[[str], Transport]

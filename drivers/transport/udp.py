@@ -6,16 +6,16 @@ unknown senders, for fakes in another process, by default on the loopback interf
 
 import select
 import socket
-from time import monotonic
 
 from drivers.errors import LinkError, LinkLostError
+from drivers.transport.transport import HostLink
 
 LARGEST_DATAGRAM = 65535
 RECEIVE_BUFFER = 1 << 20
 """Receive buffer of the kernel for a late reader, bytes: seconds of a 7 kHz stream."""
 
 
-class UdpTransport:
+class UdpTransport(HostLink):
     """Datagrams to and from one address.
 
     Args:
@@ -24,21 +24,10 @@ class UdpTransport:
     """
 
     def __init__(self, url: str, connected: socket.socket) -> None:
-        self._url = url
+        super().__init__(url)
         self._socket = connected
-        self._closed = False
         connected.setblocking(False)
         connected.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-
-    @property
-    def url(self) -> str:
-        """The URL the transport was opened by."""
-        return self._url
-
-    @property
-    def now_s(self) -> float:
-        """The host's monotonic clock, seconds."""
-        return monotonic()
 
     def read(self, timeout_s: float) -> bytes:
         """Return the next datagram, waiting at most `timeout_s` for it."""
@@ -50,7 +39,7 @@ class UdpTransport:
         except BlockingIOError:
             return b""  # a datagram with a bad checksum was there and is not
         except OSError as error:
-            raise self._lost(error) from error
+            raise self._gone(error) from error
 
     def write(self, data: bytes) -> None:
         """Send `data` as one datagram."""
@@ -58,20 +47,16 @@ class UdpTransport:
         try:
             self._socket.send(data)
         except OSError as error:
-            raise self._lost(error) from error
+            raise self._gone(error) from error
 
     def close(self) -> None:
         """Close the socket."""
-        self._closed = True
+        self._closes()
         self._socket.close()
 
-    def _require_link(self) -> None:
-        if self._closed:
-            raise LinkLostError(f"{self._url} is closed.")
-
-    def _lost(self, error: OSError) -> LinkLostError:
+    def _gone(self, error: OSError) -> LinkLostError:
         return LinkLostError(
-            f"The link to {self._url} is gone.",
+            f"The link to {self.url} is gone.",
             f"{error}.",
             "Check that the device is powered and in this computer's network.",
         )

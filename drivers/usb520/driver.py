@@ -1,14 +1,16 @@
 """The driver of a USB520 in its text mode: it streams and accepts no commands."""
 
+from collections.abc import Mapping
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.counters import Arrivals, DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity
-from drivers.errors import DriverError, FrameError, LinkTimeoutError
+from drivers.device import Channel, DeviceIdentity
+from drivers.errors import FrameError, LinkTimeoutError
 from drivers.registry import BaudOption, Driver
+from drivers.streaming import StreamedDevice
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 from drivers.usb520 import protocol
@@ -17,7 +19,7 @@ PATIENCE_S = 1.0
 """Time for a first whole line; ten should have come."""
 
 
-class Usb520:
+class Usb520(StreamedDevice):
     """One amplifier on USB, sending lines by itself.
 
     Args:
@@ -28,14 +30,10 @@ class Usb520:
     name = "usb520"
 
     def __init__(self, transport: Transport, rate_hz: float = 10.0) -> None:
-        self._transport = transport
-        self._rate_hz = rate_hz
-        self._counters = DeviceCounters()
-        self._arrivals = Arrivals(self._counters, 5 / rate_hz)
+        super().__init__(transport, rate_hz, "USB520")
         self._unit: str | None = None
         self._held = b""
         self._in_step = False
-        self._bad_at_start = 0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -45,11 +43,6 @@ class Usb520:
         quantity = protocol.QUANTITIES[self._unit]
         text = f"reading in {self._unit}"
         return (Channel(quantity.name, quantity.unit, self._rate_hz, -np.inf, np.inf, text),)
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Counters of the line; bad lines are `crc_errors`."""
-        return self._counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
         """Wait for a whole line. The device reports no name and no number.
@@ -71,26 +64,20 @@ class Usb520:
                 decoded = self._decode(line)
                 if decoded is not None and self._unit is None:
                     self._unit = decoded[1]
+        self._identified = True
         return DeviceIdentity("USB520", "", "")
 
-    def start(self) -> None:
+    def begin(self) -> None:
         """Forget what was sent before now."""
-        if self._unit is None:
-            self.identify()
         self._transport.read(0.0)
         self._held = b""
         self._in_step = False
-        self._bad_at_start = self._counters.crc_errors
-        self._arrivals.restart(self._transport.now_s)
 
-    def read(self, timeout_s: float) -> Batch:
-        """Return the readings that have come, stamped with the time of this read.
-
-        Raises:
-            DriverError: Neither `identify` nor `start` has been called.
-        """
-        if self._unit is None:
-            raise DriverError("The USB520's unit is not known yet.", fix="Call start first.")
+    def receive(
+        self, timeout_s: float
+    ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
+        """Return the readings of the whole lines that have come."""
+        assert self._unit is not None  # noqa: S101 - read by `identify`
         give_up_s = self._transport.now_s + timeout_s
         values: list[float] = []
         while not values:
@@ -101,23 +88,12 @@ class Usb520:
                     values.append(decoded[0])
             if not data or self._transport.now_s >= give_up_s:
                 break
-        now_s = self._transport.now_s
         quantity = protocol.QUANTITIES[self._unit]
-        return Batch(
-            {quantity.name: np.array(values, np.float64) * quantity.factor},
-            np.full(len(values), now_s),
-            "host",
-            self._arrivals.number(len(values), now_s),
-            np.zeros(len(values), np.uint8),
-            self._counters.crc_errors - self._bad_at_start,
-        )
+        readings = np.array(values, np.float64) * quantity.factor
+        return {quantity.name: readings}, np.zeros(len(values), np.uint8)
 
     def stop(self) -> None:
         """Do nothing: the device cannot be stopped."""
-
-    def close(self) -> None:
-        """Let go of the port."""
-        self._transport.close()
 
     def _lines(self, data: bytes) -> list[bytes]:
         """Return the whole lines that `data` completes; the first may have begun before."""

@@ -7,7 +7,7 @@ import math
 
 from drivers.device import Device
 from drivers.transport.faulty import Faults, FaultyTransport
-from drivers.transport.simulated import SimulatedTransport
+from drivers.transport.simulated import Outbox, SimulatedTransport
 from drivers.usb520 import protocol
 from drivers.usb520.driver import Usb520
 
@@ -15,7 +15,7 @@ LINE_TICKS = 100
 """Milliseconds between lines."""
 
 
-class Usb520Fake:
+class Usb520Fake(Outbox):
     """An amplifier, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
@@ -23,9 +23,9 @@ class Usb520Fake:
     """
 
     def __init__(self, unit: str = "N-m") -> None:
+        super().__init__()
         self.unit = unit
         self._ticks = 0
-        self._out = b""
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host; in this mode it heeds none."""
@@ -36,11 +36,6 @@ class Usb520Fake:
         self._ticks += ticks
         for line in range(first, self._ticks // LINE_TICKS + 1):
             self._out += protocol.encode_line(0.8 * math.sin(0.2 * line), self.unit)
-
-    def transmit(self) -> bytes:
-        """Give the bytes that wait for the host."""
-        out, self._out = self._out, b""
-        return out
 
 
 def open_fake(faults: Faults) -> Device:

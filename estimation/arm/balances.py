@@ -74,6 +74,12 @@ def balances_of(recording: Recording) -> ArmBalances | None:
     return None
 
 
+def declared_arm(models: Sequence[Model], recordings: Sequence[Recording]) -> ArmBalances | None:
+    """Return the equations of the arm whose joints are declared; None where none is, or no run."""
+    of_joints = any(model.balance.startswith("joint.") for model in models)
+    return balances_of(recordings[0]) if of_joints and recordings else None
+
+
 def equations(arm: Arm, names: Sequence[JointNames]) -> ArmBalances:
     """Return the torque equations of an arm's joints.
 

@@ -12,7 +12,7 @@ Source: generalised least squares of the random-intercept model, N. M. Laird and
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,14 +95,8 @@ class Normal:
     def only(self, target: int) -> "Normal":
         """Return the share of one target."""
         one = slice(target, target + 1)
-        return Normal(
-            self.count,
-            self.gram,
-            self.cross[:, one],
-            self.square[one],
-            self.mean,
-            self.target[one],
-        )
+        cross, square = self.cross[:, one], self.square[one]
+        return replace(self, cross=cross, square=square, target=self.target[one])
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,15 +139,7 @@ class Pool:
 
     def without(self, part: "Pool") -> "Pool":
         """Return the sums over the other runs."""
-        return Pool(
-            self.count - part.count,
-            self.total - part.total,
-            self.gram - part.gram,
-            self.cross - part.cross,
-            self.square - part.square,
-            self.between - part.between,
-            self.between_cross - part.between_cross,
-        )
+        return Pool(*(getattr(self, f.name) - getattr(part, f.name) for f in fields(self)))
 
     @property
     def spread(self) -> FloatArray:

@@ -226,6 +226,11 @@ class Layout:
     undecided: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
 
+    @cached_property
+    def ranges(self) -> dict[object, tuple[float, float]]:
+        """Ranges of signals over the runs that were already worked out."""
+        return {}
+
     def select(self, names: Sequence[str]) -> "Layout":
         """Return the same equations on some of the runs."""
         kept = set(names)

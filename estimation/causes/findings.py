@@ -50,11 +50,14 @@ class Probability:
         family: The family.
         share: Its probability.
         best: Its best candidate.
+        gain: Of that candidate, before the price of what was chosen: over the training runs, or
+            over all runs once the test runs are opened.
     """
 
     family: str
     share: float
     best: Scored
+    gain: float
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,9 @@ def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Pro
     for scored in ranked:
         best.setdefault(scored.candidate.cause.family, scored)
     shares = posterior(list(best.values()), numbers)
-    found = [Probability(f, float(p), best[f]) for f, p in zip(best, shares, strict=True)]
+    found = [
+        Probability(f, float(p), best[f], best[f].gain) for f, p in zip(best, shares, strict=True)
+    ]
     return sorted((p for p in found if p.share > 0.0), key=lambda p: -p.share)
 
 
@@ -88,7 +93,8 @@ def named(one: Kept, may_name: bool) -> Finding:
     """Return the claim of a cause, without its errors."""
     cause = one.scored.candidate.cause
     home = cause.place.home
-    lead, others = one.likely[0], _set_of(one.likely)
+    lead = one.likely[0]
+    others = others_in_set(lead.family, {p.family: p.share for p in one.likely})
     unknown = isinstance(lead.best.candidate.cause, Function)
     if not may_name:
         verdict = "something_missing"
@@ -108,10 +114,6 @@ def named(one: Kept, may_name: bool) -> Finding:
         else {},
         depends_on=_variables(lead.best.candidate),
         confidence=None if unknown or not may_name else round(lead.share, 4),
-        rmse_before=float("nan"),
-        rmse_after=float("nan"),
-        runs_improved=0,
-        runs_total=0,
     )
 
 
@@ -156,15 +158,18 @@ def parameters_of(kept: Kept, home: str, written: Sequence[Model]) -> Mapping[st
     }
 
 
-def _set_of(likely: Sequence[Probability]) -> list[str]:
-    """Return the families besides the first that a verdict lists."""
-    some, covered = sum(p.share for p in likely), likely[0].share
-    others: list[str] = []
-    for one in likely[1:]:
-        if covered >= (IN_SET if others else SURE) * some:
-            break
-        covered += one.share
-        others.append(one.family)
+def others_in_set(name: str, shares: Mapping[str, float]) -> list[str]:
+    """Return the names besides one that a verdict lists.
+
+    Args:
+        name: The name.
+        shares: Every name to its probability, the likeliest first.
+    """
+    covered, others = shares[name], list[str]()
+    for other, share in shares.items():
+        if other != name and covered < (IN_SET if others else SURE) * sum(shares.values()):
+            others.append(other)
+            covered += share
     return others
 
 

@@ -189,9 +189,12 @@ def _knots(
     """Return the knots of a variable, evenly over the range of its values."""
     if variable == "velocity_sign":
         return ()
-    inside = [variable_of(run, place, variable, place.home, width) for run in layout.runs]
-    low = min(float(np.percentile(x, 1)) for x in inside)
-    high = max(float(np.percentile(x, 99)) for x in inside)
+    key = (variable, _channel(layout.runs[0], place, variable, place.home), width)
+    if key not in layout.ranges:
+        inside = [variable_of(run, place, variable, place.home, width) for run in layout.runs]
+        ends = np.array([np.percentile(x, [1, 99]) for x in inside])
+        layout.ranges[key] = float(ends[:, 0].min()), float(ends[:, 1].max())
+    low, high = layout.ranges[key]
     return tuple(map(float, np.linspace(low, high if high > low else low + 1.0, count)))
 
 

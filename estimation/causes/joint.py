@@ -349,17 +349,20 @@ class Joint:
         part: Part,
         runs: NDArray[np.intp],
         base: FloatArray,
+        error: FloatArray,
         next_to: "Next | None" = None,
     ) -> FloatArray:
         """Return the error that is missing because less of the readings' noise is in a residual.
 
         A cause that stands in for a noisy reading, or follows its noise, removes that noise. The
-        error that it removes so is put back.
+        error that it removes so is put back. No residual has more noise than error, however noisy
+        a column is thought to be.
 
         Args:
             part: Of the regression.
             runs: Numbers of the runs, shape (n,).
             base: Parameters of the base, shape (n, causes, base).
+            error: Squared error of the residual, shape (n, causes).
             next_to: Causes next to the base.
 
         Returns:
@@ -381,7 +384,8 @@ class Joint:
             follows = (there[:, :, None] @ laid.noise[name][runs])[:, :, 0]
             itself = (amplitudes[:, :, None] @ laid.own_noise[name][runs])[:, :, 0]
             left = left + ((2.0 * follows + itself) * amplitudes).sum(axis=-1)
-        return np.asarray(np.maximum(((noise @ usual) @ usual)[:, None] - left, 0.0))
+        before = ((noise @ usual) @ usual)[:, None]
+        return np.asarray(np.maximum(before - np.minimum(left, error), 0.0))
 
     def whole(self, base: FloatArray) -> FloatArray:
         """Return amplitudes of the declared columns, with what was taken off those of causes.
@@ -431,8 +435,9 @@ class Joint:
             found = {p: np.zeros(len(self.runs)) for p in self.parts}
             for p in self.parts:
                 own = np.einsum("ri,rij,rj->r", vector, self.gram[p][fits.runs], vector)
-                avoided = self.avoided(p, fits.runs, base[:, None])[:, 0]
-                found[p][fits.runs] = np.maximum(own, 0.0) + avoided
+                own = np.maximum(own, 0.0)
+                avoided = self.avoided(p, fits.runs, base[:, None], own[:, None])[:, 0]
+                found[p][fits.runs] = own + avoided
             out.append(found)
         return out
 
@@ -449,8 +454,8 @@ class Joint:
         spreads: Sequence[Mapping[Part, float]],
         before: Sequence[Mapping[Part, FloatArray]],
         after: Sequence[Mapping[Part, FloatArray]],
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return scores of candidates, and those of each family of folds, (families, candidates).
+    ) -> FloatArray:
+        """Return the scores of candidates, shape (candidates,).
 
         The score of a part is the mean over families. A family counts by how well the base itself
         is known where it predicts, and at most what the family of single runs shows: where the base
@@ -461,7 +466,7 @@ class Joint:
             before: Errors of the base, of each family.
             after: Errors with the candidates.
         """
-        total, by_family = np.zeros(()), [np.zeros(()) for _ in spreads]
+        total = np.zeros(())
         for p in self.parts:
             ratios, trusts = [], []
             for spread, old, new in zip(spreads, before, after, strict=True):
@@ -471,8 +476,7 @@ class Joint:
                 trusts.append(whole / (whole + spread[p]))
             least = [t * np.minimum(r, ratios[0]) for t, r in zip(trusts, ratios, strict=True)]
             total = total + np.sum(least, axis=0) / sum(trusts)
-            by_family = [f + r for f, r in zip(by_family, ratios, strict=True)]
-        return np.asarray(total), np.array(by_family)
+        return np.asarray(total)
 
     def log_ratio(self, part: Part, before: FloatArray, after: FloatArray) -> FloatArray:
         """Return the weighted log ratio of mean squared errors of a part, above its floor."""

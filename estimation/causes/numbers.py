@@ -26,6 +26,9 @@ class Numbers:
         cause_cost: Further score that a cause costs.
         rare_cost: Further score that an unknown form costs, and acting in some of the runs only.
         kept_evidence: E-value on the test runs from which a cause is kept.
+        runs_a_test_run: One run in so many is a test run.
+        least_to_name: Training runs from which an effect is named: a sign test over one fewer
+            cannot reach 5 %.
     """
 
     samples_a_run: float = 40.0
@@ -38,6 +41,8 @@ class Numbers:
     cause_cost: float = 0.1
     rare_cost: float = 0.16
     kept_evidence: float = 20.0
+    runs_a_test_run: int = 3
+    least_to_name: int = 5
 
 
 DEFAULT = Numbers()

@@ -25,6 +25,31 @@ AMPLIFIED = ("_n_m", "_n", "_a")
 
 
 @dataclass(frozen=True)
+class Price:
+    """What was chosen with a candidate.
+
+    Attributes:
+        choices: Logarithm of the number of choices that it is one of.
+        rare: How many rare things it supposes: an unknown form, and that it changes over time or
+            acts in some of the runs only.
+        amplitudes: Score that the amplitudes but the first cost.
+    """
+
+    choices: float
+    rare: int
+    amplitudes: float
+
+    def score(self, numbers: Numbers) -> float:
+        """Return the score that these choices cost."""
+        return (
+            numbers.cause_cost
+            + numbers.rare_cost * self.rare
+            + numbers.choice_price * self.choices
+            + self.amplitudes
+        )
+
+
+@dataclass(frozen=True)
 class Scored:
     """A candidate with its score given a base.
 
@@ -32,7 +57,7 @@ class Scored:
         candidate: The candidate.
         score: Mean of the families of folds, less the price of what was chosen.
         gain: The same with the price left in.
-        by_family: Score of each family of folds.
+        price: What was chosen.
         amplitudes: Its amplitudes on all runs, in the scale of its columns.
         by_run: Products of its columns with the base's residual, with themselves and with the base,
             of each run.
@@ -41,7 +66,7 @@ class Scored:
     candidate: Candidate
     score: float
     gain: float
-    by_family: FloatArray
+    price: Price
     amplitudes: FloatArray
     by_run: tuple[FloatArray, FloatArray, FloatArray]
 
@@ -54,15 +79,15 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
         block = block_of(joint, group.laid, group.block)
         outcome = evaluate(joint, block, folds, group.precision)
         replaces = _in_readings(joint, group.candidates, outcome)
-        scores, by_family = joint.score(spreads, before, outcome.errors)
+        scores = joint.score(spreads, before, outcome.errors)
         for k, candidate in enumerate(group.candidates):
             amplitudes = outcome.amplitudes[k]
             if replaces[k] or _is_impossible(candidate, amplitudes):
                 continue
-            gain = float(scores[k])
-            score = gain - _price(candidate, joint)
+            gain, price = float(scores[k]), _price(candidate, joint)
+            score = gain - price.score(joint.numbers)
             by_run = outcome.cross[:, k], outcome.own[:, k], outcome.base[:, k]
-            out.append(Scored(candidate, score, gain, by_family[:, k], amplitudes, by_run))
+            out.append(Scored(candidate, score, gain, price, amplitudes, by_run))
     return out
 
 
@@ -142,27 +167,23 @@ def _is_impossible(candidate: Candidate, amplitudes: FloatArray) -> bool:
     return abs(total) < cause.least or (cause.is_bounded and total < 0.0)
 
 
-def _price(candidate: Candidate, joint: Joint) -> float:
-    """Return the price of what was chosen: the logarithm of how many choices there were.
+def _price(candidate: Candidate, joint: Joint) -> Price:
+    """Return what was chosen: the logarithm of how many choices there were, and what is rare.
 
     The prior probability of a cause is shared by all forms at all places, that of a form by the
     points of its grid, that of an unknown form by the sets of variables, and that of acting in some
     of the runs by all choices of them. Each amplitude but the first costs what a parameter costs in
     the Bayesian information criterion (Schwarz 1978).
     """
-    numbers = joint.numbers
     choices, cause = float(np.log(candidate.choices)), candidate.cause
-    samples = numbers.samples_a_run * len(joint.runs)
+    samples = joint.numbers.samples_a_run * len(joint.runs)
     more = 0 if isinstance(cause, Function) else len(cause.parts) - 1
     changes = isinstance(cause, Function) and "time" in cause.variables
     chosen = candidate.acts is not None and not candidate.given
-    rare = candidate.is_function + (changes or chosen)
     if candidate.acts is not None and chosen:
         count, acting = len(candidate.acts), sum(candidate.acts)
         choices += float(np.log(count + 1.0)) + sum(
             float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
         )
-    amplitudes = more * float(np.log(samples)) / samples
-    return (
-        numbers.cause_cost + numbers.rare_cost * rare + numbers.choice_price * choices + amplitudes
-    )
+    rare = int(candidate.is_function) + int(changes or chosen)
+    return Price(choices, rare, more * float(np.log(samples)) / samples)

@@ -380,6 +380,12 @@ def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:
 
 def _range(layout: Layout, channel: str) -> tuple[float, float]:
     """Return the range of a channel: of a speed or a clock from zero to its usual most."""
+    if channel not in layout.ranges:
+        layout.ranges[channel] = _worked_out_range(layout, channel)
+    return layout.ranges[channel]
+
+
+def _worked_out_range(layout: Layout, channel: str) -> tuple[float, float]:
     inside = [run.on_grid(channel) for run in layout.runs]
     if "velocity" in channel:
         return 0.0, float(np.median([np.percentile(np.abs(x), 95) for x in inside]))

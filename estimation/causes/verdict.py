@@ -33,7 +33,7 @@ from estimation.causes.search import Found, search
 from estimation.causes.unsteady import unsteady
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding
-from estimation.diagnosis.split import LEAST_TO_NAME, Sealed
+from estimation.diagnosis.split import Sealed
 from estimation.model import Model
 from estimation.recording import Recording
 
@@ -245,7 +245,7 @@ def _tested(
     """
     known = [p for p in one.likely if p.share >= LEAST_SHARE]
     count, train = len(held_out.layout.runs), len(held_out.layout.runs) - len(held_out.at)
-    gains, logs = np.array([(p.best.gain, 0.0) for p in known]).T
+    gains, logs = np.array([(p.gain, 0.0) for p in known]).T
     for k, p in enumerate(known):
         of_runs = held_out.gains(others, p.best.candidate)
         logs[k] = of_runs.log_ratio(0.5 * numbers.samples_a_run)
@@ -256,7 +256,10 @@ def _tested(
     prices = np.array([p.best.gain - p.best.score for p in known])
     weights = probabilities(gains - prices, gains, numbers.sharpness)
     found = sorted(
-        (replace(p, share=float(w)) for p, w in zip(known, weights, strict=True)),
+        (
+            replace(p, share=float(w), gain=float(g))
+            for p, w, g in zip(known, weights, gains, strict=True)
+        ),
         key=lambda p: -p.share,
     )
     return replace(one, scored=found[0].best, likely=found), total
@@ -297,8 +300,8 @@ def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> 
     found = audit(training)
     if not sealed.may_name:
         found.append(
-            f"{len(sealed.discover)} training runs: with fewer than {LEAST_TO_NAME} no effect is"
-            " named."
+            f"{len(sealed.discover)} training runs: with fewer than {DEFAULT.least_to_name} no"
+            " effect is named."
         )
     found += [f"Left out: {reason}" for reason in layout.left_out.values()]
     found += [

@@ -1,30 +1,41 @@
 """What changed between two campaigns of one machine, with intervals over runs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimation.causes.candidates import pool_of, skews, with_skews
-from estimation.causes.equations import lay_out
+from estimation.arm.balances import declared_arm
+from estimation.arm.shared import laid_out as with_shared_links
+from estimation.causes.candidates import (
+    Claim,
+    Group,
+    groups_of,
+    laid_out,
+    pool_of,
+    skews,
+    with_skews,
+)
+from estimation.causes.equations import Layout, lay_out
+from estimation.causes.folds import Folds, folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import Numbers
-from estimation.causes.scoring import Scored
-from estimation.causes.search import Ranking, hypothesis
+from estimation.causes.scoring import Scored, assessed, best_of_each
+from estimation.causes.search import Rank, Ranking, hypothesis
 from estimation.changes.candidates import claims
-from estimation.changes.difference import Difference
-from estimation.changes.predicted import ON, A, B, errors
-from estimation.changes.ranking import folds_of_one_campaign, in_one_alone
+from estimation.changes.difference import Difference, Predicted
 from estimation.changes.stated import prior_of_moved, shares, stated
+from estimation.diagnosis.split import SplitError, periods
 from estimation.errors import EstimationError
 from estimation.model import Model
-from estimation.recording import Recording
+from estimation.recording import FloatArray, Recording
 
-LEAST_RUNS = 4
-"""Runs of each campaign: of fewer, a change and a difference between runs are alike."""
+A, B, ON = "A:", "B:", "C:"
+"""What the names of the runs of each campaign begin with."""
 
 CHANGES = Numbers(
     sharpness=100.0, choice_price=0.002, cause_cost=0.02, between=1.0 / 40.0, form_floor=0.3**2
@@ -39,21 +50,22 @@ class ChangesError(EstimationError):
 
 
 def compare(
-    a: Sequence[Recording],
-    b: Sequence[Recording],
+    a: Iterable[Recording],
+    b: Iterable[Recording],
     models: Sequence[Model],
-    on: Sequence[Recording] = (),
+    on: Iterable[Recording] = (),
     seed: int = 0,
     numbers: Numbers = CHANGES,
 ) -> Difference:
     """Find what changed from one campaign of a machine to another.
 
     A change is what the runs of one campaign need and those of the other do not. What both need
-    alike, such as a friction of another form than the declared one, does not count.
+    alike, such as a friction of another form than the declared one, does not count. Nor have the
+    links of an arm changed, which all its joints share.
 
     Args:
-        a: Runs of the first campaign, four at least.
-        b: Runs of the second one, four at least.
+        a: Runs of the first campaign, four at least, or one path of so many periods.
+        b: The same of the second one.
         models: Declared equations.
         on: Runs of a third campaign, to predict.
         seed: Seed of the random choices of runs.
@@ -64,18 +76,15 @@ def compare(
         LayoutError: No equation can be written with the channels of both.
         FitError: A declared equation cannot be identified.
     """
-    for name, runs in (("first", a), ("second", b)):
-        if len(runs) < LEAST_RUNS:
-            raise ChangesError(
-                f"The {name} campaign has {len(runs)} run{'s' * (len(runs) != 1)}, too few to"
-                " compare.",
-                "A change is judged against the differences between runs of one campaign.",
-                f"Record {LEAST_RUNS} runs at least of each, or cut a long recording into runs:"
-                " lap_s under [data.runs] of the machine file.",
-            )
-    named = [*_named(a, A), *_named(b, B)]
-    train = [r.name for r in named]
-    layout = with_levels(lay_out(models, [*named, *_named(on, ON)], train), train, numbers)
+    first, second, third = (_named(*x) for x in ((a, A), (b, B), (on, ON)))
+    _check_number("first", first)
+    _check_number("second", second)
+    both = [*first, *second]
+    train, everything = [r.name for r in both], [*both, *third]
+    arm = declared_arm(models, both)
+    if arm is not None:
+        everything = with_shared_links(arm, everything, train)
+    layout = with_levels(lay_out(models, everything, train), train, numbers)
     add_instruments(layout, train)
     fitted = layout.select(train)
     is_b = [run.name.startswith(B) for run in fitted.runs]
@@ -84,41 +93,155 @@ def compare(
     joint = with_skews(plain, late)
     pool = pool_of(joint, claims(fitted, is_b))
     with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
-        ranking = Ranking(joint, pool, folds_of_one_campaign(fitted, is_b), in_one_alone(joint))
-        first = ranking.next_to([])
+        ranking = Ranking(joint, pool, _folds_of_one_campaign(fitted, is_b), _in_one_alone(joint))
+        best = ranking.next_to([])
         causes, ranked = list[Scored](), list[Sequence[Scored]]()
-        if first and first[0].score > 0.0:
-            causes, ranked = hypothesis(ranking, first[:1])
-    prior = prior_of_moved(pool, joint.numbers)
+        if best and best[0].score > 0.0:
+            causes, ranked = hypothesis(ranking, best[:1])
+    prior = prior_of_moved(pool, numbers)
     random = np.random.default_rng(seed)
     found = [
-        stated(one, shares(names, prior, joint.numbers), joint, causes, random)
+        stated(one, shares(names, prior, numbers), joint, causes, random)
         for one, names in zip(causes, ranked, strict=True)
     ]
     changes = {change.name: change for change in reversed(found)}
     return Difference(
         changes=tuple(reversed(changes.values())),
-        runs={"a": tuple(r.name for r in a), "b": tuple(r.name for r in b)},
-        predicted=errors(layout, late, causes) if on else {},
-        notes=tuple(_notes({r.name: _stratum(r) for r in named})),
+        runs={
+            name: tuple(r.name.removeprefix(mark) for r in runs)
+            for name, mark, runs in (("a", A, first), ("b", B, second))
+        },
+        predicted=_predicted(layout, late, causes) if third else {},
+        notes=_notes(first, second),
         seed=seed,
     )
 
 
-def _named(recordings: Sequence[Recording], prefix: str) -> list[Recording]:
-    return [replace(r, name=f"{prefix}{r.name}") for r in recordings]
+def _named(recordings: Iterable[Recording], mark: str) -> list[Recording]:
+    """Return the runs of a campaign with its mark; one path that repeats itself, in periods."""
+    runs = list(recordings)
+    if len(runs) == 1:
+        with suppress(SplitError):  # one run, and no path of several periods
+            runs = periods(runs[0])
+    return [replace(r, name=f"{mark}{r.name}") for r in runs]
 
 
-def _stratum(recording: Recording) -> str:
-    return repr(sorted((k, str(v)) for k, v in recording.conditions.items()))
+def _check_number(campaign: str, runs: Sequence[Recording], least: int = 4) -> None:
+    """Refuse fewer runs: of these, a change and a difference between runs are alike."""
+    if len(runs) < least:
+        raise ChangesError(
+            f"The {campaign} campaign has {len(runs)} run{'s' * (len(runs) != 1)}, too few to"
+            " compare.",
+            "A change is judged against the differences between runs of one campaign.",
+            f"Record {least} runs at least of each, or cut a long recording into runs:"
+            " lap_s under [data.runs] of the machine file.",
+        )
 
 
-def _notes(conditions: Mapping[str, str]) -> list[str]:
-    of_a = {v for k, v in conditions.items() if k.startswith(A)}
-    of_b = {v for k, v in conditions.items() if k.startswith(B)}
-    if of_a == of_b:
-        return []
-    return [
-        "The two campaigns were not recorded under the same conditions: what the declared model"
-        " lacks under a condition that only one of them has can appear as a change."
+def _notes(first: Sequence[Recording], second: Sequence[Recording]) -> tuple[str, ...]:
+    conditions = [
+        {repr(sorted((k, str(v)) for k, v in r.conditions.items())) for r in runs}
+        for runs in (first, second)
     ]
+    if conditions[0] == conditions[1]:
+        return ()
+    return (
+        "The two campaigns were not recorded under the same conditions: what the declared model"
+        " lacks under a condition that only one of them has can appear as a change.",
+    )
+
+
+def _folds_of_one_campaign(layout: Layout, is_b: Sequence[bool]) -> list[list[list[int]]]:
+    """Return families of folds that omit runs of one campaign at a time.
+
+    What the declared model lacks at a level is learnt from the other campaign's runs there.
+    """
+    return [
+        [
+            of_one
+            for fold in family
+            for side in (True, False)
+            if (of_one := [run for run in fold if is_b[run] == side])
+        ]
+        for family in folds_of(layout)
+    ]
+
+
+def _in_one_alone(plain: Joint, reach: float = 7.0) -> Rank:
+    """Return the ranking of changes that the campaigns do not share, next to others found.
+
+    Args:
+        plain: The regression without changes.
+        reach: Log odds below the best change from which another one is not tried.
+    """
+
+    def ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
+        found: list[Scored] = []
+        least = _form_of_others(plain, joint, folds)
+        for one in best_of_each(assessed(joint, pool, folds)):
+            far = bool(found) and one.score < found[0].score - reach / joint.numbers.sharpness
+            if one.score < 0.0 or far:
+                break
+            if one.gain > least and _differs(one, joint, folds):
+                found.append(one)
+        return found
+
+    return ranked
+
+
+def _form_of_others(plain: Joint, joint: Joint, folds: Folds) -> float:
+    """Return the gain that the inexact forms of the changes found may have missed.
+
+    Their forms deviate from the catalogue's by a share: the square of it, of the error that they
+    remove, does not count as another change.
+    """
+    spreads = [plain.extrapolated(family) for family in folds]
+    removed = plain.score(spreads, plain.base_errors(folds), joint.base_errors(folds))[0]
+    left = joint.numbers.bend_share**2 * float(np.expm1(max(0.0, float(removed))))
+    return float(-np.log1p(-left)) if left < 1.0 else float("inf")
+
+
+def _differs(one: Scored, joint: Joint, folds: Folds) -> bool:
+    """Whether a change is worth its price where the same cause acts in both campaigns as well."""
+    shared = laid_out(joint, Claim(one.candidate.cause))
+    if shared is None:  # a declared column
+        return True
+    both = joint.with_cause(shared.laid, shared.precision)
+    changed = replace(Claim(one.candidate.cause), acts=one.candidate.acts, given=True)
+    again = assessed(both, groups_of(both, [changed]), folds)
+    return bool(again) and again[0].gain > one.gain - one.score
+
+
+def _predicted(
+    layout: Layout, late: Sequence[Claim], causes: Sequence[Scored]
+) -> dict[str, Predicted]:
+    """Return the errors on the third campaign's runs, by four models."""
+    names = [run.name for run in layout.runs]
+    of = {mark: np.array([float(n.startswith(mark)) for n in names]) for mark in (A, B, ON)}
+    plain = with_skews(Joint(layout), late)
+    errors = [_rms(plain, plain.fitted_on(of[side]), of[ON]) for side in (A, B)]
+    for taken_as in (A, B):
+        grown = plain
+        for one in causes:
+            later = bool((one.candidate.acts or ())[-1])
+            own = {A: not later, B: later, ON: (taken_as == B) == later}
+            acts = tuple(own[name[:2]] for name in names)
+            laid = laid_out(plain, replace(Claim(one.candidate.cause), acts=acts, given=True))
+            if laid is not None:
+                grown = grown.with_cause(laid.laid, laid.precision)
+        errors.append(_rms(grown, grown.fitted_on(of[A] + of[B]), of[ON]))
+    return {
+        name: Predicted(*(found[name] for found in errors), unit=equation.model.unit)
+        for name, equation in layout.equations.items()
+    }
+
+
+def _rms(joint: Joint, base: FloatArray, counts: FloatArray) -> dict[str, float]:
+    """Return the root mean square error of each equation within some runs."""
+    vector = np.append(base, -1.0)
+    out = {}
+    for name in joint.layout.equations:
+        p = (name, "within")
+        squared = np.einsum("i,rij,j->r", vector, joint.gram[p], vector)
+        out[name] = float(np.sqrt(max(squared @ counts, 0.0) / (joint.samples[p] @ counts)))
+    return out

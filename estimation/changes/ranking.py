@@ -59,7 +59,7 @@ def _form_of_others(plain: Joint, joint: Joint, folds: Folds) -> float:
     remove, does not count as another change.
     """
     spreads = [plain.extrapolated(family) for family in folds]
-    removed = plain.score(spreads, plain.base_errors(folds), joint.base_errors(folds))[0]
+    removed = plain.score(spreads, plain.base_errors(folds), joint.base_errors(folds))
     left = joint.numbers.bend_share**2 * float(np.expm1(max(0.0, float(removed))))
     return float(-np.log1p(-left)) if left < 1.0 else float("inf")
 

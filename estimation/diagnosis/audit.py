@@ -12,42 +12,28 @@ import numpy as np
 
 from estimation.recording import Recording, shared_columns
 
-STEADY = 1e-3
-"""A condition that varies by less than this share of its size is held."""
-
-SKIP = 1.5
-"""A step of the clock longer than so many periods is a gap."""
-
-LONGEST_S = 0.05
-"""A gap of this length may hide a reversal; a lost sample or two may not."""
-
 
 @dataclass(frozen=True)
-class Gap:
-    """One step of a clock that is longer than a period.
+class _Gap:
+    """A step of a clock that is longer than a period: time of its begin, length, and if it jumps.
 
-    Attributes:
-        at_s: Where it begins, as the run's clock has it.
-        length_s: How long it is.
-        jump: Whether it is long, and no sample at its ends is flagged.
+    It jumps where it is long enough to hide a reversal and no sample at its ends is flagged.
     """
 
     at_s: float
     length_s: float
-    jump: bool
+    jumps: bool
 
 
-def gaps(recording: Recording) -> list[Gap]:
+def _gaps(recording: Recording, long_s: float = 0.05) -> list[_Gap]:
     """Return the gaps of a run's clock, in order."""
     steps = np.diff(recording.time_s)
-    if steps.size == 0:
-        return []
-    usual = float(np.median(steps))
+    usual = float(np.median(steps)) if steps.size else 0.0
     flagged = recording.flags != 0
-    jumps = ~(flagged[:-1] | flagged[1:]) & (steps > usual + LONGEST_S)
+    jumps = ~(flagged[:-1] | flagged[1:]) & (steps > usual + long_s)
     return [
-        Gap(float(recording.time_s[k]), float(steps[k]), bool(jumps[k]))
-        for k in np.flatnonzero(steps > SKIP * usual)
+        _Gap(float(recording.time_s[k]), float(steps[k]), bool(jumps[k]))
+        for k in np.flatnonzero(steps > 1.5 * usual)
     ]
 
 
@@ -55,49 +41,38 @@ def steady(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]
     """Return the runs whose clock does not jump, and a sentence on each other run."""
     kept, lost = [], []
     for recording in recordings:
-        jumps = [gap for gap in gaps(recording) if gap.jump]
+        jumps = [gap for gap in _gaps(recording) if gap.jumps]
         if not jumps:
             kept.append(recording)
             continue
-        first = jumps[0]
         more = "" if len(jumps) == 1 else f", and at {len(jumps) - 1} more places"
         lost.append(
-            f"Run {recording.name} is left out: its clock jumps by {first.length_s:.3g} s at"
-            f" {first.at_s:.3f} s{more}, and the motion meanwhile is not known."
+            f"Run {recording.name} is left out: its clock jumps by {jumps[0].length_s:.3g} s at"
+            f" {jumps[0].at_s:.3f} s{more}, and the motion meanwhile is not known."
         )
     return kept, lost
 
 
-def skips(recordings: Sequence[Recording]) -> list[str]:
-    """Return the limits that the gaps of used runs set, one sentence a run."""
+def audit(recordings: Sequence[Recording]) -> list[str]:
+    """Return the limits that the clocks and the conditions of used runs set, one sentence each."""
     said = []
     for recording in recordings:
-        found = gaps(recording)
-        if found:
+        if found := _gaps(recording):
             longest = max(found, key=lambda gap: gap.length_s)
             said.append(
                 f"The clock of run {recording.name} skips {len(found)} times, the longest by"
                 f" {longest.length_s:.3g} s at {longest.at_s - recording.time_s[0]:.3g} s:"
                 " an effect of time or history is not decided across it."
             )
-    return said
+    return said + [line for name in shared_columns(recordings) if (line := _held(name, recordings))]
 
 
-def audit(recordings: Sequence[Recording]) -> list[str]:
-    """Return the limits of the recordings, one sentence each."""
-    return [*skips(recordings), *_excitation(recordings)]
-
-
-def _excitation(recordings: Sequence[Recording]) -> list[str]:
-    said = []
-    shared = shared_columns(recordings)
-    for name in shared:
-        spans = [float(np.ptp(r[name])) for r in recordings]
-        if not np.isfinite(spans).all():
-            continue
-        size = max(float(np.max(np.abs(r[name]))) for r in recordings)
-        if max(spans) <= STEADY * size:
-            levels = {round(float(np.mean(r[name])) / max(size, 1e-300), 3) for r in recordings}
-            held = "never varies" if len(levels) == 1 else "is held within each run"
-            said.append(f"{name} {held}: an effect that depends on it is not decided within a run.")
-    return said
+def _held(name: str, recordings: Sequence[Recording], steady: float = 1e-3) -> str:
+    """Return a sentence on a channel that varies in no run by more than a share of its size."""
+    spans = [float(np.ptp(r[name])) for r in recordings]
+    size = max(float(np.max(np.abs(r[name]))) for r in recordings)
+    if not np.isfinite(spans).all() or max(spans) > steady * size:
+        return ""
+    levels = {round(float(np.mean(r[name])) / max(size, 1e-300), 3) for r in recordings}
+    held = "never varies" if len(levels) == 1 else "is held within each run"
+    return f"{name} {held}: an effect that depends on it is not decided within a run."

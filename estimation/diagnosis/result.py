@@ -9,8 +9,6 @@ from estimation.diagnosis.split import Sealed
 
 SCHEMA = "rig.diagnosis/1"
 
-UNKNOWN = "unknown"
-
 VERDICTS = ("identified", "one_of", "depends_on", "something_missing", "nothing_missing")
 """From the strongest claim to none; the verdict of a diagnosis is its weakest finding's."""
 
@@ -43,9 +41,9 @@ class Value:
     ci95: tuple[float, float] | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Finding:
-    """One cause.
+    """One cause; its fields are those of the JSON, in their order.
 
     Attributes:
         balance: Equation it is reported under.
@@ -66,20 +64,20 @@ class Finding:
     """
 
     balance: str
+    also_in: tuple[str, ...] = ()
+    place: str = ""
     family: str
     verdict: str
-    rmse_before: float
-    rmse_after: float
-    runs_improved: int
-    runs_total: int
-    runs_affected: tuple[str, ...] = ()
     alternatives: tuple[str, ...] = ()
+    probabilities: Mapping[str, float] = field(default_factory=dict)
     depends_on: tuple[str, ...] = ()
     confidence: float | None = None
     parameters: Mapping[str, Value] = field(default_factory=dict)
-    also_in: tuple[str, ...] = ()
-    place: str = ""
-    probabilities: Mapping[str, float] = field(default_factory=dict)
+    rmse_before: float = math.nan
+    rmse_after: float = math.nan
+    runs_improved: int = 0
+    runs_total: int = 0
+    runs_affected: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,32 +170,13 @@ class Diagnosis:
         return plain
 
 
-ORDER = [
-    "balance",
-    "also_in",
-    "place",
-    "family",
-    "verdict",
-    "alternatives",
-    "probabilities",
-    "depends_on",
-    "confidence",
-    "parameters",
-    "rmse_before",
-    "rmse_after",
-    "runs_improved",
-    "runs_total",
-    "runs_affected",
-]
-
-
 def _finding(finding: Finding) -> dict[str, Any]:
     fields = asdict(finding)
     for known in fields["parameters"].values():
         # an interval with an end that is not known is none
         if known["ci95"] is not None and not all(map(math.isfinite, known["ci95"])):
             known["ci95"] = None
-    return {name: fields[name] for name in ORDER}
+    return fields
 
 
 def _plain(value: Any) -> Any:

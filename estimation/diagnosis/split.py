@@ -1,25 +1,26 @@
-"""Splitting runs once into training runs and held-out test runs.
+"""Splitting runs once into training runs and held-out test runs, before anything is fitted.
 
-The test runs are chosen before anything is fitted, by a seed, stratified over the conditions: runs
-are sorted by what was held constant and one run of every stratum of neighbours becomes a test run,
-but not the last one of the least or greatest load, speed or other condition.
+The test runs are chosen by a seed, stratified over the conditions: runs are sorted by what was held
+constant and one run of every stratum of neighbours becomes a test run, but not the last one of the
+least or greatest load, speed or other condition.
+
+Of few recordings, pieces stand for runs. Of two paths that repeat themselves, the periods of one
+train and those of the other test. Other recordings of too small a number are cut into equal parts.
 """
 
 import hashlib
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation.campaign import Campaign
+from estimation.causes.numbers import DEFAULT
 from estimation.errors import EstimationError
-from estimation.recording import Recording
+from estimation.recording import FloatArray, Recording
 
-SHARE = 3
-"""One run in this many is a test run."""
-
-LEAST_TO_NAME = 5
-"""With fewer training runs no effect is named: a sign test over four runs cannot reach 5 %."""
+PERIOD, PART = ", period ", ", part "
 
 
 class SplitError(EstimationError):
@@ -47,7 +48,7 @@ class Sealed:
     @property
     def may_name(self) -> bool:
         """Whether there are enough training runs to name an effect."""
-        return len(self.discover) >= LEAST_TO_NAME
+        return len(self.discover) >= DEFAULT.least_to_name
 
     def without(self, names: Collection[str]) -> "Sealed":
         """Return the split without runs that cannot be used; the seal is of all.
@@ -86,26 +87,176 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
     Raises:
         SplitError: Fewer than three runs, or runs of different rigs or instruments.
     """
-    check_one_rig(recordings)
-    if len(recordings) < SHARE:
+    _check_one_rig(recordings)
+    share = DEFAULT.runs_a_test_run
+    if len(recordings) < share:
         raise SplitError(
             f"{len(recordings)} runs are too few to diagnose.",
             "Some runs must find an effect, and others, held out, confirm it.",
-            f"Record {SHARE} runs at least; to name an effect, eight.",
+            f"Record {share} runs at least; to name an effect, eight.",
         )
     new = [recording for recording in recordings if recording.name not in seen]
-    ordered = sorted(new if len(new) >= SHARE else recordings, key=_place)
+    ordered = sorted(new if len(new) >= share else recordings, key=_place)
     random = np.random.default_rng(seed)
     confirm: set[str] = set()
-    for start in range(0, len(ordered) - SHARE + 1, SHARE):
-        stratum = [ordered[start + int(k)].name for k in random.permutation(SHARE)]
+    for start in range(0, len(ordered) - share + 1, share):
+        stratum = [ordered[start + int(k)].name for k in random.permutation(share)]
         inside = (n for n in stratum if _spans_all(recordings, {*confirm, n}))
         confirm.add(next(inside, stratum[0]))
-    names = [recording.name for recording in recordings]
-    data = data_hash(recordings)
-    kept = tuple(n for n in names if n not in confirm)
-    held = tuple(n for n in names if n in confirm)
-    return Sealed(kept, held, seed, data, seal(data, kept, held))
+    return _sealed(recordings, [recording.name for recording in recordings], confirm, seed)
+
+
+def cut_and_split(
+    recordings: Sequence[Recording],
+    seed: int = 0,
+    seen: Collection[str] = (),
+    parts: int = 10,
+    shortest_part_s: float = 2.0,
+) -> tuple[list[Recording], Sealed]:
+    """Choose the test runs; few recordings are cut into pieces that stand for runs.
+
+    Args:
+        recordings: Any number.
+        seed: Seed of the choice.
+        seen: Names of recordings that an earlier diagnosis held; of two paths the new one tests.
+        parts: Parts that few recordings are cut into.
+        shortest_part_s: The shortest part.
+
+    Returns:
+        The runs or pieces, and their split.
+
+    Raises:
+        SplitError: The recordings are of different rigs or instruments; or one of two does not
+            repeat itself; or they are too few, and too short to be cut.
+    """
+    number = len(recordings)
+    if number == 2:
+        return _split_paths(recordings, seed, seen)
+    each = math.ceil(parts / max(1, number))
+    longest = min((float(np.ptp(r.time_s)) for r in recordings), default=0.0)
+    enough = number - number // DEFAULT.runs_a_test_run >= DEFAULT.least_to_name
+    if enough or longest < each * shortest_part_s:
+        return [*recordings], split(recordings, seed, seen)
+    _check_one_rig(recordings)
+    pieces = [
+        piece
+        for recording in recordings
+        for piece in _pieces(recording, np.array_split(np.arange(len(recording)), each), PART)
+    ]
+    known = {piece.name for piece in pieces if path_of(piece.name) in seen}
+    return pieces, split(pieces, seed, known)
+
+
+def _split_paths(
+    paths: Sequence[Recording], seed: int, seen: Collection[str]
+) -> tuple[list[Recording], Sealed]:
+    """Cut two paths into whole periods and choose which path tests."""
+    _check_one_rig(paths)
+    new = [k for k, path in enumerate(paths) if path.name not in seen]
+    tests = new[0] if len(new) == 1 else int(np.random.default_rng(seed).integers(len(paths)))
+    pieces = [piece for path in paths for piece in periods(path)]
+    names = [piece.name for piece in pieces]
+    held = {name for name in names if path_of(name) == paths[tests].name}
+    return pieces, _sealed(paths, names, held, seed)
+
+
+def path_of(name: str) -> str:
+    """Return the name of the recording a piece was cut from; of a run its own name."""
+    return name.rpartition(PERIOD)[0] or name.rpartition(PART)[0] or name
+
+
+def claim(sealed: Sealed) -> str | None:
+    """Return the limit of the evidence of pieces, in words; None where whole runs were split."""
+    names = (*sealed.discover, *sealed.confirm)
+    whole = {path_of(name) for name in names}
+    if whole == {*names}:
+        return None
+    if any(PART in name for name in names):
+        return (
+            f"Only {len(whole)} recording{'s' * (len(whole) > 1)}, cut into {len(names)} parts that"
+            f" stand for runs: {len(sealed.discover)} trained and {len(sealed.confirm)} tested."
+            " Parts of one recording are less apart than runs."
+        )
+    return (
+        f"Two recorded paths only: {path_of(sealed.discover[0])} trained, cross-validated by its"
+        f" {len(sealed.discover)} periods, and {path_of(sealed.confirm[0])} tested."
+        " Periods of one path are less apart than runs: the claim holds for these two paths."
+    )
+
+
+def periods(path: Recording) -> list[Recording]:
+    """Cut a path into its whole periods; a rest of half a period and more at its end counts too.
+
+    Raises:
+        SplitError: It does not repeat itself.
+    """
+    length = period_samples(path)
+    starts = range(0, len(path) - length // 2, length)
+    return _pieces(path, (np.arange(k, min(k + length, len(path))) for k in starts), PERIOD)
+
+
+def period_samples(
+    path: Recording, repeats: int = 3, shortest_s: float = 1.0, alike: float = 0.7
+) -> int:
+    """Return the length of a path's period: where its positions are most like themselves.
+
+    Args:
+        path: The path.
+        repeats: Periods that it must have.
+        shortest_s: Shortest period.
+        alike: Least correlation of the path with itself one period later.
+
+    Raises:
+        SplitError: It does not repeat itself so many times.
+    """
+    angles = [
+        values
+        for name, values in path.columns.items()
+        if ("angle" in name or "position" in name) and np.ptp(values) > 0
+    ]
+    shortest, longest = round(shortest_s * path.sample_rate_hz), len(path) // repeats
+    likeness = np.mean([_likeness(x)[: longest + 1] for x in angles] or [[0.0]], axis=0)
+    # what is near lag zero is alike because nothing has moved yet
+    apart = int(np.argmax(likeness < 0.5)) if (likeness < 0.5).any() else len(likeness)
+    likeness[: max(apart, shortest)] = -1.0
+    # two periods are as alike as one: the shortest lag about as good as the best
+    near = np.flatnonzero(likeness >= likeness.max() - 0.02)
+    first = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)[0]
+    best = int(first[np.argmax(likeness[first])])
+    if likeness[best] < alike:
+        raise SplitError(
+            f"Path {path.name!r} does not repeat itself {repeats} times.",
+            "With two recordings only, whole periods of one stand for runs, and there are none.",
+            "Record three runs at least, or paths of several periods.",
+        )
+    return best
+
+
+def _likeness(x: FloatArray) -> FloatArray:
+    """Return the correlation of a signal with itself at every lag, shape (n,)."""
+    n = len(x)
+    centred = x - x.mean()
+    sums = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * n)) ** 2)[:n]
+    whole = np.concatenate([[0.0], np.cumsum(centred**2)])
+    lags = np.arange(n)
+    early, late = whole[n - lags], whole[n] - whole[lags]
+    return np.asarray(sums / np.maximum(np.sqrt(early * late), np.finfo(float).tiny))
+
+
+def _pieces(path: Recording, places: Iterable[NDArray[np.intp]], mark: str) -> list[Recording]:
+    return [
+        replace(path.at(part), name=f"{path.name}{mark}{number}")
+        for number, part in enumerate(places, start=1)
+    ]
+
+
+def _place(recording: Recording) -> tuple[tuple[str, int, float, str], ...]:
+    """Return where a run sorts among the others: by its conditions, then by its name."""
+    keys: list[tuple[str, int, float, str]] = []
+    for name, value in sorted(recording.conditions.items()):
+        numeric = isinstance(value, int | float)
+        keys.append((name, int(not numeric), float(value) if numeric else 0.0, str(value)))
+    return (*keys, ("~name", 0, 0.0, recording.name))
 
 
 def _spans_all(recordings: Sequence[Recording], held: Collection[str]) -> bool:
@@ -122,9 +273,14 @@ def _ranges(recordings: Sequence[Recording]) -> dict[str, tuple[float, float]]:
     return {name: (min(values), max(values)) for name, values in found.items()}
 
 
-def seal(data: str, discover: Sequence[str], confirm: Sequence[str]) -> str:
-    """Return SHA-256 over the data's hash and both lists."""
-    return _hash(data, *discover, "|", *confirm)
+def _sealed(
+    recordings: Sequence[Recording], names: Sequence[str], held: Collection[str], seed: int
+) -> Sealed:
+    """Return the split of runs, or of pieces of recordings, by the names of those held out."""
+    discover = tuple(n for n in names if n not in held)
+    confirm = tuple(n for n in names if n in held)
+    data = data_hash(recordings)
+    return Sealed(discover, confirm, seed, data, _hash(data, *discover, "|", *confirm))
 
 
 def data_hash(recordings: Sequence[Recording]) -> str:
@@ -143,25 +299,11 @@ def samples_hash(recording: Recording) -> str:
     return digest.hexdigest()
 
 
-def evidence(campaign: Campaign) -> list[Recording]:
-    """Read the runs that are not excluded into memory."""
-    return list(campaign.evidence)
-
-
 def _hash(*parts: str) -> str:
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
-def _place(recording: Recording) -> tuple[tuple[str, int, float, str], ...]:
-    """Return where a run sorts among the others: by its conditions, then by its name."""
-    keys: list[tuple[str, int, float, str]] = []
-    for name, value in sorted(recording.conditions.items()):
-        numeric = isinstance(value, int | float)
-        keys.append((name, int(not numeric), float(value) if numeric else 0.0, str(value)))
-    return (*keys, ("~name", 0, 0.0, recording.name))
-
-
-def check_one_rig(recordings: Sequence[Recording]) -> None:
+def _check_one_rig(recordings: Sequence[Recording]) -> None:
     """Raise when the runs come from different rigs or instruments."""
     for what, found in (
         ("rigs", {r.rig for r in recordings}),

@@ -1,4 +1,4 @@
-"""Physical effects, one file each: of this folder, or of other packages by entry point."""
+"""Physical effects, a file each with its functional forms, or of other packages by entry point."""
 
 import difflib
 import importlib

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numba
 import numpy as np
 
-from estimation.effects.effect import Parameter, Remembering
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Remembering, Row, Shape
 from estimation.recording import FloatArray
 
 
@@ -41,3 +41,70 @@ class FrictionStep(Remembering):
     walk = _walk
     rest = (0.0, 0.0)
     told_apart_by = "the run repeated twice as long"
+
+
+class CampaignFrictionStep(Pointwise):
+    """A part that is worn, repaired or exchanged in the course of a campaign.
+
+    Equation: torque = F tanh(speed / width) for t >= since, t from the campaign's start. F in N m,
+    width in rad/s, since in s. A change of an offset is excluded, since each run has an offset of
+    its own.
+
+    Check: compare the maintenance notes with the time of the change, and repeat the first run.
+
+    Source: Page 1955 (a change of a parameter at an unknown point).
+    """
+
+    id = "change.step.campaign"
+    family = "change.step"
+    balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
+    roles: ClassVar = {"speed": "motor_velocity_rad_s", "campaign_clock": "campaign_time_s"}
+    amplitudes = (Parameter("friction", "target", "loss after the change minus before"),)
+    shape = (
+        Parameter("since", "campaign_clock", "time of the change", 20.0, 2e4, points=20),
+        Parameter("width", "speed", "speed at which the tanh reaches 76 %", 0.1, 10.0, points=2),
+    )
+    told_apart_by = "the first run repeated at the end"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        after = np.where(inputs["campaign_clock"] >= shape[0], 1.0, 0.0)
+        return (after * np.tanh(inputs["speed"] / shape[1]),)
+
+
+@numba.njit(cache=True)
+def _walk_offset(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
+    """Fill the rows; state: started (0 or 1), the time of the first."""
+    for i in range(len(now)):
+        if not state[0]:
+            state[0], state[1] = 1.0, now[i, 0]
+        rows[i, 0] = 1.0 if now[i, 0] - state[1] >= shape[0] else 0.0
+
+
+class OffsetStep(Remembering):
+    """A cable that jumps out of its groove, a screw that slips, or a sensor that was knocked.
+
+    Equation: torque = b for t >= since, t from the run's start. b in N m, since in s.
+
+    Check: read the unloaded sensor before and after the run, and inspect cable and sensor mount.
+
+    Source: Page 1955 (a change of a parameter at an unknown point).
+    """
+
+    id = "change.step.offset"
+    family = "change.step"
+    balances: ClassVar = {
+        "motor": 1,
+        "gearbox": 1,
+        "cable": 1,
+        "stretch": 1,
+        "grasp": 1,
+        "pitch": 1,
+        "yaw": 1,
+        "joint": 1,
+    }
+    roles: ClassVar = {"clock": "time_s"}
+    amplitudes = (Parameter("offset", "target", "level after the change minus before"),)
+    shape = (Parameter("since", "clock", "time of the change in its run", 0.5, 60.0, points=33),)
+    walk = _walk_offset
+    rest = (0.0, 0.0)
+    told_apart_by = "the unloaded sensor before and after, and the run repeated twice as long"

@@ -1,11 +1,11 @@
 """Eccentricity: a lever arm that varies over a turn, so that the load causes a periodic torque."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Parameters, Pointwise, Row, Shape
+from estimation.effects.ripple_output import OutputHarmonics, harmonics, harmonics_in
 
 
 class EccentricLoad(Pointwise):
@@ -22,14 +22,52 @@ class EccentricLoad(Pointwise):
     id = "eccentric.load"
     balances: ClassVar = {"motor": -1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": -1}
     roles: ClassVar = {"output_angle": "spindle_angle_rad", "load": "motor_load_n_m"}
-    amplitudes: ClassVar[tuple[Parameter, ...]] = (
+    amplitudes: ClassVar[Parameters] = (
         Parameter("sine", "target / load", "eccentricity along one axis, of the lever arm"),
         Parameter("cosine", "target / load", "eccentricity along the other"),
     )
     shape = (Parameter("order", "1", "periods per turn", 0.5, 16.5, linear=True, points=33),)
     told_apart_by = "the same sweep against two loads"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return sine and cosine, times the load."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         phase = shape[0] * inputs["output_angle"]
         return inputs["load"] * np.sin(phase), inputs["load"] * np.cos(phase)
+
+
+class EccentricHarmonics(EccentricLoad):
+    """A pulley or a gear whose lever arm varies over a turn, not as a pure sine.
+
+    Equation: torque = load sum over n = 1, 2, 3 of (a_n sin(n order angle) + b_n cos(n order
+    angle)), load in N m, angle in rad, a_n and b_n without unit, order in periods per turn.
+
+    Check: measure the runout of pulleys and gears with a dial gauge.
+
+    Source: the moment of a force about an axis: a lever arm r(angle) in place of r.
+    """
+
+    id = "eccentric.load.harmonics"
+    amplitudes = harmonics_in("target / load")
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        return [inputs["load"] * x for x in harmonics(shape[0] * inputs["output_angle"])]
+
+
+class EccentricPulley(OutputHarmonics):
+    """A pulley or a gear that is not round: it moves its output and changes its own lever arm.
+
+    Equation: travel = A(angle) = sum over n = 1, 2, 3 of a_n sin(n order angle) + b_n cos(n order
+    angle), a_n and b_n in the target's unit (rad), angle in rad, order in periods per turn. The
+    torque of the load behind it changes by load dA/dangle: neither takes energy from the motion. A
+    ripple of an encoder has the travel alone.
+
+    Check: measure the runout of pulleys and gears with a dial gauge.
+
+    Source: the principle of virtual work; Goldstein, "Classical Mechanics", section 1.4.
+    """
+
+    id = "eccentric.load.pulley"
+    family = "eccentric.load"
+    balances: ClassVar = {"gearbox": 1, "stretch": 1}
+    amplitudes = harmonics_in("target")
+    shape = (Parameter("order", "1", "periods per turn", 0.5, 16.5, linear=True, points=33),)
+    told_apart_by = "the same sweep against two loads"

@@ -15,6 +15,13 @@ import numpy as np
 
 from estimation.recording import FloatArray
 
+Inputs = Mapping[str, Any]
+"""Role to one value or to an array of shape (n,)."""
+Shape = Sequence[float]
+"""Values of the shape parameters, in order."""
+Row = Sequence[Any]
+"""One value or one array of shape (n,) for each amplitude."""
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
@@ -47,6 +54,9 @@ class Parameter:
         return np.geomspace(self.lower, self.upper, self.points)
 
 
+Parameters = tuple[Parameter, ...]
+"""Parameters of an effect; a class annotates them so where a form of it has another number."""
+
 LOSS: Mapping[str, int] = {
     "motor": -1,
     "gearbox": -1,
@@ -70,8 +80,8 @@ class Effect(ABC):
     Attributes:
         id: Name of the effect, unique in the catalogue, such as `friction.coulomb`.
         family: Name that a diagnosis reports; the id by default. Several functional forms of one
-            physical effect share a family, and the id of a form is its family with one more word
-            (`hysteresis.presliding.lugre`).
+            physical effect are in one file and share a family. The id of a form is its family with
+            one more word (`hysteresis.presliding.lugre`); a subclass of an effect is a form of it.
         balances: Equations that a search may add it to, and its side there: 1 adds to the target,
             -1 subtracts from it, so that a bound on an amplitude has the same meaning in all of
             them. `joint` stands for every `joint.N`. Empty for an effect that is only declared,
@@ -87,14 +97,14 @@ class Effect(ABC):
     family: ClassVar[str]
     balances: ClassVar[Mapping[str, int]] = {}
     roles: ClassVar[Mapping[str, str]]
-    amplitudes: ClassVar[tuple[Parameter, ...]]
-    shape: ClassVar[tuple[Parameter, ...]] = ()
+    amplitudes: ClassVar[Parameters]
+    shape: ClassVar[Parameters] = ()
     told_apart_by: ClassVar[str] = ""
     at_rest: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
-        """Set the family to the id by default."""
-        if "id" in vars(cls) and "family" not in vars(cls):
+        """Set the family to the id, unless it is a form of another effect."""
+        if "id" in vars(cls) and not hasattr(cls, "family"):
             cls.family = cls.id
 
     @abstractmethod
@@ -133,7 +143,7 @@ class Pointwise(Effect):
     """
 
     @abstractmethod
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array of shape (n,) for each amplitude."""
 
     def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:

@@ -1,11 +1,10 @@
 """Coulomb asymmetry: different Coulomb friction in closing and in opening."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class CoulombAsymmetry(Pointwise):
@@ -26,6 +25,5 @@ class CoulombAsymmetry(Pointwise):
     shape = (Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),)
     told_apart_by = "standstill periods, and slow motion in both directions"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or one array per amplitude."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         return (np.abs(np.tanh(inputs["speed"] / shape[0])),)

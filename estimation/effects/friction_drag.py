@@ -1,11 +1,10 @@
 """Quadratic drag: friction proportional to the square of speed."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class Drag(Pointwise):
@@ -24,6 +23,5 @@ class Drag(Pointwise):
     amplitudes = (Parameter("drag", "target / speed / speed", "loss at one rad/s", lower=0.0),)
     told_apart_by = "a staircase of constant speeds up to the highest"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or one array per amplitude."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         return (inputs["speed"] * np.abs(inputs["speed"]),)

@@ -1,11 +1,10 @@
 """Load-dependent viscous friction: viscous damping that grows with the load."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class LoadViscousFriction(Pointwise):
@@ -26,6 +25,25 @@ class LoadViscousFriction(Pointwise):
     )
     told_apart_by = "a staircase of speeds at two loads"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or one array per amplitude."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         return (np.abs(inputs["load"]) * inputs["speed"],)
+
+
+class SaturatingLoadViscousFriction(LoadViscousFriction):
+    """Viscous friction of a loaded film whose viscosity falls with the shear rate.
+
+    Equation: torque = c |load| speed / (1 + |speed| / knee), load in N m, speed and knee in rad/s,
+    c in s/rad.
+
+    Check: run at several constant speeds at two loads; check the lubricant.
+
+    Source: Bair and Winer 1979 (a lubricant under pressure bears a limiting shear stress).
+    """
+
+    id = "friction.load_viscous.saturating"
+    balances: ClassVar = {"motor": -1, "cable": 1}
+    shape = (Parameter("knee", "speed", "speed at which half remains", 0.1, 500.0, points=9),)
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        speed = inputs["speed"]
+        return (np.abs(inputs["load"]) * speed / (1.0 + np.abs(speed) / shape[0]),)

@@ -1,11 +1,10 @@
 """Stribeck friction: friction that is larger at low speed."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class Stribeck(Pointwise):
@@ -31,6 +30,5 @@ class Stribeck(Pointwise):
     )
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or one array per amplitude."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         return (np.exp(-((inputs["speed"] / shape[0]) ** 2)) * np.tanh(inputs["speed"] / shape[1]),)

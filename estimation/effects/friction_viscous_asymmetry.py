@@ -1,11 +1,10 @@
 """Viscous asymmetry: different viscous damping in closing and in opening."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class ViscousAsymmetry(Pointwise):
@@ -27,6 +26,5 @@ class ViscousAsymmetry(Pointwise):
     )
     told_apart_by = "a staircase of constant speeds in both directions"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or one array per amplitude."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         return (np.abs(inputs["speed"]),)

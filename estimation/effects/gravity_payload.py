@@ -1,11 +1,10 @@
 """Payload: gravity torque of a mass on the joint."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class Payload(Pointwise):
@@ -28,8 +27,7 @@ class Payload(Pointwise):
     )
     told_apart_by = "the same slow sweep with the rig tilted"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or one array per amplitude."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         return (
             np.sin(inputs["tilt"]),
             np.cos(inputs["tilt"]),

@@ -1,11 +1,10 @@
 """Magnetic saturation: a torque constant that falls at large currents."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Parameters, Pointwise, Row, Shape
 
 
 class Saturation(Pointwise):
@@ -24,9 +23,30 @@ class Saturation(Pointwise):
     amplitudes = (
         Parameter("gain", "target / current", "torque constant at small currents", lower=0.0),
     )
-    shape = (Parameter("knee", "current", "current at which it saturates", 0.05, 5.0),)
+    shape: ClassVar[Parameters] = (
+        Parameter("knee", "current", "current at which it saturates", 0.05, 5.0),
+    )
     told_apart_by = "stall at several currents of both signs"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or one array per amplitude."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         return (inputs["current"] - shape[0] * np.tanh(inputs["current"] / shape[0]),)
+
+
+class CubicSaturation(Saturation):
+    """The first term by which a saturating magnetic circuit loses torque.
+
+    Equation: loss = c current^3.
+
+    Source: the first odd term of any symmetric saturation curve.
+    """
+
+    id = "motor.saturation.cubic"
+    amplitudes = (
+        Parameter(
+            "loss", "target / current / current / current", "loss for one cubic unit", lower=0.0
+        ),
+    )
+    shape = ()
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        return (inputs["current"] ** 3,)

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numba
 import numpy as np
 
-from estimation.effects.effect import Parameter, Remembering
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Remembering, Row, Shape
 from estimation.recording import FloatArray
 
 
@@ -47,5 +47,91 @@ class ThermalLoss(Remembering):
     )
     shape = (Parameter("time_constant", "clock", "thermal time constant", 0.3, 300.0, points=8),)
     walk = _walk
-    rest = (0.0, 0.0, 0.0, 0.0)
+    rest: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0)
     told_apart_by = "a run repeated immediately, and again after the motor has cooled"
+
+
+class CampaignWarming(Pointwise):
+    """The torque constant settles to its warm value while a rig works for minutes or hours.
+
+    Equation: loss = c current (1 - exp(-t / T)), t since the campaign's first run began.
+
+    Source: Newton's law of cooling under a steady mean load, and a magnet's remanence that falls in
+    proportion to its temperature.
+    """
+
+    id = "motor.thermal.campaign"
+    family = "motor.thermal"
+    balances: ClassVar = {"motor": -1, "grasp": -1}
+    roles: ClassVar = {"campaign_clock": "campaign_time_s", "current": "motor_current_a"}
+    amplitudes = (
+        Parameter("loss", "target / current", "fall of the torque constant, warm", lower=0.0),
+    )
+    shape = (Parameter("time", "campaign_clock", "thermal time constant", 30, 2e4, points=6),)
+    told_apart_by = "the first run once more at the end, and once more after the motor has cooled"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        return (-inputs["current"] * np.expm1(-np.maximum(inputs["campaign_clock"], 0) / shape[0]),)
+
+
+REFERENCE_K = 298.15
+"""Reference temperature of the torque constant in data sheets, K."""
+
+
+class MeasuredThermalLoss(Pointwise):
+    """The torque constant falls in proportion to the motor's measured temperature.
+
+    Equation: loss = c current (temperature - 298.15 K), current in A, temperature in K, c in N m/(A
+    K).
+
+    Check: compare c with the temperature coefficient of the data sheet.
+
+    Source: the reversible temperature coefficient of a magnet's remanence, IEC 60404-8-1.
+    """
+
+    id = "motor.thermal.measured"
+    family = "motor.thermal"
+    balances: ClassVar = {"motor": -1, "grasp": -1}
+    roles: ClassVar = {"current": "motor_current_a", "temperature": "motor_temperature_k"}
+    amplitudes = (
+        Parameter(
+            "loss",
+            "target / current / temperature",
+            "fall of the torque constant per kelvin",
+            lower=0.0,
+        ),
+    )
+    told_apart_by = "a run repeated immediately, and again after the motor has cooled"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        return (inputs["current"] * (inputs["temperature"] - REFERENCE_K),)
+
+
+@numba.njit(cache=True)
+def _walk_warming(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
+    """Fill the rows; state: started (0 or 1), the time of the first."""
+    for i in range(len(now)):
+        if not state[0]:
+            state[0], state[1] = 1.0, now[i, 0]
+        rows[i, 0] = now[i, 1] * (1.0 - np.exp(-(now[i, 0] - state[1]) / shape[0]))
+
+
+class WarmingLoss(ThermalLoss):
+    """The torque constant settles to its warm value, whatever the source of heat.
+
+    Equation: loss = c current (1 - exp(-t / T)), t from the first sample of the run. current in A,
+    c in N m/A, T in s.
+
+    Check: repeat a run at once and after the motor has cooled.
+
+    Source: Newton's law of cooling under a steady mean load, and a magnet's remanence that falls in
+    proportion to its temperature.
+    """
+
+    id = "motor.thermal.warming"
+    amplitudes = (
+        Parameter("loss", "target / current", "fall of the torque constant, warm", lower=0.0),
+    )
+    shape = (Parameter("time_constant", "clock", "thermal time constant", 0.5, 100.0, points=6),)
+    walk = _walk_warming
+    rest = (0.0, 0.0)

@@ -1,11 +1,10 @@
 """Current ripple: a torque constant that varies with the motor angle."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class CurrentRipple(Pointwise):
@@ -31,7 +30,6 @@ class CurrentRipple(Pointwise):
     shape = (Parameter("order", "1", "periods per turn", 0.5, 20.5, linear=True, points=401),)
     told_apart_by = "the same slow sweep at two currents"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return sine and cosine."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         phase = shape[0] * inputs["motor_angle"]
         return inputs["current"] * np.sin(phase), inputs["current"] * np.cos(phase)

@@ -1,11 +1,10 @@
 """Motor torque ripple: torque that is periodic in the motor angle (cogging)."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class MotorRipple(Pointwise):
@@ -30,7 +29,6 @@ class MotorRipple(Pointwise):
     shape = (Parameter("order", "1", "periods per turn", 0.5, 20.5, linear=True, points=401),)
     told_apart_by = "a sweep at a slow constant speed, and coasting without current"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return sine and cosine."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         phase = shape[0] * inputs["motor_angle"]
         return np.sin(phase), np.cos(phase)

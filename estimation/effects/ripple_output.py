@@ -1,11 +1,28 @@
 """Output ripple: torque or angle that is periodic in the output angle, after the gearhead."""
 
-from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Parameters, Pointwise, Row, Shape
+
+
+def harmonics_in(unit: str) -> tuple[Parameter, ...]:
+    """Return the amplitudes of the harmonics, in a unit."""
+    return tuple(
+        Parameter(f"{wave}_{n}", unit, f"amplitude of the {wave} at {n} times the order")
+        for n in (1, 2, 3)
+        for wave in ("sine", "cosine")
+    )
+
+
+def harmonics(phase: Any) -> list[Any]:
+    """Return sine and cosine of each harmonic, in the order of the amplitudes.
+
+    Args:
+        phase: Phase of the first one, rad, a value or an array.
+    """
+    return [wave(n * phase) for n in (1, 2, 3) for wave in (np.sin, np.cos)]
 
 
 class OutputRipple(Pointwise):
@@ -31,7 +48,7 @@ class OutputRipple(Pointwise):
         "joint": 1,
     }
     roles: ClassVar = {"output_angle": "spindle_angle_rad"}
-    amplitudes: ClassVar[tuple[Parameter, ...]] = (
+    amplitudes: ClassVar[Parameters] = (
         Parameter("sine", "target", "amplitude of the sine"),
         Parameter("cosine", "target", "amplitude of the cosine"),
     )
@@ -39,7 +56,27 @@ class OutputRipple(Pointwise):
     shape = (Parameter("order", "1", "periods per turn", 1.0, 32.0, linear=True, points=63),)
     told_apart_by = "a sweep at a slow constant speed over several turns, and under another load"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return sine and cosine."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         phase = shape[0] * inputs["output_angle"]
         return np.sin(phase), np.cos(phase)
+
+
+class OutputHarmonics(OutputRipple):
+    """A periodic error over the output's turn that is not a pure sine, such as tooth meshing.
+
+    Equation: torque or angle = sum over n = 1, 2, 3 of a_n sin(n order angle) + b_n cos(n order
+    angle), a_n and b_n in the target's unit (N m or rad), angle in rad, order in periods per turn.
+
+    Check: compare the order with the number of teeth; inspect the last gear stage.
+
+    Source: harmonics of the meshing frequency; Randall 2011, "Vibration-based Condition
+    Monitoring", section 2.2.
+    """
+
+    id = "ripple.output.harmonics"
+    amplitudes = harmonics_in("target")
+    # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
+    shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=31),)
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        return harmonics(shape[0] * inputs["output_angle"])

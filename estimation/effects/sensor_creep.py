@@ -5,7 +5,7 @@ from typing import ClassVar
 import numba
 
 from estimation.effects.effect import Parameter, Remembering
-from estimation.effects.first_order import AT_REST, behind
+from estimation.effects.memory import AT_REST, behind
 from estimation.effects.transmission_relaxation import SETTLED
 from estimation.recording import FloatArray
 

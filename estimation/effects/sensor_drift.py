@@ -2,7 +2,19 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import Parameter, Proportional
+import numba
+import numpy as np
+
+from estimation.effects.effect import (
+    Inputs,
+    Parameter,
+    Pointwise,
+    Proportional,
+    Remembering,
+    Row,
+    Shape,
+)
+from estimation.recording import FloatArray
 
 
 class Drift(Proportional):
@@ -21,3 +33,87 @@ class Drift(Proportional):
     roles: ClassVar = {"elapsed": "time_s"}
     amplitudes = (Parameter("rate", "target / elapsed", "change of the zero per second"),)
     told_apart_by = "the unloaded sensor at standstill before, during and after a run"
+
+
+class CampaignDrift(Pointwise):
+    """A zero that approaches its warm value by an exponential while a campaign lasts.
+
+    Equation: error = a (1 - exp(-t / T)), t since the campaign's first run began.
+
+    Source: Newton's law of cooling, for a strain gauge heated by its own bridge.
+    """
+
+    id = "sensor.drift.campaign"
+    family = "sensor.drift"
+    balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": 1}
+    roles: ClassVar = {"campaign_clock": "campaign_time_s"}
+    amplitudes = (Parameter("drift", "target", "zero when warm less zero when cold"),)
+    shape = (Parameter("time", "campaign_clock", "time until 63 % of it", 30, 2e4, points=6),)
+    told_apart_by = "the unloaded sensor at rest before, during and after a campaign"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        return (-np.expm1(-np.maximum(inputs["campaign_clock"], 0.0) / shape[0]),)
+
+
+@numba.njit(cache=True)
+def _walk_exponential(
+    now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray
+) -> None:
+    """Fill the rows; state: started (0 or 1), the time of the first."""
+    for i in range(len(now)):
+        if not state[0]:
+            state[0], state[1] = 1.0, now[i, 0]
+        rows[i, 0] = 1.0 - np.exp(-(now[i, 0] - state[1]) / shape[0])
+
+
+class SettlingDrift(Remembering):
+    """A zero that approaches its warm value exponentially.
+
+    Equation: error = a (1 - exp(-t / T)), t from the first sample of the run. a in the target's
+    unit, T in s.
+
+    Check: let the amplifier warm up and read the unloaded sensor at standstill before and after a
+    run.
+
+    Source: Newton's law of cooling, for a strain gauge heated by its own bridge.
+    """
+
+    id = "sensor.drift.exponential"
+    family = "sensor.drift"
+    balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": 1}
+    roles: ClassVar = {"clock": "time_s"}
+    amplitudes = (Parameter("drift", "target", "warm zero minus cold zero"),)
+    shape = (Parameter("time_constant", "clock", "time to reach 63 %", 0.5, 100.0, points=6),)
+    walk = _walk_exponential
+    rest = (0.0, 0.0)
+    told_apart_by = "the unloaded sensor at standstill before, during and after a run"
+
+
+@numba.njit(cache=True)
+def _walk_logarithmic(
+    now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray
+) -> None:
+    """Fill the rows; state: started (0 or 1), the time of the first."""
+    for i in range(len(now)):
+        if not state[0]:
+            state[0], state[1] = 1.0, now[i, 0]
+        rows[i, 0] = np.log1p((now[i, 0] - state[1]) / shape[0])
+
+
+class LogarithmicDrift(SettlingDrift):
+    """A zero that changes by the same amount in each decade of time, as polymers relax.
+
+    Equation: error = a ln(1 + t / T), t from the first sample of the run. a in the target's unit, T
+    in s.
+
+    Check: read the unloaded sensor at standstill before, during and after a run.
+
+    Source: drift of piezoresistive force sensors, stated by their makers as % for each decade of
+    time; Hall et al. 2008 for force-sensing resistors.
+    """
+
+    id = "sensor.drift.logarithmic"
+    family = "sensor.drift"
+    amplitudes = (Parameter("drift", "target", "change per factor 2.7 of time"),)
+    shape = (Parameter("onset", "clock", "time when the change slows", 0.05, 50.0, points=4),)
+    walk = _walk_logarithmic

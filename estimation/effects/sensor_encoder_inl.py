@@ -1,11 +1,11 @@
 """Encoder non-linearity: an angle reading with an error periodic in the angle."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Parameters, Pointwise, Row, Shape
+from estimation.effects.ripple_output import harmonics, harmonics_in
 
 
 class EncoderNonlinearity(Pointwise):
@@ -30,7 +30,7 @@ class EncoderNonlinearity(Pointwise):
     id = "sensor.encoder_inl"
     balances: ClassVar = {"gearbox": 1, "stretch": 1}
     roles: ClassVar = {"encoder": "motor_angle_rad"}
-    amplitudes: ClassVar[tuple[Parameter, ...]] = (
+    amplitudes: ClassVar[Parameters] = (
         Parameter("sine", "target", "amplitude of the sine"),
         Parameter("cosine", "target", "amplitude of the cosine"),
     )
@@ -39,7 +39,26 @@ class EncoderNonlinearity(Pointwise):
         "a slow sweep without load, repeated with the other sensor turned by half a turn"
     )
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return sine and cosine."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         phase = shape[0] * inputs["encoder"]
         return np.sin(phase), np.cos(phase)
+
+
+class EncoderHarmonics(EncoderNonlinearity):
+    """An encoder whose periodic error is not a pure sine.
+
+    Equation: error = sum over n = 1, 2, 3 of a_n sin(n order angle) + b_n cos(n order angle), a_n
+    and b_n in rad, angle in rad, order in periods per turn.
+
+    Check: turn slowly without load, and again with the other sensor turned by half a turn.
+
+    Source: the harmonics caused by amplitude, offset and phase errors of the two tracks, as makers
+    of magnetic angle encoders state them.
+    """
+
+    id = "sensor.encoder_inl.harmonics"
+    amplitudes = harmonics_in("target")
+    shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=16),)
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        return harmonics(shape[0] * inputs["encoder"])

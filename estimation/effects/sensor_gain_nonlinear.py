@@ -1,11 +1,10 @@
 """Sensor non-linearity: a sensor whose gain changes over its range."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class NonlinearGain(Pointwise):
@@ -32,8 +31,7 @@ class NonlinearGain(Pointwise):
     )
     told_apart_by = "reference weights over the sensor's whole range, both signs"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return the square, the cube and the signed square."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         reading = inputs["reading"]
         square = reading * reading
         return square, square * reading, reading * np.abs(reading)

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from estimation.effects.effect import READING, Parameter, Remembering
-from estimation.effects.first_order import AT_REST, behind
+from estimation.effects.memory import AT_REST, behind
 
 
 class SensorLag(Remembering):

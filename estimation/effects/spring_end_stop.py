@@ -1,11 +1,10 @@
 """End stop: a contact spring beyond a limit angle."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import Parameter, Pointwise
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
 
 class EndStop(Pointwise):
@@ -27,6 +26,24 @@ class EndStop(Pointwise):
     shape = (Parameter("onset", "stop", "angle of first contact", -0.7, 2.5, True, 41),)
     told_apart_by = "a slow free sweep to the ends of the travel, in both directions"
 
-    def row(self, inputs: Mapping[str, Any], shape: Sequence[float]) -> Sequence[Any]:
-        """Return one value or one array per amplitude."""
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
         return (np.maximum(inputs["stop"] - shape[0], 0.0),)
+
+
+class OpenEndStop(EndStop):
+    """A stop or a fold of a hose that is contacted on opening.
+
+    The contact is near one end of the travel: a stop that is always in contact is a spring.
+
+    Equation: torque = k min(angle - onset, 0), angle and onset in rad, k in N m/rad.
+
+    Check: move slowly by hand to the end of the travel and look for the contact.
+
+    Source: Hooke's law with a contact that does not pull.
+    """
+
+    id = "spring.end_stop.opening"
+    shape = (Parameter("onset", "stop", "angle of first contact", -2.6, 0.6, True, 41),)
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        return (np.minimum(inputs["stop"] - shape[0], 0.0),)

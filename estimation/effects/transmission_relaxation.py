@@ -5,7 +5,7 @@ from typing import ClassVar
 import numba
 import numpy as np
 
-from estimation.effects.effect import Parameter, Remembering
+from estimation.effects.effect import Parameter, Parameters, Remembering
 from estimation.recording import FloatArray
 
 
@@ -59,7 +59,7 @@ class Relaxation(Remembering):
     id = "transmission.relaxation"
     balances: ClassVar = {"gearbox": -1, "stretch": 1}
     roles: ClassVar = {"load": "distal_torque_n_m", "clock": "time_s"}
-    amplitudes = (
+    amplitudes: ClassVar[Parameters] = (
         Parameter("compliance", "target / load", "compliance of the slow part", lower=0.0),
     )
     shape = (
@@ -67,5 +67,26 @@ class Relaxation(Remembering):
         SETTLED,
     )
     walk = walk_lag
-    rest = (0.0, 0.0, 0.0, 0.0)
+    rest: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0)
     told_apart_by = "a step of load that is held three times as long"
+
+
+class Prony(Relaxation):
+    """Two terms of a Prony series.
+
+    Equation: deflection lost = sum c_k (load - x_k); dx_k/dt = (load - x_k) / time_k, x_k = settled
+    times the load at the start, time_2 = 8 time_1. load in N m, c_k in rad/(N m), time_k in s.
+
+    Check: apply a step of load, hold it, and record the deflection; check the cable's pretension
+    and age.
+
+    Source: the generalised Maxwell model (Wiechert 1893), its relaxation as a Prony series.
+    """
+
+    id = "transmission.relaxation.prony"
+    amplitudes = (
+        Parameter("fast", "target / load", "compliance of the fast part", lower=0.0),
+        Parameter("slow", "target / load", "compliance of the slow part", lower=0.0),
+    )
+    shape = (Parameter("time", "clock", "time of the fast part", 0.02, 5.0, points=9), SETTLED)
+    rest = (0.0, 0.0, 0.0, 0.0, 0.0)

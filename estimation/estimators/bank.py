@@ -228,15 +228,10 @@ class BankStepper:
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""
-        found = self.estimate(time_s, measured)
+        channels = self._source.step(time_s, measured)
+        found = self._estimator.of_rows(rows_of(channels, self._estimator.bank))
         self.inside, self.half_width = found.inside, found.half_width
         return found.value
-
-    def estimate(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> Estimates:
-        """Take the next samples and return their estimates with interval and validity."""
-        channels = self._source.step(time_s, measured)
-        rows = np.column_stack([channels[name] for name in self._estimator.bank.channels])
-        return self._estimator.of_rows(rows)
 
 
 def rows_of(channels: Mapping[str, FloatArray] | Recording, bank: Bank) -> FloatArray:

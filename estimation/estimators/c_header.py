@@ -6,15 +6,18 @@ The result is that of `predict(recording, causal=True)` for gap-free samples.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from estimation.bank import states
-from estimation.bank.beyond import STANDING_RAD_S, Beyond
+from estimation.bank.beyond import STANDING_RAD_S
 from estimation.derived import (
     AGO,
+    ALIKE,
     FALL,
     RISE,
     TRAVEL,
@@ -23,18 +26,16 @@ from estimation.derived import (
     TURNING,
     measured_channels,
     origin_of,
+    window_samples,
 )
 from estimation.errors import EstimationError
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.c_model import model_text
-from estimation.estimators.c_templates import BANK, DIFFERENCES, HEADER, NETWORK, TRACKER
 from estimation.estimators.model import ModelEstimator
 from estimation.estimators.network import NetworkEstimator
-from estimation.filters import PAPER
 from estimation.kalman import tracker
 from estimation.recording import FloatArray
 from estimation.signals import Signals, reference
-from estimation.window import ALIKE
 
 TURNING_TRAVEL, TURNING_TURNED = (
     TURNING.replace("_angle_rad", suffix) for suffix in (TRAVEL, TURNED)
@@ -83,55 +84,79 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         raise ExportError(
             f"{name!r} cannot name things in C.", fix="Use small letters, digits and underscores."
         )
-    motion, low_pass, signals = DIFFERENCES, PAPER, reference()
+    model, signals = "", reference()
     channels: Sequence[str]
-    if isinstance(estimator, BankEstimator):
-        channels, model = estimator.bank.channels, _bank(estimator)
-        motion, low_pass = _tracker(sample_rate_hz), estimator.low_pass
-    elif isinstance(estimator, NetworkEstimator):
-        channels, model = estimator.network.inputs, _network(estimator)
-        low_pass = estimator.low_pass
-    else:
+    if isinstance(estimator, ModelEstimator):
         channels = [c for c in estimator.model.channels if c != "time_s"]
         model = model_text(estimator.model, channels.index)
         low_pass, signals = estimator.model.low_pass, estimator.model.signals
+    else:
+        low_pass = estimator.low_pass
+        if isinstance(estimator, BankEstimator):
+            channels = estimator.bank.channels
+        else:
+            channels = estimator.network.inputs
     measured = measured_channels(channels, signals)
-    sections = low_pass.sections(sample_rate_hz)
     windows = [c for c in channels if c.endswith(TRAVEL) or FALL in c]
     pasts = _pasts(channels)
     row = _Row(measured, windows, pasts, sample_rate_hz, signals)
-    text = HEADER
-    for mark, value in {
-        "MOTION": motion,
-        "TARGET": estimator.target,
-        "MEASURED_LIST": ", ".join(measured),
-        "RATE": f"{sample_rate_hz!r}",
-        "MEASURED": str(len(measured)),
-        "ROW": str(len(channels)),
-        "SECTION_COUNT": str(len(sections)),
-        "SECTIONS": _double_rows(np.delete(sections, 3, axis=1)),
-        "WINDOWS": str(max(len(windows), 1)),
-        "WINDOW": str(max(1, round(TRAVEL_WINDOW_S * sample_rate_hz))),
-        "ALIKE": f"{ALIKE!r}",
-        "PASTS": str(max(len(pasts), 1)),
-        "KEEP": _keep(pasts, measured),
-        "FILL": "\n".join(_channel(k, c, row) for k, c in enumerate(channels)),
-        "MODEL": model,
-    }.items():
-        text = text.replace(f"@{mark}@", value)
+    text = _template().render(
+        estimator=estimator,
+        bank=estimator.bank if isinstance(estimator, BankEstimator) else None,
+        network=estimator.network if isinstance(estimator, NetworkEstimator) else None,
+        model=model,
+        channels=channels,
+        measured=measured,
+        windows=windows,
+        pasts=pasts,
+        rate_hz=sample_rate_hz,
+        window=window_samples(sample_rate_hz),
+        sections=np.delete(low_pass.sections(sample_rate_hz), 3, axis=1),
+        tracker=tracker(sample_rate_hz),
+        keep=_keep(pasts, measured),
+        fill="\n".join(_channel(k, c, row) for k, c in enumerate(channels)),
+    )
     return text.replace("NAME", name.upper()).replace("name_", f"{name}_")
+
+
+@cache
+def _template() -> Template:
+    """Return the C of an exported estimator; what stands in @{ }@ is filled in."""
+    environment = Environment(
+        loader=PackageLoader("estimation.estimators"),
+        undefined=StrictUndefined,
+        autoescape=False,  # noqa: S701  C, not HTML
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        variable_start_string="@{",
+        variable_end_string="}@",
+        block_start_string="@%",
+        block_end_string="%@",
+    )
+    environment.globals |= {
+        "states": states,
+        "window_s": TRAVEL_WINDOW_S,
+        "standing_rad_s": STANDING_RAD_S,
+        "alike": ALIKE,
+        "floats": _floats,
+        "doubles": _doubles,
+        "ints": _ints,
+        "rows": _rows,
+    }
+    return environment.get_template("estimator.h.jinja")
 
 
 def _floats(values: FloatArray) -> str:
     return ", ".join(f"{float(v):.9g}f" if v % 1 else f"{float(v):.1f}f" for v in np.ravel(values))
 
 
-def _double_rows(table: FloatArray) -> str:
-    return ", ".join(f"{{ {', '.join(f'{float(v)!r}' for v in row)} }}" for row in table)
+def _doubles(values: FloatArray) -> str:
+    return ", ".join(f"{float(v)!r}" for v in values)
 
 
-def _float_rows(table: FloatArray) -> str:
-    return ", ".join(f"{{ {_floats(row)} }}" for row in table)
+def _rows(table: FloatArray, written: Callable[[FloatArray], str]) -> str:
+    return ", ".join(f"{{ {written(row)} }}" for row in table)
 
 
 def _ints(values: Sequence[int] | np.ndarray) -> str:
@@ -201,78 +226,3 @@ def _channel(k: int, channel: str, row: _Row) -> str:
     else:
         value = _value(channel, measured)
     return f"    row[{k}] = (float)({value}); /* {channel} */"
-
-
-def _tracker(sample_rate_hz: float) -> str:
-    found = tracker(sample_rate_hz)
-    text = TRACKER.replace("@PERIOD@", f"{found.period_s!r}")
-    for k, gain in enumerate(found.gain):
-        text = text.replace(f"@GAIN{k}@", f"{float(gain)!r}")
-    return text
-
-
-def _bank(estimator: BankEstimator) -> str:
-    bank, interval = estimator.bank, estimator.interval
-    parents, factors = bank.tables
-    columns = interval.columns if interval is not None else np.zeros(1, np.int64)
-    widths = interval.weights if interval is not None else np.zeros(1)
-    unknown = Beyond(np.zeros(1), np.ones(1), np.zeros(2))
-    table = interval.beyond if interval is not None else unknown
-    text = BANK
-    for mark, value in {
-        "PRODUCTS": str(len(bank.products)),
-        "ORDERS": str(bank.orders),
-        "SIZE": str(bank.size),
-        "PARENTS": _ints(parents),
-        "FACTORS": _ints(factors),
-        "WEIGHTS": _floats(estimator.weights),
-        "LOWEST": _floats(estimator.ranges[0]),
-        "HIGHEST": _floats(estimator.ranges[1]),
-        "WIDTH_COUNT": str(len(columns)),
-        "WIDTH_COLUMNS": _ints(columns),
-        "WIDTH_WEIGHTS": _floats(widths),
-        "LEAST": f"{interval.least:.9g}f" if interval is not None else "0.0f",
-        "AXES": str(len(table.step)),
-        "LOWEST_NODE": _floats(table.lowest) if interval is not None else "NAN",
-        "NODE_STEP": _floats(table.step),
-        "NODES": _ints(table.values.shape),
-        "BEYOND": _floats(table.values),
-        "STANDING": f"{STANDING_RAD_S}f",
-        "POSE_PLACE": f", row[{states.JUDGED}]" if bank.pose else "",
-        "CENTRE": f"{states.POSITION_CENTRE_RAD}f",
-        "SCALE": f"{states.POSITION_SCALE_RAD}f",
-        "LOAD": f"{states.LOAD_SCALES[bank.surrogate]}f",
-        "ACCELERATION": f"{states.ACCELERATION_SCALE_RAD_S2}f",
-        "SLOWEST": f"{states.SLOWEST_RAD_S}f",
-        "LIGHTEST": f"{states.LIGHTEST}f",
-        "GEAR": f"{states.GEAR_RATIO}f",
-        "TURN": f"{states.GEAR_RATIO * states.RIPPLE_STEP:.9g}f",
-        "WRIST_ORDERS": str(bank.wrist_orders),
-        "WRIST_POWERS": str(states.WRIST_POWERS),
-        "WRIST_TURN": f"{2 * np.pi / states.WRIST_PERIOD_RAD:.9g}f",
-        "POSE": f"name_held(row, {states.JUDGED})" if bank.pose else "0.0f",
-        "STATES": str(len(states.STATES)),
-        "LAGS": str(len(states.LAGS)),
-        "JUDGED": str(bank.judged),
-        "SLID": f"{states.SLID_RAD}f",
-        "LEAVING": f"{states.LEAVING_S}f",
-        "LEAVES": f"{TRAVEL_WINDOW_S - states.LEAVING_S}f",
-    }.items():
-        text = text.replace(f"@{mark}@", value)
-    return text
-
-
-def _network(estimator: NetworkEstimator) -> str:
-    network = estimator.network
-    text = NETWORK
-    for mark, value in {
-        "NODES": str(len(network.hidden)),
-        "LOWEST": _floats(network.input_range[0]),
-        "HIGHEST": _floats(network.input_range[1]),
-        "HIDDEN": _float_rows(network.hidden),
-        "OUTPUT": _floats(network.output[0]),
-        "LOW": _floats(network.output_range[0, :1]),
-        "HIGH": _floats(network.output_range[1, :1]),
-    }.items():
-        text = text.replace(f"@{mark}@", value)
-    return text

@@ -1,14 +1,80 @@
 """Linear and physical estimators: an equation of effects."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from estimation.campaign import Campaign
 from estimation.fitting import fit
+from estimation.live_channels import CausalChannels
 from estimation.model import Model, predict
 from estimation.model_file import write
 from estimation.recording import FloatArray, Recording
-from estimation.stream import Stream
+
+
+class Stream:
+    """A model's causal estimator. It holds the state of the filters and of the effects.
+
+    The result is that of `predict(model, recording, causal=True)` to rounding, however the samples
+    are cut into batches.
+    """
+
+    def __init__(self, model: Model, sample_rate_hz: float) -> None:
+        """Start before the first sample.
+
+        Args:
+            model: A fitted model.
+            sample_rate_hz: Nominal rate of the device's clock, Hz.
+
+        Raises:
+            NotFittedError: A parameter has no value.
+            FilterError: The model's filter does not fit the rate.
+        """
+        self.model = model
+        self._source = CausalChannels(
+            model.channels, sample_rate_hz, model.low_pass, signals=model.signals
+        )
+        self._weights = [np.array(term.weights) for term in model.terms]
+        self._shapes = [term.numbers(term.effect.shape) for term in model.terms]
+        self._states = [term.effect.start() for term in model.terms]
+        self._rest = {k: v for k, v in model.signals.rest.items() if k in model.channels}
+        self.at_rest = False
+        """Whether one of the model's axes stands at the newest sample."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Measured channels that `step` needs."""
+        return self._source.measured
+
+    def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
+        """Take the next samples and return their estimates.
+
+        Args:
+            time_s: Device time, shape (n,) or one number, increasing across batches.
+            measured: Measured channels in SI units, each of the same shape; others are ignored.
+
+        Returns:
+            Shape (n,), in `model.unit`; NaN where a needed channel is not finite.
+        """
+        channels = self._source.step(time_s, measured)
+        if np.size(time_s):  # an empty batch changes nothing
+            self.at_rest = any(bool(abs(channels[k][-1]) < v) for k, v in self._rest.items())
+        rows = np.column_stack([channels[name] for name in self.model.channels])
+        return np.array([self._one(row) for row in rows.tolist()])
+
+    def _one(self, row: list[float]) -> float:
+        sample = dict(zip(self.model.channels, row, strict=True))
+        total = 0.0
+        for term, weights, shape, state in zip(
+            self.model.terms, self._weights, self._shapes, self._states, strict=True
+        ):
+            inputs = {role: sample[channel] for role, channel in term.channels.items()}
+            values = term.effect.step(inputs, shape, state)
+            total += sum(w * v for w, v in zip(weights, values, strict=True))
+        return float(total)
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.campaign import Campaign
-from estimation.estimators.model import ModelRecipe
+from estimation.estimators.model import ModelRecipe, Stream
 from estimation.estimators.network import NetworkEstimator, NetworkRecipe
 from estimation.model import Model, predict
 from estimation.model_file import parse, to_toml
 from estimation.networks.network import NetworkError, write_arrays
 from estimation.recording import FloatArray, Recording
-from estimation.stream import Stream
 
 
 @dataclass(frozen=True)

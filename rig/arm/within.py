@@ -11,8 +11,7 @@ import numpy as np
 
 from estimation.arm.effects import ArmEffect
 from estimation.arm.motion import LOW_PASS
-from estimation.diagnosis.paths import period_samples
-from estimation.diagnosis.split import SplitError
+from estimation.diagnosis.split import SplitError, period_samples
 from estimation.recording import Recording
 from rig.arm.search import RATE_SHARE, Prepared, search
 

@@ -5,8 +5,7 @@ from functools import partial
 
 from drivers.device import Device
 from drivers.registry import open_device, open_fake
-from drivers.teensy.channels import raw_channels
-from drivers.teensy.device import TeensyDevice
+from drivers.teensy.device import TeensyDevice, raw_channels
 from rig.bench.logger import open_logger
 from rig.configuration.check import LOGGER
 from rig.configuration.config import Config, is_simulated

@@ -59,26 +59,16 @@ def source_hash() -> int | None:
 
 
 def posix_cksum(data: bytes) -> int:
-    """Return the checksum of POSIX `cksum`: CRC-32, high bit first, the length behind the data."""
-    length, size = len(data), b""
-    while length:
-        size += bytes([length & 0xFF])
-        length >>= 8
-    crc = 0
-    for byte in data + size:
-        crc = (crc << 8 ^ _TABLE[crc >> 24 ^ byte]) & 0xFFFFFFFF
-    return crc ^ 0xFFFFFFFF
+    """Return the checksum of POSIX `cksum`: CRC-32, high bit first, the length behind the data.
+
+    zlib's CRC runs low bit first: bytes and result are reversed bit by bit.
+    """
+    size = len(data).to_bytes((len(data).bit_length() + 7) // 8, "little")
+    crc = zlib.crc32((data + size).translate(_REVERSED), 0xFFFFFFFF)
+    return int(f"{crc:032b}"[::-1], 2)
 
 
-def _reversed(value: int) -> int:
-    return int(f"{value:032b}"[::-1], 2)
-
-
-# zlib's CRC runs low bit first; a byte's entry is its reverse's, reversed
-_TABLE = [
-    _reversed(zlib.crc32(bytes([int(f"{byte:08b}"[::-1], 2)]), 0xFFFFFFFF) ^ 0xFFFFFFFF)
-    for byte in range(256)
-]
+_REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 
 def compare(config: Config) -> Versions:

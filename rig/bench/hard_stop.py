@@ -14,8 +14,7 @@ from drivers.errors import CommandRefusedError
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import STATUS_ARMED, TOP, Trip
 from drivers.teensy.reference import Limits
-from rig.bench.holding import holding
-from rig.bench.logger import open_logger
+from rig.bench.logger import held_logger
 from rig.bench.trips import WORDS
 from rig.configuration.config import Config
 from rig.errors import UsageError
@@ -63,10 +62,7 @@ def drive_to_stop(config: Config, closing: bool) -> float:
     reach = round(abs(2.0 * config.reference_limits.spindle_angle_rad / slope))
     step = SPEED_RAD_S * 1e-3 / slope * (1 if closing else -1)
     gains = [*config.controller.gains()[:4], float(limits.hold_command_e4)]
-    with (
-        holding(config.logger.url),
-        TeensyLogger(open_logger(config), machine.profile) as logger,
-    ):
+    with held_logger(config) as logger:
         logger.identify()
         logger.start()
         here = int(_read(logger, COLD_S)["spindle"][-1])

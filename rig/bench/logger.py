@@ -1,13 +1,22 @@
 """Open the logger a configuration names: the real one, or the simulated one behind `sim://`."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
 from drivers.device import Drive
+from drivers.errors import DriverError
 from drivers.registry import open_device, open_fake
+from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.transport import Transport, open_transport
+from rig.bench.holding import holding
 from rig.bench.sensor_logger import SensorWay
 from rig.configuration.config import Config
 from rig.errors import UsageError
 from rig.logic.latch import TripLatch
 from rig.logic.link import LogicLink
+from rig.machines.choose import machine_of
 
 PTY_URL = "sim://pty"
 """The firmware as a process, in real time."""
@@ -59,6 +68,46 @@ def open_logger(
             step_s,
         )
     return open_transport(config.logger.url)
+
+
+@contextmanager
+def held_logger(config: Config) -> Iterator[TeensyLogger]:
+    """Hold the rig and open its logger, for what is no session; it is disarmed on the way out.
+
+    Raises:
+        DriverError: It cannot be reached.
+    """
+    with (
+        holding(config.logger.url),
+        TeensyLogger(open_logger(config), machine_of(config).profile) as logger,
+    ):
+        yield logger
+
+
+def read_for(logger: TeensyLogger, duration_s: float, is_alive: bool = False) -> SampleBatch:
+    """Read for a while by the board's clock.
+
+    Args:
+        logger: The board, streaming.
+        duration_s: How long.
+        is_alive: Whether the board gets a sign of life meanwhile.
+
+    Raises:
+        DriverError: Nothing comes.
+    """
+    parts: list[SampleBatch] = []
+    while not parts or parts[-1].tick_us[-1] - parts[0].tick_us[0] < duration_s * 1e6:
+        if is_alive:
+            logger.heartbeat()
+        batch = logger.read(1.0)
+        if not len(batch.samples):
+            raise DriverError("The logger sends nothing.", fix="Run: rig doctor")
+        parts.append(batch)
+    return SampleBatch(
+        np.concatenate([part.samples for part in parts]),
+        np.concatenate([part.tick_us for part in parts]),
+        parts[-1].lost,
+    )
 
 
 def _open_any(config: Config, pace: float | None) -> Transport:

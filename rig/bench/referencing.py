@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from drivers.errors import CommandRefusedError
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Identity, Result
-from rig.bench.holding import holding
-from rig.bench.logger import open_logger
+from rig.bench.logger import held_logger
 from rig.configuration.config import Config
 from rig.errors import UsageError
 from rig.machines.choose import machine_of
@@ -58,10 +57,7 @@ def reference_board(config: Config, here_rad: Sequence[float], at_index: bool = 
     require_place(config, here_rad)
     machine = machine_of(config)
     counts = machine.reference_counts(config, config.calibration_set(), here_rad)
-    with (
-        holding(config.logger.url),
-        TeensyLogger(open_logger(config), machine.profile) as logger,
-    ):
+    with held_logger(config) as logger:
         logger.identify()
         logger.start()
         _read_at_rest(logger)

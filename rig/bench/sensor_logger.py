@@ -7,13 +7,13 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.counters import LinkCounters
 from drivers.device import Channel, Device
-from drivers.link import LinkCounters
 from drivers.teensy.driver import ClockExchange, SampleBatch
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import Identity, Trip, TripReport
+from drivers.transport.simulated import Pace
 from rig.errors import UsageError
-from rig.logic.pace import Pace
 
 FLAGS = "flags"
 """Field of a device's own `SampleFlag` bits among the samples."""

@@ -23,7 +23,6 @@ from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import Identity, Result, Trip, TripReport
 from drivers.transport.transport import Transport
-from rig.bench.board_start import require_same_start
 from rig.bench.companions import Companion, open_companions
 from rig.bench.device_logger import logger_on, raw_stream, with_channels
 from rig.bench.flight import FlightRecorder
@@ -31,7 +30,7 @@ from rig.bench.holding import holding
 from rig.bench.interrupts import leaving_safely
 from rig.bench.logger import is_real_time
 from rig.bench.sensor_logger import SensorWay
-from rig.bench.trips import HostWatch, trip_error, tripped
+from rig.bench.trips import HostWatch, require_same_start, trip_error, tripped
 from rig.configuration.config import Config
 from rig.errors import ExitCode, RigError, SafetyTripError, UsageError
 from rig.log.schema import Stream

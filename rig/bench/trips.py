@@ -1,4 +1,4 @@
-"""What tripped, in words: what happened, how late, how to clear it; and the host's own watch."""
+"""What tripped or restarted, in words, how late, how to clear it; and the host's own watch."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
+from drivers.errors import DriverError
 from drivers.teensy.core import CoreGuard, firmware_library
+from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import (
     STATUS_ARMED,
@@ -19,7 +21,8 @@ from drivers.teensy.protocol import (
     TripReport,
 )
 from estimation.channels import unit_of
-from rig.errors import SafetyTripError
+from rig.bench.sensor_logger import SensorLogger
+from rig.errors import ExitCode, RigError, SafetyTripError
 from rig.machines.machine import Machine
 from rig.machines.reading import Reading, has_status
 
@@ -194,3 +197,33 @@ class HostWatch:
         steps = (clock[1:] - clock[:-1]).astype(np.float64)  # it wraps
         ticks: NDArray[np.float64] = steps / self._machine.profile.tick_us
         return ticks
+
+
+class BoardResetError(RigError):
+    """The board was restarted while the session ran."""
+
+    exit_code = ExitCode.DEVICE
+
+
+def require_same_start(logger: TeensyLogger | SensorLogger, boot: int) -> None:
+    """Compare the board's present start number with the session's.
+
+    Args:
+        logger: The board. One that does not answer is left to the caller to report.
+        boot: Start number when the session began.
+
+    Raises:
+        BoardResetError: The numbers differ.
+    """
+    try:
+        present = logger.identify().boot
+    except DriverError:
+        return
+    if present != boot:
+        raise BoardResetError(
+            "The board was restarted while it was in use.",
+            f"Its start number is {present} and was {boot} when the session began. The cause is a"
+            " reset, its watchdog, or its supply.",
+            "It is disarmed and its counts have lost their zeros. Find the cause of the restart,"
+            " then run: rig reference",
+        )

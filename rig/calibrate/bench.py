@@ -4,8 +4,9 @@ Each step opens the devices and closes them again, so that the rig is disarmed a
 a buffer while hands are in it.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -211,27 +212,11 @@ def _joined(measured: Measurement, device: Device, batch: Batch) -> Measurement:
 
     They begin within one read of each other, some milliseconds on a real bench: press slowly.
     """
-    recording = measured.recording
-    time_s = _force_times(device, batch)
-    last = min(recording.time_s[-1], time_s[-1])
-    kept = recording.time_s <= last
-    columns: Iterator[tuple[str, NDArray[np.float64]]] = (
-        (name, np.interp(recording.time_s[kept], time_s, values))
-        for name, values in batch.columns.items()
-    )
-    flags = (
-        recording.flags[kept]
-        | batch.flags[np.searchsorted(time_s, recording.time_s[kept], side="left")]
-    )
-    joined = Recording(
-        recording.name,
-        recording.time_s[kept],
-        {**{n: v[kept] for n, v in recording.columns.items()}, **dict(columns)},
-        flags=flags,
-        conditions=recording.conditions,
-        rig=recording.rig,
-        instrument=recording.instrument,
-        calibrations=recording.calibrations,
-    )
+    force_s = _force_times(device, batch)
+    kept = np.flatnonzero(measured.recording.time_s <= force_s[-1])
+    recording = measured.recording.at(kept)
+    forces = {n: np.interp(recording.time_s, force_s, v) for n, v in batch.columns.items()}
+    after = np.searchsorted(force_s, recording.time_s)
+    joined = replace(recording.with_columns(**forces), flags=recording.flags | batch.flags[after])
     counts = None if measured.counts is None else measured.counts[kept]
     return Measurement(joined, counts, {**measured.details, **_said(device)})

@@ -8,25 +8,33 @@ excludes because the rig does not move steadily are flagged here: fits and searc
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from calibration.chain import CURRENT, PAIRS
 from calibration.fsr_curve import FsrCurve
 from calibration.fsr_memory import FsrMemory
-from calibration.ft import AXES, STANDARD_GRAVITY_M_S2
-from calibration.procedure import Measurement, Result
-from calibration.sessions.current import TORQUE
+from calibration.procedure import Measurement, Procedure, Result
+from calibration.record import CalibrationRecord
+from calibration.sessions.current import TORQUE, CurrentSession
+from calibration.sessions.encoder import EncoderSession
 from calibration.sessions.fsr import SMOOTH, FsrSession
+from calibration.sessions.ft import AXES, FtSession
+from calibration.sessions.gearbox import GearboxSession
 from calibration.sessions.motion import stands
-from calibration.torque import weight_torque_n_m
+from calibration.sessions.torque import TorqueSession
+from calibration.torque import STANDARD_GRAVITY_M_S2, weight_torque_n_m
 from estimation.derived import zero_phase_channels
 from estimation.effects import effect
 from estimation.filters import LowPass
 from estimation.model import Model, Term
 from estimation.recording import Flag, Recording
 from estimation.rest import SPINDLE_SPEED
+from rig.calibrate.raw import KIND, read_raw
 from rig.errors import UsageError
+from rig.log.check import looks_like_log
+from rig.log.reader import read_log
 
 STEADY = LowPass(cutoff_hz=20.0, order=3)
 """Steady motion is slow; noise of the current, a regressor, would pass for creep."""
@@ -45,24 +53,61 @@ class Declared:
     recordings: list[Recording]
 
 
-def declared_by(kind: str, result: Result, measurements: Sequence[Measurement]) -> Declared:
-    """Return the equation and runs that a calibration declares.
-
-    Args:
-        kind: Kind of calibration.
-        result: Its result.
-        measurements: Its measurements, in the order of the steps.
+def declared_by_record(record: CalibrationRecord) -> Declared:
+    """Return the declared equation of a record, and the runs it was made from.
 
     Raises:
-        UsageError: Nothing is known of the kind.
+        UsageError: Its kind cannot be diagnosed, or its raw logs are gone.
     """
-    if kind not in MAKERS:
+    folders = {Path(file.path).parent for file in record.raw}
+    if len(folders) != 1 or not all(Path(file.path).is_file() for file in record.raw):
+        raise UsageError(
+            f"The raw logs of {record.content_hash} are not where they were.",
+            "Only a session of `rig calibrate` keeps them; a certificate has none.",
+            f"Kinds that can be diagnosed: {', '.join(KINDS)}.",
+        )
+    kind, measurements, _ = read_raw(folders.pop())
+    low, high = record.validity.low, record.validity.high
+    result = Result(record.channel, record.input, record.fit, low, high)
+    return _known(kind).declare(result, measurements)
+
+
+def declared_by_folder(folder: Path) -> Declared:
+    """Return the declared equation of the simplest calibration from raw logs, and its runs.
+
+    Plain is the force-sensing resistor's curve, the gear's stiffness, the encoder's line: what a
+    session may add to these is then what the diagnosis finds.
+
+    Raises:
+        UsageError: The folder holds no raw logs of one calibration.
+        BadDataError: They cannot carry a calibration.
+    """
+    name, measurements, lines = read_raw(folder)
+    kind = _known(name)
+    said = {name: v for m in measurements for name, v in m.recording.conditions.items()}
+    results = kind.plain(said).conclude(measurements, lines).results
+    return kind.declare(results[kind.place], measurements)
+
+
+def is_raw(path: Path) -> bool:
+    """Return whether a path is a folder of raw logs that `rig calibrate` left."""
+    if not path.is_dir():
+        return False
+    first = next(iter(sorted(path.glob("*.mcap"))), None)
+    if first is None or not looks_like_log(first):
+        return False
+    run = read_log(first, topics=(), tolerant=True, checksums=False).run
+    return run is not None and KIND in run.details
+
+
+def _known(kind: str) -> "_Kind":
+    if kind not in KINDS:
         raise UsageError(
             f"A calibration of the kind {kind} cannot be diagnosed.",
             "It stores no runs, or no equation is declared for it.",
-            f"Kinds that can: {', '.join(MAKERS)}.",
+            f"Kinds that can: {', '.join(KINDS)}.",
         )
-    return MAKERS[kind](result, measurements)
+    return KINDS[kind]
 
 
 def _fsr(result: Result, measurements: Sequence[Measurement]) -> Declared:
@@ -184,15 +229,36 @@ def _encoder(result: Result, measurements: Sequence[Measurement]) -> Declared:
     return Declared(model, made)
 
 
-MAKERS: Mapping[str, Callable[[Result, Sequence[Measurement]], Declared]] = {
-    "fsr": _fsr,
-    "torque": _torque,
-    "ft": _ft,
-    "current": _current,
-    "gearbox": _gearbox,
-    "encoder": _encoder,
+@dataclass(frozen=True)
+class _Kind:
+    """One kind of calibration.
+
+    Attributes:
+        plain: Its simplest session, from the conditions of its runs.
+        declare: Makes the declaration of a result and the measurements.
+        place: Place of the result that is declared among a session's.
+    """
+
+    plain: Callable[[Mapping[str, float | str]], Procedure]
+    declare: Callable[[Result, Sequence[Measurement]], Declared]
+    place: int = 0
+
+
+KINDS: Mapping[str, _Kind] = {
+    "fsr": _Kind(lambda said: FsrSession(curve_only=True), _fsr),
+    "torque": _Kind(
+        lambda said: TorqueSession(sensor=str(said.get("sensor", "proximal"))), _torque
+    ),
+    "ft": _Kind(lambda said: FtSession(), _ft),
+    "current": _Kind(lambda said: CurrentSession(), _current),
+    "gearbox": _Kind(lambda said: GearboxSession(stiffness_only=True), _gearbox),
+    # its periodic error is in the second result, the comparison with the other encoder
+    "encoder": _Kind(
+        lambda said: EncoderSession(encoder=str(said.get("encoder", "spindle")), line_only=True),
+        _encoder,
+        place=-1,
+    ),
 }
-"""Kind to what makes its declaration."""
 
 
 def fsr_of(result: Result) -> tuple[FsrCurve, FsrMemory]:

@@ -4,6 +4,7 @@ import shutil
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,10 @@ from rig import __version__
 from rig.errors import UsageError
 from rig.log.check import logs_in
 from rig.log.container import Attached
-from rig.log.convert import log_times_ns, recording_from_log
+from rig.log.convert import log_times_ns, recording_from_log, run_info
 from rig.log.reader import read_log
 from rig.log.recalibrate import ATTACHMENT, carried_calibrations
-from rig.log.run import RunEnd, RunInfo
+from rig.log.run import RunEnd
 from rig.log.streams import COUNTS, COUNTS_STREAM, SAMPLE, sample_stream
 from rig.log.writer import PART_SUFFIX, LogWriter
 
@@ -94,13 +95,9 @@ def read_raw(folder: Path) -> tuple[str, list[Measurement], CalibrationSet]:
 def _write(path: Path, kind: str, measurement: Measurement, lines: CalibrationSet) -> Path:
     recording, counts = measurement.recording, measurement.counts
     rate_hz = recording.sample_rate_hz
-    info = RunInfo(
-        name=recording.name,
-        rig=recording.rig,
-        instrument=recording.instrument,
-        conditions=recording.conditions,
+    info = replace(
+        run_info(recording),
         started_at_ns=time.time_ns() - round(recording.duration_s * 1e9),
-        calibrations=recording.calibrations,
         details={KIND: kind, "rig_version": __version__, "devices": dict(measurement.details)},
     )
     streams = [sample_stream(tuple(recording.columns), round(rate_hz))]

@@ -1,4 +1,4 @@
-"""An index of the recorded runs under a folder, kept in SQLite and made from the logs alone.
+"""An index of the recorded runs under a folder, kept as a JSON file and made from the logs alone.
 
 Each folder of logs is read again when the name, size or date of one of its files changed. The index
 holds nothing that the logs do not: deleted or damaged, it is built again.
@@ -7,15 +7,14 @@ holds nothing that the logs do not: deleted or damaged, it is built again.
 import hashlib
 import json
 import os
-import sqlite3
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-LAYOUT = 2
-"""Version of the tables; an index of another one is built again."""
+LAYOUT = 3
+"""Version of the index; one of another version is built again."""
 
 ENDINGS = (".mcap", ".mcap.part")
 DIAGNOSIS = Path("diagnosis") / "diagnosis.json"
@@ -23,13 +22,6 @@ DIAGNOSIS = Path("diagnosis") / "diagnosis.json"
 
 CALIBRATION = "calibration of"
 """How the protocol of a calibration's raw logs begins."""
-
-TABLES = f"""
-PRAGMA user_version = {LAYOUT};
-CREATE TABLE folders (folder TEXT PRIMARY KEY, signature TEXT, diagnosis TEXT);
-CREATE TABLE runs (folder TEXT, run TEXT);
-CREATE INDEX of_folder ON runs (folder);
-"""
 
 
 @dataclass(frozen=True)
@@ -92,7 +84,7 @@ def default_index(root: Path) -> Path:
     base = os.environ.get("XDG_CACHE_HOME")
     cache = Path(base) if base else Path.home() / ".cache"
     key = hashlib.sha256(str(root.resolve()).encode()).hexdigest()[:16]
-    return cache / "rig" / f"campaigns-{key}.sqlite"
+    return cache / "rig" / f"campaigns-{key}.json"
 
 
 def campaigns(
@@ -109,48 +101,43 @@ def campaigns(
         rebuild: Read every log again.
         on_folder: Called with each folder that is read.
 
-    Where the index cannot be written, it is made for this call alone, in memory.
+    Where the index cannot be written, it is made for this call alone.
     """
-    with suppress(OSError):
-        index.parent.mkdir(parents=True, exist_ok=True)
-    if not os.access(index if index.exists() else index.parent, os.W_OK):
-        return _up_to_date(root, Path(":memory:"), on_folder)
-    if rebuild:
-        index.unlink(missing_ok=True)
+    known = {} if rebuild else _read(index)
+    now: dict[str, Any] = {}
+    for folder, logs, signature in _folders(root):
+        entry = known.get(str(folder))
+        if entry is None or entry["signature"] != signature:
+            on_folder(folder)
+            entry = {"signature": signature, **_learnt(folder, logs)}
+        now[str(folder)] = entry
+    if now != known:
+        with suppress(OSError):
+            index.parent.mkdir(parents=True, exist_ok=True)
+            part = index.with_name(f".{index.name}.{os.getpid()}.part")
+            part.write_text(json.dumps({"layout": LAYOUT, "folders": now}))
+            part.replace(index)
+    listed = [_campaign(Path(folder), entry) for folder, entry in now.items()]
+    return sorted(listed, key=lambda c: (c.runs[0].date if c.runs else "", str(c.folder)))[::-1]
+
+
+def _read(index: Path) -> dict[str, Any]:
+    """Return the entry of each folder in an index; none of one that is damaged or not there."""
     try:
-        return _up_to_date(root, index, on_folder)
-    except sqlite3.DatabaseError:
-        index.unlink(missing_ok=True)
-        return _up_to_date(root, index, on_folder)
+        content = json.loads(index.read_bytes())
+        return dict(content["folders"]) if content["layout"] == LAYOUT else {}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
 
 
-def _up_to_date(
-    root: Path, index: Path, on_folder: Callable[[Path], None]
-) -> list[IndexedCampaign]:
-    with closing(sqlite3.connect(index)) as base, base:
-        (layout,) = base.execute("PRAGMA user_version").fetchone()
-        if layout != LAYOUT:
-            base.executescript("DROP TABLE IF EXISTS folders; DROP TABLE IF EXISTS runs;" + TABLES)
-        known = dict(base.execute("SELECT folder, signature FROM folders"))
-        there = {str(folder): found for folder, found in _folders(root)}
-        for folder in known.keys() - there.keys():
-            _forget(base, folder)
-        for folder, found in there.items():
-            if known.get(folder) != found.signature:
-                on_folder(Path(folder))
-                _forget(base, folder)
-                _learn(base, Path(folder), found)
-        return _read(base)
+def _campaign(folder: Path, entry: Mapping[str, Any]) -> IndexedCampaign:
+    runs = (IndexedRun(**run) for run in entry["runs"])
+    ordered = tuple(sorted(runs, key=lambda run: (run.date, run.file)))
+    return IndexedCampaign(folder, ordered, entry["diagnosis"])
 
 
-@dataclass(frozen=True)
-class _Found:
-    logs: tuple[Path, ...]
-    signature: str
-
-
-def _folders(root: Path) -> Iterator[tuple[Path, _Found]]:
-    """Yield every folder with logs, from a folder downwards, and a digest of each one's state."""
+def _folders(root: Path) -> Iterator[tuple[Path, list[Path], str]]:
+    """Yield every folder with logs, from a folder downwards, its logs and a digest of its state."""
     waiting = [root]
     while waiting:
         folder = waiting.pop()
@@ -161,52 +148,28 @@ def _folders(root: Path) -> Iterator[tuple[Path, _Found]]:
                     waiting.append(folder / entry.name)
                 elif entry.name.endswith(ENDINGS):
                     stat = entry.stat()
-                    logs.append(entry.name)
+                    logs.append(folder / entry.name)
                     state.update(f"{entry.name} {stat.st_size} {stat.st_mtime_ns}\n".encode())
         if logs:
             with suppress(FileNotFoundError):
                 stat = (folder / DIAGNOSIS).stat()
                 state.update(f"{stat.st_size} {stat.st_mtime_ns}".encode())
-            yield folder, _Found(tuple(folder / name for name in logs), state.hexdigest())
+            yield folder, logs, state.hexdigest()
 
 
-def _forget(base: sqlite3.Connection, folder: str) -> None:
-    base.execute("DELETE FROM folders WHERE folder = ?", (folder,))
-    base.execute("DELETE FROM runs WHERE folder = ?", (folder,))
-
-
-def _learn(base: sqlite3.Connection, folder: Path, found: _Found) -> None:
-    """Read the logs of a folder and its diagnosis into the index."""
+def _learnt(folder: Path, logs: Sequence[Path]) -> dict[str, Any]:
+    """Return the runs and the diagnosis of a folder, as the index holds them."""
     # loaded when a log is read: a search alone needs no arrays and starts faster without them
     from rig.campaigns.reading import runs_in
 
-    base.execute(
-        "INSERT INTO folders VALUES (?, ?, ?)",
-        (str(folder), found.signature, _diagnosis(folder / DIAGNOSIS)),
-    )
-    texts = [(str(folder), json.dumps(asdict(run))) for run in runs_in(found.logs)]
-    base.executemany("INSERT INTO runs VALUES (?, ?)", texts)
+    runs = [asdict(run) for run in runs_in(logs)]
+    return {"diagnosis": _diagnosis(folder / DIAGNOSIS), "runs": runs}
 
 
-def _diagnosis(path: Path) -> str | None:
-    """Return the text of a diagnosis, or None where there is none that can be read."""
+def _diagnosis(path: Path) -> Any:
+    """Return a diagnosis, or None where there is none that can be read."""
     try:
-        text = path.read_text()
-        return text if str(json.loads(text)["schema"]).startswith("rig.diagnosis/") else None
+        content = json.loads(path.read_text())
+        return content if str(content["schema"]).startswith("rig.diagnosis/") else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
-
-
-def _read(base: sqlite3.Connection) -> list[IndexedCampaign]:
-    runs: dict[str, list[IndexedRun]] = {}
-    for folder, text in base.execute("SELECT folder, run FROM runs"):
-        runs.setdefault(folder, []).append(IndexedRun(**json.loads(text)))
-    found = [
-        IndexedCampaign(
-            Path(folder),
-            tuple(sorted(runs.get(folder, []), key=lambda run: (run.date, run.file))),
-            json.loads(diagnosis) if diagnosis else None,
-        )
-        for folder, diagnosis in base.execute("SELECT folder, diagnosis FROM folders")
-    ]
-    return sorted(found, key=lambda c: (c.runs[0].date if c.runs else "", str(c.folder)))[::-1]

@@ -234,17 +234,19 @@ def diagnose(
     json: JsonFlag = False,
 ) -> None:
     """Run the diagnosis on the raw logs of a calibration."""
-    from rig.calibrate.diagnose import declared_by_record
+    from rig.calibrate.declared import declared_by_record
     from rig.diagnosis.ledger import Ledger, default_ledger
-    from rig.diagnosis.run import remember, run_diagnosis
+    from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import of_calibration
     from rig.reports.diagnosis_words import sentences
 
     asked = of_calibration(declared_by_record(_holding(record, store).get(record)))
     looks = Ledger(ledger or default_ledger())
     with stages() as on_stage:
-        done = run_diagnosis(asked.campaign, asked.models, looks, seed=seed, on_stage=on_stage)
-    remember(done, looks)
+        done, look = run_diagnosis(
+            asked.campaign, asked.models, looks, seed=seed, on_stage=on_stage
+        )
+    looks.enter(look)
     screen = results(json)
     for line in [*sentences(done.diagnosis), *done.diagnosis.notes]:
         screen.print(line, markup=False)

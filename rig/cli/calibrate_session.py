@@ -28,8 +28,7 @@ def conduct(procedure: "Procedure", how: "Keeping") -> None:
     """
     from datetime import datetime
 
-    from calibration.sessions.current import CurrentSession
-    from calibration.sessions.drive import DriveCurrentSession
+    from calibration.sessions.current import CurrentSession, DriveCurrentSession
     from calibration.store import CalibrationStore
     from rig.calibrate.raw import read_raw
     from rig.calibrate.run import Signature, keep

@@ -14,18 +14,16 @@ from typing import Any
 from estimation import model_file
 from estimation.cross_validation import HeldOutError, held_out_error
 from estimation.diagnosis.result import Diagnosis
-from estimation.diagnosis.split import evidence, split
+from estimation.diagnosis.split import split
 from estimation.files import write_text_atomic
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.campaigns.index import DIAGNOSIS
 from rig.configuration.config import Config, load_config
 from rig.diagnosis.ledger import Ledger
-from rig.diagnosis.run import remember, run_diagnosis
-from rig.diagnosis.traces import traces
-from rig.diagnosis.written import written_models
+from rig.diagnosis.run import run_diagnosis
+from rig.diagnosis.traces import traces, written_models
 from rig.importers.registry import open_campaign
-from rig.output.console import plain
 from rig.output.provenance import Provenance
 from rig.output.render import write_report
 from rig.protocols.protocol import load_protocol
@@ -101,22 +99,22 @@ def run_demo(folder: Path, seed: int, on_stage: Stage, on_progress: Progress) ->
     on_stage(f"fitting the declared model {MODEL!r} on the training runs")
     campaign = open_campaign(logs)
     # the others are the diagnosis' proof; whoever looks at them first proves nothing with them
-    campaign = campaign.select(split(evidence(campaign), seed).discover)
+    campaign = campaign.select(split(list(campaign.evidence), seed).discover)
     held_out = held_out_error(declared, campaign, FOLDS, seed)
     on_stage(held_out_sentence(declared, held_out))
     # simulated runs are not evidence about a real rig: they are not in the user's own log
     ledger = folder / "looks.jsonl"
     looks = Ledger(ledger)
-    done = run_diagnosis(
+    done, look = run_diagnosis(
         open_campaign(logs), [declared], looks, seed=seed, quick=True, on_stage=on_stage
     )
     model_path = folder / f"{MODEL}.model.toml"
     model_file.write_all(written_models(done), model_path)
-    page = diagnosis_page.page(done.diagnosis, traces(done.answer), Provenance.now(seed))
+    page = diagnosis_page.page(done.diagnosis, traces(done), Provenance.now(seed))
     kept = logs / DIAGNOSIS
     report = write_report(kept.with_suffix(".html"), page)
-    write_text_atomic(kept, json.dumps(plain(done.diagnosis.to_json()), indent=2) + "\n")
-    remember(done, looks)
+    write_text_atomic(kept, json.dumps(done.diagnosis.to_json(), indent=2) + "\n")
+    looks.enter(look)
     return Demo(
         folder,
         report,

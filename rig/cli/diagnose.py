@@ -19,7 +19,7 @@ from rig.cli.options import (
     WorkersOption,
 )
 from rig.cli.shipped import complete_recordings
-from rig.output.console import JsonFlag, emit_json, plain, results, stages
+from rig.output.console import JsonFlag, emit_json, results
 
 
 def diagnose(
@@ -69,14 +69,13 @@ def diagnose(
     from estimation import model_file
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
     from estimation.files import check_output, write_text_atomic
-    from rig.diagnosis.durations import default_durations, measured, work_of
-    from rig.diagnosis.engine import engine
+    from rig.diagnosis.durations import timed_stages
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
-    from rig.diagnosis.run import remember, run_diagnosis
+    from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import subject
-    from rig.diagnosis.traces import traces
-    from rig.diagnosis.written import with_cost_of_causal_filters, written_models
+    from rig.diagnosis.traces import traces, with_cost_of_causal_filters, written_models
+    from rig.diagnosis.work import engine
     from rig.output.provenance import Provenance
     from rig.output.render import write_report
     from rig.reports.diagnosis import page
@@ -92,9 +91,8 @@ def diagnose(
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_, machine, skip_bad)
         say_left_out(path, asked.campaign)
-        times, work = default_durations(), work_of(asked, quick)
-        with stages(times.expected(*work)) as shown, measured(shown) as (on_stage, seconds):
-            done = run_diagnosis(
+        with timed_stages(asked, quick) as on_stage:
+            done, look = run_diagnosis(
                 asked.campaign,
                 asked.models,
                 looks,
@@ -103,7 +101,6 @@ def diagnose(
                 quick=quick,
                 on_stage=on_stage,
             )
-    times.add(*work, seconds)
     # files first, then the ledger, then the screen: held-out runs are not used up by a diagnosis
     # that left nothing, and nobody sees a result that the ledger does not hold
     written = []
@@ -112,15 +109,15 @@ def diagnose(
         model_file.write_all(written_models(done), model_out)
         written += [f"Model: {model_out}", f"To estimate with it: rig model use {model_out}"]
     if page_file is not None:
-        write_report(page_file, page(done.diagnosis, traces(done.answer), Provenance.now(seed)))
+        write_report(page_file, page(done.diagnosis, traces(done), Provenance.now(seed)))
         written.append(f"Report: {page_file}")
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))
     if json_out is not None:
-        text = json.dumps(plain(done.diagnosis.to_json()), indent=2, allow_nan=False)
+        text = json.dumps(done.diagnosis.to_json(), indent=2, allow_nan=False)
         write_text_atomic(json_out, text + "\n")
         written.append(f"Diagnosis: {json_out}")
-    remember(done, looks)
+    looks.enter(look)
     screen = results(json_)
     for line in (*sentences(done.diagnosis), *done.diagnosis.notes, *written):
         screen.print(line, markup=False)

@@ -26,8 +26,8 @@ def show_diagnoses(
     """
     from functools import partial
 
-    from rig.diagnosis.engine import engine
     from rig.diagnosis.ledger import default_ledger
+    from rig.diagnosis.work import engine
     from rig.reports.diagnosed import diagnose_all
 
     folders = [one.folder for one in reversed(found)]  # the newest come first

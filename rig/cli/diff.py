@@ -31,7 +31,7 @@ def diff(
     Two dates, two instruments, before and after a repair: which declared parameters moved, which
     effects came or went. A change is stated where it predicts runs left out better than none does.
     """
-    from rig.diagnosis.compared import compared
+    from estimation.changes.compare import compare
     from rig.diagnosis.subject import subject
     from rig.output.console import progress
     from rig.output.table import to_rich
@@ -39,12 +39,13 @@ def diff(
 
     first = subject(a, model, balance, format_, machine)
     second = subject(b, model, balance, format_, machine)
-    third = None if on is None else subject(on, model, balance, format_, machine).campaign
+    third = () if on is None else subject(on, model, balance, format_, machine).campaign.evidence
     for path, campaign in ((a, first.campaign), (b, second.campaign)):
         say_left_out(path, campaign)
     with progress() as bar:
         task = bar.add_task("changes", total=1)
-        found: Difference = compared(first.campaign, second.campaign, first.models, third, seed)
+        both = first.campaign.evidence, second.campaign.evidence
+        found: Difference = compare(*both, first.models, third, seed)
         bar.advance(task)
     screen = results(json_)
     for line in lines(found):

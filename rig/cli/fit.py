@@ -34,8 +34,8 @@ def fit_states(
 ) -> None:
     """Fit products of physical states, and report the error on runs left out."""
     from estimation.bank.states import LOAD_SCALES, Bank
+    from estimation.cross_validation import held_out_score
     from estimation.estimators.bank import BankRecipe
-    from estimation.estimators.held_out import held_out_score
     from rig.errors import UsageError
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.models.origins import with_origin

@@ -97,7 +97,7 @@ def follow(
     quits and disarms the motors.
     """
     from rig.configuration.check import refuse_problems
-    from rig.grasper.following import follow_master
+    from rig.grasper.follow import follow_master
 
     # the simulated rig of this command is the simulated grasper
     settings = chosen_rig(Path("grasper") if sim and config is None else config, sim=False)

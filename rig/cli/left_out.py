@@ -17,7 +17,7 @@ SkipBad = Annotated[
 
 def say_left_out(path: Path, campaign: "Campaign") -> None:
     """Print on stderr the files and runs at a path that a campaign excludes, with the reason."""
-    from rig.importers.left_out import left_out
+    from rig.importers.registry import left_out
 
     screen = remarks()
     for line in left_out(path, campaign):

@@ -107,9 +107,10 @@ def _export_campaign(
 ) -> None:
     """Write all runs as one table."""
     from rig.errors import UsageError
-    from rig.importers.tidy import TidyFormat, write_tidy
+    from rig.importers.tidy import write_tidy
+    from rig.log.export import ExportFormat
 
-    known = [item.value for item in TidyFormat]
+    known = [ExportFormat.CSV.value, ExportFormat.PARQUET.value]
     if format_name not in known:
         raise UsageError(
             f"A campaign is not exported as {format_name!r}.",
@@ -118,7 +119,7 @@ def _export_campaign(
     if out is not None and out.is_dir():
         out = out / f"{path.resolve().name}.{format_name}"
     target = out or path.resolve().with_name(f"{path.resolve().name}.{format_name}")
-    _said([write_tidy(campaign, target, TidyFormat(format_name), force)], campaign, json)
+    _said([write_tidy(campaign, target, ExportFormat(format_name), force)], campaign, json)
 
 
 def _other_calibrations(

@@ -48,9 +48,9 @@ def loop(
     Ends when every effect is unique, when the model is complete, or at the limit of rounds or time.
     """
     from rig.configuration.config import load_config
-    from rig.diagnosis.engine import engine
     from rig.diagnosis.loop import Budget, Round, run_loop
     from rig.diagnosis.subject import declared_models
+    from rig.diagnosis.work import engine
     from rig.errors import UsageError
     from rig.protocols.protocol import load_protocol
     from rig.simulation.hidden import chosen
@@ -104,7 +104,7 @@ def _report(one: "Round", folder: Path, seed: int, screen: "Console") -> None:
     from rig.reports.diagnosis_words import next_sentence, sentences
 
     found = one.done.diagnosis
-    text = page(found, traces(one.done.answer), Provenance.now(seed))
+    text = page(found, traces(one.done), Provenance.now(seed))
     where = write_report(folder / f"round-{one.number}" / "diagnosis.html", text)
     last = one.stopped or next_sentence(found)
     for line in (*sentences(found), f"Report: {where}", last):

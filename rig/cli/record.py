@@ -13,7 +13,8 @@ from rig.output.console import JsonFlag, emit_json, progress, remarks, results
 
 if TYPE_CHECKING:
     from rig.configuration.config import Config
-    from rig.machines.machine import Machine, MachinePlan
+    from rig.machines.machine import Machine
+    from rig.protocols.protocol import Plan
     from rig.recording.campaign import RunResult
     from rig.recording.watch import RunWatch
 
@@ -93,7 +94,7 @@ def record(
 
 def _recorded(
     settings: "Config",
-    todo: "list[MachinePlan]",
+    todo: "list[Plan]",
     folder: Path,
     notes: str,
     watch: "RunWatch | None",

@@ -29,8 +29,8 @@ def show_refit(
     from functools import partial
 
     from estimation.model_file import read, to_toml
-    from rig.diagnosis.engine import engine
     from rig.diagnosis.refit import refit_all
+    from rig.diagnosis.work import engine
 
     declared = to_toml(read(Path(model)))
     dates = {one.folder: one.runs[0].date for one in reversed(found)}  # the newest come first

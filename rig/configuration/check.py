@@ -12,10 +12,10 @@ from urllib.parse import parse_qsl
 from pydantic import ConfigDict, ValidationError, create_model
 
 from calibration.linear import SHIPPED as SHIPPED_CALIBRATIONS
-from drivers.registry import CanUse, Driver, drivers, fakes
+from drivers.registry import Driver, drivers, fakes
 from rig.configuration.config import SHIPPED, Config, is_simulated
 from rig.configuration.machine_settings import settings_of
-from rig.configuration.sections import DeviceSection, LoggerSection
+from rig.configuration.sections import DeviceSection
 from rig.configuration.validation import explain
 from rig.errors import UsageError
 
@@ -41,7 +41,7 @@ class Problem:
 def problems(config: Config) -> list[Problem]:
     """Return the problems of a configuration beyond its keys and ranges; empty when sound."""
     known = drivers()
-    sections: dict[str, LoggerSection | DeviceSection] = {LOGGER: config.logger, **config.devices}
+    sections: dict[str, DeviceSection] = {LOGGER: config.logger, **config.devices}
     found = [
         p for name, section in sections.items() for p in _driver_problems(name, section, known)
     ]
@@ -94,7 +94,7 @@ def _unknown(key: str, name: str, known: list[str]) -> Problem:
 
 
 def _driver_problems(
-    name: str, section: LoggerSection | DeviceSection, known: Mapping[str, Driver]
+    name: str, section: DeviceSection, known: Mapping[str, Driver]
 ) -> list[Problem]:
     key = _key(name)
     driver = known.get(section.driver)
@@ -141,7 +141,7 @@ class _OnBus:
 
 
 def _bus_problems(
-    sections: Mapping[str, LoggerSection | DeviceSection], known: Mapping[str, Driver]
+    sections: Mapping[str, DeviceSection], known: Mapping[str, Driver]
 ) -> list[Problem]:
     buses: dict[str, list[_OnBus]] = {}
     found = []
@@ -150,7 +150,8 @@ def _bus_problems(
         if use is None or not section.url.startswith("can:"):
             continue
         bus, _, query = section.url.partition("?")
-        place = _place(name, section, use, known[section.driver].options)
+        options = {**known[section.driver].options, **section.options}
+        place = _OnBus(name, use.identifiers(options), section.bit_rate or use.bit_rate)
         said = dict(parse_qsl(query)).get("bitrate")
         if said is not None and said != str(place.bit_rate):
             found.append(
@@ -173,13 +174,6 @@ def _bus_problems(
                 )
             )
     return found
-
-
-def _place(
-    name: str, section: LoggerSection | DeviceSection, use: CanUse, defaults: Mapping[str, Any]
-) -> _OnBus:
-    identifiers = use.identifiers({**defaults, **section.options})
-    return _OnBus(name, identifiers, section.bit_rate or use.bit_rate)
 
 
 def _clash(bus: str, one: _OnBus, other: _OnBus) -> list[Problem]:

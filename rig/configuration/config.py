@@ -1,13 +1,11 @@
 """The rig's configuration: one TOML file, every key checked, the resolved form kept in each log."""
 
 import tomllib
-from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import (
-    BaseModel,
     Field,
     SerializeAsAny,
     ValidationError,
@@ -248,25 +246,8 @@ def _found(path: Path) -> Path:
 
 def _known_keys() -> set[str]:
     """Every key of a configuration, whatever machine it is of."""
-    keys = _keys(Config)
-    for settings in map(settings_of, profiles()):
-        for kind in (settings.limits, settings.drift, settings.own):
-            keys |= _keys(kind)
-    return keys
-
-
-def _keys(model: type[BaseModel]) -> set[str]:
-    return set(model.model_fields) | {
-        key
-        for info in model.model_fields.values()
-        for section in _sections(info.annotation)
-        for key in _keys(section)
-    }
-
-
-def _sections(kind: Any) -> Iterator[type[BaseModel]]:
-    """Yield the sections a key's type is made of."""
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        yield kind
-    for part in get_args(kind):
-        yield from _sections(part)
+    every = map(settings_of, profiles())
+    kinds = [Config, *(kind for one in every for kind in (one.limits, one.drift, one.own))]
+    schemas = [kind.model_json_schema() for kind in kinds]
+    tables = [table for whole in schemas for table in (whole, *whole.get("$defs", {}).values())]
+    return {key for table in tables for key in table.get("properties", {})}

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from typing import Any
 
 from pydantic import ConfigDict, Field
 
@@ -43,23 +44,40 @@ class MachineSettings:
     moves: bool = True
 
 
+def installed(group: str, profile: str) -> Any:
+    """Return the object in an entry point group for a profile.
+
+    Raises:
+        UsageError: None is installed, or it cannot be loaded.
+    """
+    found = entry_points(group=group, name=profile)
+    if not found:
+        known = ", ".join(sorted(entry.name for entry in entry_points(group=group)))
+        raise UsageError(
+            f"Nothing is installed for [logger] profile = {profile!r}.",
+            f"The entry point group {group} has: {known or 'none'}.",
+            "Install the project again (`pip install -e .`), or name another profile.",
+        )
+    entry = next(iter(found))
+    try:
+        return entry.load()
+    except (ImportError, AttributeError) as error:
+        raise UsageError(
+            f"{entry.value} cannot be loaded: {error}.",
+            f"It is installed for [logger] profile = {entry.name!r}.",
+            "Install its package again, or remove it.",
+        ) from error
+
+
 def settings_of(profile: str) -> MachineSettings:
     """Settings of the machine that is installed under a name.
 
     Raises:
         UsageError: None is, or it cannot be loaded.
     """
-    try:
-        (entry,) = entry_points(group=MACHINE_SETTINGS, name=profile)
-        loaded = entry.load()
-    except (ValueError, ImportError, AttributeError) as error:
-        raise UsageError(
-            f"The settings of [logger] profile = {profile!r} cannot be loaded.",
-            f"{error}.",
-            "Install the package of that machine again, or name another profile.",
-        ) from error
+    loaded = installed(MACHINE_SETTINGS, profile)
     if not isinstance(loaded, MachineSettings):
-        raise UsageError(f"{entry.value} is a {type(loaded).__name__}, not MachineSettings.")
+        raise UsageError(f"{profile}: a {type(loaded).__name__} is installed, not MachineSettings.")
     return loaded
 
 

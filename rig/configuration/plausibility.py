@@ -6,14 +6,15 @@ compiler, does not.
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from rig.configuration.sections import Number, Section
 
 Window = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 Ratio = Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class PlausibilitySection(BaseModel):
+class PlausibilitySection(Section):
     """What is believed of the drive train; defaults are those of the reference rig.
 
     Each window is wider than what the shipped protocols need on simulated rigs whose parameters
@@ -57,8 +58,6 @@ class PlausibilitySection(BaseModel):
         spindle_jump_rad: Farthest the spindle may turn in one sample.
         jaw_jump_rad: Farthest the jaw may turn in one sample.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     following_rad: Window = 0.5
     following_s: Annotated[float, Field(gt=0, le=60)] = 0.2

@@ -40,7 +40,24 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class LoggerSection(Section):
+class DeviceSection(Section):
+    """A further device whose channels are recorded with the logger's.
+
+    Attributes:
+        driver: Name of its driver; `rig devices` lists them.
+        url: URL; `sim://` for its fake.
+        options: The driver's own options.
+        bit_rate: Bit rate it is set to, bit/s, where it is on a CAN bus; the one it comes with
+            from the factory if none.
+    """
+
+    driver: str
+    url: str
+    options: dict[str, Any] = Field(default_factory=dict)
+    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
+
+
+class LoggerSection(DeviceSection):
     """The board or drive that moves and samples the rig, and its URL.
 
     Attributes:
@@ -57,27 +74,7 @@ class LoggerSection(Section):
     """
 
     driver: str = "teensy"
-    url: str
     profile: Profile = "reference"
-    options: dict[str, Any] = Field(default_factory=dict)
-    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
-
-
-class DeviceSection(Section):
-    """A further device whose channels are recorded with the logger's.
-
-    Attributes:
-        driver: Name of its driver; `rig devices` lists them.
-        url: URL; `sim://` for its fake.
-        options: The driver's own options.
-        bit_rate: Bit rate it is set to, bit/s, where it is on a CAN bus; the one it comes with
-            from the factory if none.
-    """
-
-    driver: str
-    url: str
-    options: dict[str, Any] = Field(default_factory=dict)
-    bit_rate: int | None = Field(default=None, ge=10_000, le=1_000_000)
 
 
 class ControllerSection(Section):

@@ -8,93 +8,75 @@ import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from rig.diagnosis.ledger import state_folder
 from rig.diagnosis.subject import Subject
-
-LATEST = 5
-"""Earlier diagnoses of a kind that count."""
+from rig.output.console import stages
 
 Range = tuple[float, float]
 """Shortest and longest time, s."""
 
 
-@dataclass(frozen=True)
-class Durations:
-    """The times so far.
+@contextmanager
+def timed_stages(asked: Subject, quick: bool = False) -> Iterator[Callable[[str], None]]:
+    """Yield what is called with each stage of a diagnosis that begins; its times are kept.
 
-    Attributes:
-        path: The file; made at the first use.
-    """
-
-    path: Path
-
-    def expected(self, kind: str, size: float) -> dict[str, Range]:
-        """Return each stage's time, in order; empty where none of the kind was measured.
-
-        Args:
-            kind: Kind of the diagnosis.
-            size: Bytes of its recordings.
-        """
-        found: dict[str, list[float]] = {}
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            lines = self.path.read_text("utf-8").splitlines()
-            known = [line for line in map(json.loads, lines) if line["kind"] == kind]
-            for one in known[-LATEST:]:
-                for stage, seconds in one["seconds"].items():
-                    found.setdefault(stage, []).append(seconds * size / one["size"])
-        return {stage: (min(times), max(times)) for stage, times in found.items()}
-
-    def add(self, kind: str, size: float, seconds: Mapping[str, float]) -> None:
-        """Add the times of a diagnosis; a folder that cannot be written costs no diagnosis."""
-        if not size:  # recordings in memory
-            return
-        line = json.dumps({"kind": kind, "size": size, "seconds": dict(seconds)})
-        with suppress(OSError):
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            with self.path.open("a", encoding="utf-8") as file:
-                file.write(line + "\n")
-
-
-def default_durations() -> Durations:
-    """Return the file in the folder of the access log."""
-    return Durations(state_folder() / "durations.jsonl")
-
-
-def work_of(asked: Subject, quick: bool = False) -> tuple[str, float]:
-    """Return the kind of a diagnosis, and the bytes of its recordings.
+    A terminal shows each stage and the time that is left.
 
     Args:
         asked: What is diagnosed.
         quick: Whether no next experiment is proposed.
     """
+    place, (kind, size) = state_folder() / "durations.jsonl", work_of(asked, quick)
+    began: list[tuple[str, float]] = []
+    with stages(expected(place, kind, size)) as show:
+
+        def begin(stage: str) -> None:
+            began.append((stage, time.monotonic()))
+            show(stage)
+
+        yield begin
+    ends = [*(at for _, at in began[1:]), time.monotonic()]
+    seconds: dict[str, float] = {}
+    for (stage, at), end in zip(began, ends, strict=True):
+        seconds[stage] = seconds.get(stage, 0.0) + end - at
+    add(place, kind, size, seconds)
+
+
+def work_of(asked: Subject, quick: bool = False) -> tuple[str, float]:
+    """Return the kind of a diagnosis, and the bytes of its recordings."""
     files = [run.source for run in asked.campaign.runs if run.source and run.source.is_file()]
     endings = sorted({path.suffix.lower() for path in files})
     equations = [model.balance for model in asked.models]
-    return " ".join((*equations, *endings, *(["quick"] if quick else []))), float(
-        sum(path.stat().st_size for path in files)
-    )
+    kind = " ".join((*equations, *endings, *(["quick"] if quick else [])))
+    return kind, float(sum(path.stat().st_size for path in files))
 
 
-@contextmanager
-def measured(
-    on_stage: Callable[[str], None],
-) -> Iterator[tuple[Callable[[str], None], dict[str, float]]]:
-    """Yield what is called with each stage that begins, and the seconds of those that ended."""
-    seconds: dict[str, float] = {}
-    began: list[tuple[str, float]] = []
+def expected(place: Path, kind: str, size: float, latest: int = 5) -> dict[str, Range]:
+    """Return each stage's time, in order; empty where none of the kind was measured.
 
-    def end() -> None:
-        for stage, start in began:
-            seconds[stage] = seconds.get(stage, 0.0) + time.monotonic() - start
-        began.clear()
+    Args:
+        place: File of the times so far.
+        kind: Kind of the diagnosis.
+        size: Bytes of its recordings.
+        latest: Earlier diagnoses that count.
+    """
+    found: dict[str, list[float]] = {}
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        lines = place.read_text("utf-8").splitlines()
+        known = [line for line in map(json.loads, lines) if line["kind"] == kind]
+        for one in known[-latest:]:
+            for stage, seconds in one["seconds"].items():
+                found.setdefault(stage, []).append(seconds * size / one["size"])
+    return {stage: (min(times), max(times)) for stage, times in found.items()}
 
-    def begin(what: str) -> None:
-        end()
-        began.append((what, time.monotonic()))
-        on_stage(what)
 
-    yield begin, seconds
-    end()
+def add(place: Path, kind: str, size: float, seconds: Mapping[str, float]) -> None:
+    """Add the times of a diagnosis; a folder that cannot be written costs no diagnosis."""
+    if not size:  # recordings in memory
+        return
+    with suppress(OSError):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with place.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"kind": kind, "size": size, "seconds": seconds}) + "\n")

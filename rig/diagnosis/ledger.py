@@ -19,6 +19,9 @@ from estimation.files import OutputError, check_output, write_text_atomic
 from estimation.recording import Recording
 from rig.errors import DataError
 
+Look = Mapping[str, Any]
+"""One use of runs, a line of the ledger."""
+
 
 class LedgerError(DataError):
     """The ledger cannot be read or written."""
@@ -34,10 +37,6 @@ def state_folder() -> Path:
 def default_ledger() -> Path:
     """Return the access log, in the state folder."""
     return state_folder() / "looks.jsonl"
-
-
-Look = Mapping[str, Any]
-"""One use of runs, a line of the ledger."""
 
 
 def look_at(recordings: Sequence[Recording], sealed: Sealed) -> Look:
@@ -63,23 +62,26 @@ class Ledger:
 
     path: Path
 
-    def seen(self, recordings: Sequence[Recording], sealed: Sealed) -> tuple[str, ...]:
-        """Return the test runs that an earlier diagnosis used.
-
-        Raises:
-            LedgerError: The ledger cannot be read.
-        """
-        known = self.known(recordings)
-        return tuple(name for name in sealed.confirm if name in known)
-
     def known(self, recordings: Sequence[Recording]) -> frozenset[str]:
         """Return the names of the runs that any earlier diagnosis used, under whatever name.
 
         Raises:
             LedgerError: The ledger cannot be read.
         """
-        looked_at = {run for look in self._looks() for run in look}
-        return frozenset(r.name for r in recordings if samples_hash(r) in looked_at)
+        try:
+            looks = [
+                json.loads(line)["runs"].values()
+                for line in self._text().splitlines()
+                if line.strip()
+            ]
+        except (OSError, ValueError, KeyError, AttributeError) as error:
+            raise LedgerError(
+                f"The ledger of diagnoses {self.path} cannot be read.",
+                str(error),
+                "Move it away; every use in it will then count as the first one.",
+            ) from error
+        used = {run for look in looks for run in look}
+        return frozenset(r.name for r in recordings if samples_hash(r) in used)
 
     def check(self) -> None:
         """Refuse a log that could not be written, before the work of a diagnosis.
@@ -92,25 +94,19 @@ class Ledger:
         except OutputError as error:
             raise self._unwritable(error) from error
 
-    def write(self, recordings: Sequence[Recording], sealed: Sealed) -> None:
-        """Enter a use, before its result is shown.
-
-        Raises:
-            LedgerError: The ledger cannot be read or written.
-        """
-        self.enter(look_at(recordings, sealed))
-
     def enter(self, look: Look) -> None:
-        """Enter a use that `look_at` described.
+        """Enter a use that `look_at` described, before its result is shown.
 
         Raises:
             LedgerError: The ledger cannot be read or written.
         """
         try:
-            before = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
-            write_text_atomic(self.path, before + json.dumps(look) + "\n")
+            write_text_atomic(self.path, self._text() + json.dumps(look) + "\n")
         except (OSError, OutputError) as error:
             raise self._unwritable(error) from error
+
+    def _text(self) -> str:
+        return self.path.read_text(encoding="utf-8") if self.path.exists() else ""
 
     def _unwritable(self, error: Exception) -> LedgerError:
         return LedgerError(
@@ -118,16 +114,3 @@ class Ledger:
             f"{error} Without it a second use of the same runs would pass as the first.",
             "Name another place with --ledger or RIG_STATE_DIR.",
         )
-
-    def _looks(self) -> list[list[str]]:
-        if not self.path.exists():
-            return []
-        try:
-            lines = self.path.read_text(encoding="utf-8").splitlines()
-            return [list(json.loads(line)["runs"].values()) for line in lines if line.strip()]
-        except (OSError, ValueError, KeyError, AttributeError) as error:
-            raise LedgerError(
-                f"The ledger of diagnoses {self.path} cannot be read.",
-                str(error),
-                "Move it away; every use in it will then count as the first one.",
-            ) from error

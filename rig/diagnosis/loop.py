@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from estimation.causes.verdict import Answer
 from estimation.diagnosis.result import Diagnosis
 from estimation.files import write_text_atomic
 from estimation.model import Model
@@ -18,13 +19,11 @@ from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.diagnosis.ledger import Ledger
-from rig.diagnosis.run import Diagnosed, remember, run_diagnosis
+from rig.diagnosis.run import run_diagnosis
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 from rig.protocols.protocol import Protocol, load_protocol, protocol_toml
 from rig.recording.campaign import Progress, open_campaign_folder, record_campaign
-
-FIRST = "diagnosis"
 
 UNIQUE = "every name is unique"
 NOTHING = "nothing is missing above the floor"
@@ -41,8 +40,8 @@ class Budget:
         minutes: Time after which no further round begins.
     """
 
-    rounds: int = 3
-    minutes: float = 20.0
+    rounds: int
+    minutes: float
 
     def __post_init__(self) -> None:
         if self.rounds < 1 or not self.minutes > 0:
@@ -69,7 +68,7 @@ class Round:
     experiment: str
     folder: Path
     runs: int
-    done: Diagnosed
+    done: Answer
     stopped: str
 
     def to_json(self) -> dict[str, Any]:
@@ -126,14 +125,14 @@ def run_loop(
     if folder.exists() and any(folder.iterdir()):
         raise UsageError(f"{folder} is not empty.", fix="Name another folder with --out.")
     began = clock()
-    protocol = first or load_protocol(FIRST)
+    protocol = first or load_protocol("diagnosis")
     ledger = Ledger(folder / "looks.jsonl")
     for number in range(1, budget.rounds + 1):
         place = folder / "runs" / f"round-{number}"
         on_stage(f"round {number}: recording {protocol.name!r}")
         runs = _record(_with_noise_of(config, number), protocol, place, on_progress)
         write_text_atomic(folder / f"round-{number}.protocol.toml", protocol_toml(protocol))
-        done = run_diagnosis(
+        done, look = run_diagnosis(
             open_campaign(folder / "runs"),
             models,
             ledger,
@@ -142,7 +141,7 @@ def run_loop(
             quick=quick,
             on_stage=lambda what, n=number: on_stage(f"round {n}: {what}"),  # type: ignore[misc]
         )
-        remember(done, ledger)
+        ledger.enter(look)
         spent = number == budget.rounds or clock() - began > 60.0 * budget.minutes
         stopped = _settled(done.diagnosis) or (SPENT if spent else "")
         yield Round(number, protocol.name, place, runs, done, stopped)

@@ -13,12 +13,6 @@ from rig.errors import UsageError
 from rig.protocols.protocol import load_protocol
 from rig.simulation.campaign import simulate_reference_campaign
 
-SEED = 1
-"""Seed of the simulated sensors' noise."""
-
-LISTED = 0.05
-"""Probability from which another effect is listed."""
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -45,7 +39,7 @@ class Plan:
                     "place": one.place,
                     "family": one.family,
                     "probability": round(one.share, 4),
-                    "others": {name: round(p, 4) for name, p in listed(one).items()},
+                    "others": {name: round(p, 4) for name, p in _listed(one).items()},
                 }
                 for one in self.effects
             ],
@@ -86,14 +80,14 @@ def plan_of(
                 "Name recordings of the machine instead: rig diagnose --plan RECORDINGS.",
             )
         models = declared_models(model, balance)
-        recordings = list(simulate_reference_campaign(SEED, str(path)).evidence)
+        recordings = list(simulate_reference_campaign(1, str(path)).evidence)
     found = isolability(models, recordings, on_part=on_part)
     return Plan(str(path), len(recordings), tuple(found))
 
 
-def listed(one: Isolable) -> dict[str, float]:
+def _listed(one: Isolable, least: float = 0.05) -> dict[str, float]:
     """Return the other effects that are worth a word, with their probabilities."""
-    return {name: p for name, p in one.others.items() if p >= LISTED}
+    return {name: p for name, p in one.others.items() if p >= least}
 
 
 def sentences(plan: Plan) -> list[str]:
@@ -107,28 +101,22 @@ def sentences(plan: Plan) -> list[str]:
         f" {len(unseen)} would not be seen.",
     ]
     for one in vague:
-        others = ", ".join(f"{name} {p:.2f}" for name, p in listed(one).items())
+        others = ", ".join(f"{name} {p:.2f}" for name, p in _listed(one).items())
         lines.append(f"  {one.equation}: {one.family} {one.share:.2f} or {others} ({one.place})")
     if unseen:
         lines.append("Not seen, because the declared terms or the run offsets take its place:")
         lines += [f"  {one.equation}: {one.family} ({one.place})" for one in unseen]
-    advice = _advice(vague)
+    advice = {
+        effect.family: effect.told_apart_by
+        for one in vague
+        for effect in catalogue().values()
+        if effect.family == one.family and effect.told_apart_by
+    }
     if advice:
-        lines += ["What distinguishes them:", *advice]
+        lines.append("What distinguishes them:")
+        lines += [f"  {family}: {text}" for family, text in sorted(advice.items())]
     return lines
 
 
 def _seen(one: Isolable) -> bool:
     return one.others.get(NOTHING, 0.0) < 1.0 - IN_SET / 2.0
-
-
-def _advice(vague: list[Isolable]) -> list[str]:
-    """Return the advice for effects that are one of several, an effect a line."""
-    known = catalogue()
-    said = {
-        effect.family: effect.told_apart_by
-        for one in vague
-        for effect in known.values()
-        if effect.family == one.family and effect.told_apart_by
-    }
-    return [f"  {family}: {text}" for family, text in sorted(said.items())]

@@ -2,31 +2,50 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from estimation import model_file
+from estimation.campaign import Campaign
 from estimation.causes.experiment import Question, question, separation
 from estimation.causes.verdict import Answer
 from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.result import Diagnosis
 from estimation.effects import catalogue
+from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
+from estimation.fitting import fit
+from estimation.model import Model
 from estimation.recording import Recording
 from rig.configuration.config import load_config
-from rig.diagnosis.menu import menu, room_of, within
-from rig.diagnosis.simulated import simulated_rig
+from rig.configuration.machine_settings import ReferenceLimits
+from rig.errors import RigError
 from rig.protocols.protocol import Protocol, protocol_toml
-from rig.simulation.twin import Twin
+from rig.simulation.fitted_rig import FittedRig, fitted_rig
 
-SEED = 7_000_000
-"""Seed of the simulated sensors' noise."""
+PLAYED = ("motor", "gearbox", "cable", "stretch")
+"""Equations of the simulated rig's own parts; also the names of their shipped models."""
+
+MENU = {
+    "grasps": "the plain grasps again, at three loads",
+    "speeds": "constant speeds from slow to fast, both ways, at three loads",
+    "reversals": "tiny motions to and fro, at three loads",
+    "holds": "steps that are held, at three loads",
+    "loads": "grasps while the load climbs and falls",
+    "free": "slow and fast sweeps without load",
+    "chirp": "small grasps that become faster and faster",
+    "dwells": "moves after rests of different length",
+}
 
 COST_PER_MINUTE = 0.01
 """Separation that a minute at the rig must add: a hundredth of the noise's variance."""
 
-PAUSE_S = 60.0
-"""Time between runs of a new campaign."""
+OF_LIMIT = 0.8
+"""Share of a limit of the rig that a proposed experiment may use."""
 
 
 def propose(
@@ -47,22 +66,34 @@ def propose(
     if found is None:
         return None
     place, hypotheses = found
-    balance = answer.diagnosis.findings[place].balance
     names = [one.label for one in hypotheses.hypotheses]
+    described = {"balance": answer.diagnosis.findings[place].balance, "between": names}
     train = [r for r in recordings if r.name in answer.diagnosis.sealed.discover]
-    declared = [equation.model for equation in answer.layout.equations.values()]
-    rig = simulated_rig(declared, train)
-    if rig is None:
-        return _by_hand(balance, names)
-    last_s = max(float(r[CAMPAIGN_TIME][-1]) for r in recordings)
-    offered = menu(room_of(recordings, load_config().reference_limits))
-    worth = partial(_worth, rig, hypotheses, last_s)
-    values = list(map(worth, offered) if executor is None else executor.map(worth, offered))
-    scored = [(p, v) for p, v in zip(offered, values, strict=True) if v is not None]
+    rig = simulated_rig([equation.model for equation in answer.layout.equations.values()], train)
+    scored: list[tuple[Protocol, float]] = []
+    if rig is not None:
+        last_s = max(float(r[CAMPAIGN_TIME][-1]) for r in recordings)
+        offered = menu(recordings, load_config().reference_limits)
+        worth = partial(_worth, rig, hypotheses, last_s)
+        values = map(worth, offered) if executor is None else executor.map(worth, offered)
+        scored = [(p, v) for p, v in zip(offered, values, strict=True) if v is not None]
     if not scored:
-        return _by_hand(balance, names)
+        return _by_hand(described)
     scored.sort(key=lambda pair: COST_PER_MINUTE * _seconds(pair[0]) / 60.0 - pair[1])
-    return _described(balance, names, scored)
+    best, separated = scored[0]
+    return {
+        "name": best.name,
+        "description": best.description,
+        **described,
+        "discrimination": separated,
+        "others": {other.name: value for other, value in scored[1:]},
+        "seconds": _seconds(best),
+        "protocol": {
+            "name": best.name,
+            "description": best.description,
+            "runs": [table.model_dump(exclude_unset=True) for table in best.runs],
+        },
+    }
 
 
 def write_protocol(diagnosis: Diagnosis, path: Path) -> str:
@@ -76,15 +107,99 @@ def write_protocol(diagnosis: Diagnosis, path: Path) -> str:
     return f"Next: rig record --protocol {path}"
 
 
-def _worth(rig: Twin, asked: Question, last_s: float, protocol: Protocol) -> float | None:
+def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> FittedRig | None:
+    """Return the simulated rig with the fitted equations.
+
+    An equation that is not diagnosed is taken from the shipped models and fitted on the same runs:
+    the plant needs all its parts.
+
+    Args:
+        fitted: The declared equations, fitted on the training runs.
+        train: The training runs.
+
+    Returns:
+        None where the simulated rig has none of the equations, or the runs lack a channel.
+    """
+    own = {model.balance: model for model in fitted if model.balance in PLAYED}
+    if not own:
+        return None
+    campaign, parts = Campaign.of(train), []
+    signals = next(iter(own.values())).signals
+    try:
+        for name in PLAYED:
+            try:
+                shipped = replace(model_file.read(Path(name)), signals=signals)
+                parts.append(own.get(name) or fit(shipped, campaign, bootstrap=0))
+            except EstimationError:
+                continue
+        return fitted_rig(parts, list(campaign.evidence))
+    except (RigError, EstimationError):
+        return None
+
+
+def menu(recordings: Sequence[Recording], limits: ReferenceLimits) -> list[Protocol]:
+    """Return the experiments: six short runs each, so that some of them can confirm.
+
+    Args:
+        recordings: Runs that have shown the travel.
+        limits: Limits of the rig, for travel and loads.
+    """
+    angles = np.concatenate([r["spindle_angle_rad"] for r in recordings])
+    reach = OF_LIMIT * limits.spindle_angle_rad
+    low, high = (float(x) for x in np.clip(np.percentile(angles, [1, 99]), -reach, reach))
+    whole, travel = high - low, round(0.6 * (high - low), 4)
+    loads = [load for load in (0.15, 0.5, 0.9) if load <= OF_LIMIT * limits.load_command_a]
+    climb = [loads[0], loads[-1], loads[len(loads) // 2], loads[0]]
+    levels = [round(part * travel, 4) for part in (0, 0.5, 1, 0.5, 0)]
+    tiny, small = (round(part * whole, 4) for part in (0.04, 0.06))
+    starts = [round(low + part * whole, 4) for part in (0.05, 0.3)]
+    every = {"loads_a": loads, "jaw_starts_rad": starts}
+    half = {"amplitude_rad": round(0.5 * travel, 4), **every}
+    along = {"travel_rad": travel, **every}
+    sine = {"kind": "sine", "duration_s": 10.0, **half}
+    rests, speeds = [0.2, 4.0, 1.0, 0.2, 2.0], [0.12, 0.3, 0.8, 1.5]
+    climbing = {"kind": "load_staircase", **half, "loads_a": climb, "hold_s": 3.0}
+    tables: dict[str, dict[str, object]] = {
+        "grasps": {**sine, "frequencies_hz": [0.3]},
+        "speeds": {"kind": "speed_staircase", "speeds_rad_s": speeds, "pause_s": 0.1, **along},
+        "reversals": {**sine, "frequencies_hz": [0.8], "amplitude_rad": tiny},
+        "holds": {"kind": "step_hold", "levels_rad": levels, "hold_s": 2.5, **every},
+        "loads": {**climbing, "frequencies_hz": [0.15, 0.3, 0.5]},
+        "free": {**sine, "frequencies_hz": [0.1, 0.25, 0.5], "loads_a": [0.0]},
+        "chirp": {"kind": "chirp", "low_hz": 0.2, "high_hz": 4.0, "amplitude_rad": small, **every},
+        "dwells": {"kind": "dwell", "dwells_s": rests, **along},
+    }
+    return [
+        Protocol.model_validate({"name": name, "description": MENU[name], "runs": [table]})
+        for name, table in tables.items()
+    ]
+
+
+def within(recordings: Sequence[Recording], limits: ReferenceLimits) -> bool:
+    """Whether simulated runs stay away from every limit."""
+    return all(
+        float(np.abs(run[name]).max()) <= OF_LIMIT * limit
+        for run in recordings
+        for name, limit in limits.model_dump().items()
+        if name in run
+    )
+
+
+def _worth(
+    rig: FittedRig,
+    asked: Question,
+    last_s: float,
+    protocol: Protocol,
+    seed: int = 7_000_000,
+    pause_s: float = 60.0,
+) -> float | None:
     """Return the expected separation of an experiment; None beyond the limits of the rig."""
-    plans = protocol.plans()
-    played = [rig.play(plan, SEED + k) for k, plan in enumerate(plans)]
+    played = [rig.play(plan, seed + k) for k, plan in enumerate(protocol.plans())]
     if not within(played, load_config().reference_limits):
         return None
     timed = []
     for recording in played:
-        last_s += PAUSE_S
+        last_s += pause_s
         timed.append(recording.with_columns(**{CAMPAIGN_TIME: last_s + recording.time_s}))
         last_s += float(recording.time_s[-1])
     return separation(asked, timed)
@@ -94,37 +209,16 @@ def _seconds(protocol: Protocol) -> float:
     return sum(plan.duration_s for plan in protocol.plans())
 
 
-def _described(
-    balance: str, between: Sequence[str], scored: Sequence[tuple[Protocol, float]]
-) -> dict[str, Any]:
-    protocol, best = scored[0]
-    return {
-        "name": protocol.name,
-        "description": protocol.description,
-        "balance": balance,
-        "between": list(between),
-        "discrimination": best,
-        "others": {other.name: value for other, value in scored[1:]},
-        "seconds": _seconds(protocol),
-        "protocol": {
-            "name": protocol.name,
-            "description": protocol.description,
-            "runs": [table.model_dump(exclude_unset=True) for table in protocol.runs],
-        },
-    }
-
-
-def _by_hand(balance: str, between: Sequence[str]) -> dict[str, Any] | None:
+def _by_hand(described: Mapping[str, Any]) -> dict[str, Any] | None:
     known: Mapping[str, Any] = catalogue()
-    advice = [known[name].told_apart_by for name in between if name in known]
-    described = "; ".join(dict.fromkeys(a for a in advice if a))
-    if not described:
+    advice = [known[name].told_apart_by for name in described["between"] if name in known]
+    text = "; ".join(dict.fromkeys(a for a in advice if a))
+    if not text:
         return None
     return {
         "name": "by hand",
-        "description": described,
-        "balance": balance,
-        "between": list(between),
+        "description": text,
+        **described,
         "discrimination": None,
         "others": {},
         "seconds": None,

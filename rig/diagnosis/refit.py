@@ -16,7 +16,7 @@ from estimation.files import write_text_atomic
 from estimation.fitting import fit
 from estimation.model_file import parse
 from rig.campaigns.index import ENDINGS
-from rig.diagnosis.each import Start, for_each
+from rig.diagnosis.work import Start, for_each
 from rig.errors import RigError
 from rig.importers.registry import open_campaign
 
@@ -60,17 +60,15 @@ def refit_all(
         BrokenExecutor: Processes end again and again.
         OSError: A result cannot be written.
     """
-    found = {folder: kept for folder in folders if (kept := _kept(folder, model))}
 
     def keep(folder: Path, fitted: Refit) -> None:
-        found[folder], place = fitted, _place(folder, model)
+        place = _place(folder, model)
         place.parent.mkdir(exist_ok=True)
         write_text_atomic(place, json.dumps(asdict(fitted)) + "\n")
         on_done(folder)
 
-    missing = [folder for folder in folders if folder not in found]
-    for_each(missing, partial(fit_folder, model), start, keep)
-    return {folder: found[folder] for folder in folders}
+    kept = partial(_kept, model)
+    return for_each(folders, kept, partial(fit_folder, model), start, keep)
 
 
 def fit_folder(model: str, folder: Path) -> Refit:
@@ -91,13 +89,9 @@ def fit_folder(model: str, folder: Path) -> Refit:
     return Refit(key, values, units, evidence.rmse, len(evidence.runs))
 
 
-def _logs(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.iterdir() if path.name.endswith(ENDINGS))
-
-
 def _key(folder: Path, model: str) -> str:
     digest = hashlib.sha256(model.encode())
-    for path in _logs(folder):
+    for path in sorted(path for path in folder.iterdir() if path.name.endswith(ENDINGS)):
         stat = path.stat()
         digest.update(f"{path.name} {stat.st_size} {stat.st_mtime_ns}\n".encode())
     return digest.hexdigest()
@@ -107,7 +101,7 @@ def _place(folder: Path, model: str) -> Path:
     return folder / "fit" / f"{hashlib.sha256(model.encode()).hexdigest()[:12]}.json"
 
 
-def _kept(folder: Path, model: str) -> Refit | None:
+def _kept(model: str, folder: Path) -> Refit | None:
     try:
         kept = Refit(**json.loads(_place(folder, model).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):

@@ -1,59 +1,28 @@
 """A diagnosis of a campaign: read the runs, split them, search, and open the test runs.
 
-The caller writes the requested files, then calls `remember`, then shows the result: the held-out
-runs count as used once there is a result to see, and not before.
+The caller writes the requested files, then enters the use of the runs into the access log, then
+shows the result: the held-out runs count as used once there is a result to see, and not before.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from estimation.arm.balances import balances_of
+import numpy as np
+
+from estimation.arm.balances import declared_arm
 from estimation.arm.shared import laid_out
 from estimation.campaign import Campaign
 from estimation.causes.equations import on_one_clock
+from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.audit import steady
-from estimation.diagnosis.paths import PATHS, claim, path_of, split_few, split_paths
-from estimation.diagnosis.result import Diagnosis
-from estimation.diagnosis.split import Sealed, evidence
+from estimation.diagnosis.split import claim, cut_and_split, path_of
 from estimation.model import Model
-from estimation.recording import Recording
-from rig.diagnosis.ledger import Ledger
-from rig.diagnosis.noise import noise_floors
+from estimation.recording import FloatArray, Recording
+from rig.diagnosis.ledger import Ledger, Look, look_at
 from rig.diagnosis.propose import propose
-
-Stage = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Diagnosed:
-    """A diagnosis with what a report needs.
-
-    Attributes:
-        diagnosis: The result.
-        answer: The equations, hypotheses and models behind it.
-        recordings: The runs, with the campaign's time.
-        sealed: The split.
-        seen: Test runs that an earlier diagnosis used.
-        looked_at: All runs as they were read, for the access log.
-    """
-
-    diagnosis: Diagnosis
-    answer: Answer
-    recordings: tuple[Recording, ...]
-    sealed: Sealed
-    seen: tuple[str, ...]
-    looked_at: tuple[Recording, ...]
-
-
-def remember(done: Diagnosed, ledger: Ledger) -> None:
-    """Write the runs of a diagnosis into the access log: a later one on them is exploratory.
-
-    Raises:
-        LedgerError: The log cannot be read or written.
-    """
-    ledger.write(done.looked_at, done.sealed)
 
 
 def run_diagnosis(
@@ -64,8 +33,8 @@ def run_diagnosis(
     seed: int = 0,
     executor: Executor | None = None,
     quick: bool = False,
-    on_stage: Stage = lambda _: None,
-) -> Diagnosed:
+    on_stage: Callable[[str], None] = lambda _: None,
+) -> tuple[Answer, Look]:
     """Diagnose declared models on a campaign.
 
     Args:
@@ -77,6 +46,10 @@ def run_diagnosis(
         quick: Propose no next experiment.
         on_stage: Called with what begins, in words.
 
+    Returns:
+        The diagnosis with what a report needs, and what the log has to hold: a later diagnosis of
+        these runs is exploratory.
+
     Raises:
         LedgerError: The log cannot be read or written.
         DataError: A recording cannot be read.
@@ -84,15 +57,13 @@ def run_diagnosis(
     """
     ledger.check()
     on_stage("reading the recordings")
-    whole, lost = steady(evidence(campaign))
+    whole, lost = steady(list(campaign.evidence))
     for reason in lost:
         on_stage(reason)
     known = ledger.known(whole)
-    choose = split_paths if len(whole) == PATHS else split_few
-    recordings, sealed = choose(whole, seed, known)
-    seen = tuple(name for name in sealed.confirm if path_of(name) in known)
-    of_arm = any(model.balance.startswith("joint.") for model in models)
-    arm = balances_of(recordings[0]) if of_arm else None
+    recordings, sealed = cut_and_split(whole, seed, known)
+    seen = [name for name in sealed.confirm if path_of(name) in known]
+    arm = declared_arm(models, recordings)
     if arm is not None:
         on_stage("fitting the links that all joints share")
         recordings = laid_out(arm, recordings, sealed.discover)
@@ -114,4 +85,62 @@ def run_diagnosis(
         noise_floor=noise_floors(found.refits, recordings),
         next_experiment=proposed,
     )
-    return Diagnosed(diagnosis, found, tuple(recordings), sealed, seen, tuple(whole))
+    return replace(found, diagnosis=diagnosis), look_at(whole, sealed)
+
+
+def noise_floors(
+    refits: Refits, recordings: Sequence[Recording], least: int = 200
+) -> dict[str, float | None]:
+    """Return each equation's noise floor in its target's unit, None where nothing was repeated.
+
+    Two runs of one motion and load contain the same physics, and so do two periods of one path.
+    Half of the variance of the difference of their residuals is unexplained by any model of these
+    variables.
+
+    Args:
+        refits: The equations with the causes found.
+        recordings: The runs.
+        least: Samples that two repeats must share.
+    """
+    pairs = repeats(recordings)
+    out = dict[str, float | None]()
+    for equation in refits.of:
+        both = [_difference(refits, equation, *pair) for pair in pairs]
+        centred = [x - x.mean() for x in both if x.size >= least]
+        squares = sum(0.5 * float(np.sum(x**2)) for x in centred)
+        samples = sum(map(len, centred))
+        out[equation] = float(np.sqrt(squares / samples)) if samples else None
+    return out
+
+
+def repeats(recordings: Sequence[Recording]) -> list[tuple[str, str]]:
+    """Return the pairs of runs of the same motion under the same load."""
+    return [
+        (one.name, other.name)
+        for one, other in itertools.combinations(recordings, 2)
+        if len(one) == len(other) and (_of_one_path(one, other) or _asked_alike(one, other))
+    ]
+
+
+def _of_one_path(one: Recording, other: Recording) -> bool:
+    return one.name != path_of(one.name) == path_of(other.name)
+
+
+def _asked_alike(one: Recording, other: Recording, alike: float = 2e-3) -> bool:
+    """Whether two runs have one reference, to a small angle and current, that moves."""
+    asked = ("target_angle_rad", "load_command_a")
+    return all(
+        name in one and name in other and float(np.abs(one[name] - other[name]).max()) < alike
+        for name in asked
+    ) and bool(np.ptp(one[asked[0]]) > alike)
+
+
+def _difference(refits: Refits, equation: str, one: str, other: str) -> FloatArray:
+    """Return the difference of two residuals at the samples that both use."""
+    solved = refits.after(equation)
+    found = [refits.of[equation].residuals(solved, name) for name in (one, other)]
+    if found[0] is None or found[1] is None:
+        return np.empty(0)
+    (first, left), (second, right) = found[0], found[1]
+    _, at, also = np.intersect1d(first, second, assume_unique=True, return_indices=True)
+    return np.asarray(left[at] - right[also])

@@ -10,12 +10,10 @@ from estimation.campaign import Campaign
 from estimation.derived import measured_channels
 from estimation.model import Model
 from estimation.plant_models import declared as declared_of
-from rig.calibrate.declared import Declared
-from rig.calibrate.diagnose import declared_by_folder, is_raw
+from rig.calibrate.declared import Declared, declared_by_folder, is_raw
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
-from rig.machines.moving import with_motion
-from rig.machines.recordings import open_recordings
+from rig.machines.recordings import open_recordings, with_motion
 from rig.machines.shipped import read_machine
 
 
@@ -61,29 +59,32 @@ def subject(
         DataError: The recordings cannot be read.
     """
     if machine is not None:
-        if model is None:
-            models = _of(declared_of(read_machine(machine)), balance)
-        else:
-            models = declared_models(model, balance)
-        return Subject(
-            with_motion(open_recordings(path, machine, format_name, skip_bad), models), models
-        )
+        own = declared_of(read_machine(machine))
+        models = _of(own, balance) if model is None else declared_models(model, balance)
+        campaign = open_recordings(path, machine, format_name, skip_bad)
+        return Subject(with_motion(campaign, models), models)
     if model is not None:
         models = declared_models(model, balance)
         return Subject(open_campaign(path, format_name, skip_bad), models)
     if format_name is None and is_raw(path):
         return of_calibration(declared_by_folder(path), balance)
-    rigs = _rigs()
+    others = [name for name in plant_file.shipped() if name != "reference"]
+    rigs = [declared_of(plant_file.shipped_plant(name)) for name in ("reference", *others)]
     if balance is not None and not balance.startswith("joint."):
-        rigs = [_of(r, balance) for r in rigs if balance in {m.balance for m in r}]
-        rigs = rigs or [_of(model_file.reference_rig(), balance)]
+        known = [rig for rig in rigs if balance in {model.balance for model in rig}]
+        rigs = [_of(rig, balance) for rig in known or [model_file.reference_rig()]]
     campaign = open_campaign(path, format_name, skip_bad)
     first = next(iter(campaign.evidence), None)
     arm = None if first is None else balances_of(first)
     if arm is not None:
         return Subject(campaign, _of(arm.models, balance))
     there = set() if first is None else {"time_s", *first.columns}
-    return Subject(campaign, max(rigs, key=lambda rig: sum(_reads(m) <= there for m in rig)))
+
+    def readable(rig: Sequence[Model]) -> int:
+        read = (measured_channels([*m.channels, m.target], m.signals) for m in rig)
+        return sum(there >= {*channels} for channels in read)
+
+    return Subject(campaign, max(rigs, key=readable))
 
 
 def of_calibration(declared: Declared, balance: str | None = None) -> Subject:
@@ -105,16 +106,6 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
     """
     models = model_file.reference_rig() if path is None else model_file.read_all(path)
     return _of(models, balance)
-
-
-def _rigs() -> list[list[Model]]:
-    """Return the equations of the rigs of this project, those of the reference rig first."""
-    others = [name for name in plant_file.shipped() if name != "reference"]
-    return [declared_of(plant_file.shipped_plant(name)) for name in ("reference", *others)]
-
-
-def _reads(model: Model) -> set[str]:
-    return set(measured_channels([*model.channels, model.target], model.signals))
 
 
 def _of(models: Sequence[Model], balance: str | None) -> list[Model]:

@@ -1,20 +1,21 @@
-"""Measured signals of the held-out test runs and the residuals before and after, for a page.
+"""The held-out test runs of a diagnosis: signals for its charts, and errors of the written models.
 
 They are those that the reported errors are made of: the same samples, the same refitted equations.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+
+import numpy as np
 
 from estimation.causes.findings import VARIABLE_OF_ROLE, Kept
 from estimation.causes.functions import Function
+from estimation.causes.refit import Refit
 from estimation.causes.verdict import Answer
 from estimation.derived import zero_phase_channels
-from estimation.model import Model
+from estimation.model import Model, predict
 from estimation.recording import FloatArray
-
-MOST = 2
-"""Most channels that the residual of one finding is drawn over."""
 
 
 @dataclass(frozen=True)
@@ -95,11 +96,62 @@ def _equation(answer: Answer, name: str, wanted: list[str]) -> EquationTraces:
     return EquationTraces(refit.model, tuple(runs))
 
 
-def _channels(kept: Kept) -> tuple[str, ...]:
-    """Return the channels of a cause's variables, time left out."""
+def _channels(kept: Kept, most: int = 2) -> tuple[str, ...]:
+    """Return the first channels of a cause's variables, time left out."""
     cause = kept.scored.candidate.cause
     if isinstance(cause, Function):
-        roles = list(cause.reads)
+        read: Sequence[str] = cause.reads
     else:
-        roles = [channel for role, channel in cause.channels if role in VARIABLE_OF_ROLE]
-    return tuple(dict.fromkeys(c for c in roles if c != "time_s"))[:MOST]
+        read = [channel for role, channel in cause.channels if role in VARIABLE_OF_ROLE]
+    return tuple(dict.fromkeys(c for c in read if c != "time_s"))[:most]
+
+
+def with_cost_of_causal_filters(found: Answer) -> Answer:
+    """Return the diagnosis with a note on the error of each written model with causal filters.
+
+    Both estimates are compared with the target as the zero-phase filter gives it, on the test runs,
+    over the samples that reported errors count, each run's mean removed.
+    """
+    notes = []
+    for model in found.models:
+        zero_phase, causal = _held_out_errors(model, found.refits.of[model.balance])
+        scale, unit = (1e3, "mN m") if model.unit == "N m" else (1.0, model.unit)
+        notes.append(
+            f"{model.balance}: the written model has an error of {scale * zero_phase:.3g} {unit} on"
+            f" the test runs with zero-phase filters and {scale * causal:.3g} {unit} with the"
+            f" causal ones it runs with live ({causal / max(zero_phase, 1e-300):.2f} times as"
+            " much)."
+        )
+    diagnosis = replace(found.diagnosis, notes=(*found.diagnosis.notes, *notes))
+    return replace(found, diagnosis=diagnosis)
+
+
+def written_models(found: Answer) -> list[Model]:
+    """Return the models with the causes found, each with its date and its errors.
+
+    A watch then has from the first run on the usual error, and a display the uncertainty of an
+    estimate.
+    """
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return [
+        replace(model, evidence=model.evidence and replace(model.evidence, made_at=now))
+        for model in found.models
+    ]
+
+
+def _held_out_errors(model: Model, refit: Refit) -> tuple[float, float]:
+    """Return a model's root mean square errors on the test runs: zero-phase, then causal."""
+    squares, samples = np.zeros(2), 0
+    for name in refit.test_names:
+        counted = refit.residuals(refit.solve([]), name)
+        if counted is None:
+            continue
+        places, recording = counted[0], refit.recordings[name]
+        filtered = zero_phase_channels(recording, [model.target], model.low_pass, model.signals)
+        target = filtered[model.target]
+        both = np.array([target - predict(model, recording, causal) for causal in (False, True)])
+        known = both[:, places][:, np.isfinite(both[:, places]).all(axis=0)]
+        squares += np.sum((known - known.mean(axis=1, keepdims=True)) ** 2, axis=1)
+        samples += known.shape[1]
+    zero_phase, live = np.sqrt(squares / max(samples, 1))
+    return float(zero_phase), float(live)

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
-from drivers.errors import CommandRefusedError, DriverError
-from drivers.teensy.driver import SampleBatch, TeensyLogger
+from drivers.errors import CommandRefusedError
+from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import STATUS_ARMED, TOP, Trip
 from drivers.teensy.reference import Limits
-from rig.bench.holding import holding
-from rig.bench.logger import open_logger
+from rig.bench.logger import held_logger, read_for
 from rig.bench.trips import WORDS
 from rig.configuration.config import Config
 from rig.doctor.selftest import Check
@@ -76,10 +75,7 @@ def commission(config: Config) -> Iterator[Check]:
             "The first motion is for rigs with one.",
             "Wire one motor after another to a rig of the reference profile first.",
         )
-    with (
-        holding(config.logger.url),
-        TeensyLogger(open_logger(config), machine.profile) as logger,
-    ):
+    with held_logger(config) as logger:
         identity = logger.identify()
         yield Check("the board answers", True, f"{identity.serial}, start {identity.boot}")
         ready = _is_ready(logger)
@@ -227,16 +223,4 @@ class _Bench:
         return float((np.mean(late) - np.mean(before[line.counts])) * line.slope)
 
     def _read(self, duration_s: float) -> NDArray[np.void]:
-        """Read for a while by the board's clock, with a sign of life.
-
-        Raises:
-            DriverError: Nothing comes.
-        """
-        parts: list[SampleBatch] = []
-        while not parts or parts[-1].tick_us[-1] - parts[0].tick_us[0] < duration_s * 1e6:
-            self._logger.heartbeat()
-            batch = self._logger.read(1.0)
-            if not len(batch.samples):
-                raise DriverError("The logger sends nothing.", fix="Run: rig doctor")
-            parts.append(batch)
-        return np.concatenate([part.samples for part in parts])
+        return read_for(self._logger, duration_s, is_alive=True).samples

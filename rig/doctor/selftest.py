@@ -6,17 +6,14 @@ Nothing moves: the board is armed without a setpoint, so the motors stay without
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from calibration.errors import CalibrationError
 from calibration.zero import drift_verdicts, measure_zeros
 from drivers.errors import CommandRefusedError, DriverError
-from drivers.teensy.driver import SampleBatch, TeensyLogger
+from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import STATUS_ARMED, TRIP_SHIFT, Trip
 from rig.bench.devices import openers
-from rig.bench.holding import holding
-from rig.bench.logger import open_logger
+from rig.bench.logger import held_logger, read_for
 from rig.configuration.config import Config
 from rig.doctor.finding import Level
 from rig.doctor.stream import device_findings
@@ -61,17 +58,14 @@ def _on_the_board(
     name: str, check: Callable[[TeensyLogger, Config], tuple[bool, str]], config: Config
 ) -> Check:
     try:
-        with (
-            holding(config.logger.url),
-            TeensyLogger(open_logger(config), machine_of(config).profile) as logger,
-        ):
+        with held_logger(config) as logger:
             logger.identify()
             logger.start()
             if logger.trip().code is not Trip.NONE:
                 return Check(name, False, "The board has tripped before. Run: rig clear")
             passed, detail = check(logger, config)
             logger.disarm()
-            _clear_own(logger)
+            logger.clear(int(logger.trip().code))  # what this self-test made it trip over
             logger.stop()
     except (DriverError, CalibrationError) as error:
         return Check(name, False, str(error))
@@ -80,9 +74,9 @@ def _on_the_board(
 
 def _zero_drift(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
     calibrations = config.calibration_set()
-    before = measure_zeros(_read(logger, ZERO_S).samples, calibrations)
-    _read(logger, APART_S)
-    after = measure_zeros(_read(logger, ZERO_S).samples, calibrations)
+    before = measure_zeros(read_for(logger, ZERO_S).samples, calibrations)
+    read_for(logger, APART_S)
+    after = measure_zeros(read_for(logger, ZERO_S).samples, calibrations)
     drifts = drift_verdicts(before, after, calibrations, config.drift_limits)
     detail = ", ".join(f"{d.channel} {d.after - d.before:+.2g} {d.unit}" for d in drifts)
     return all(d.passes for d in drifts), f"in {APART_S:g} s: {detail or 'no tared channel'}"
@@ -90,7 +84,7 @@ def _zero_drift(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
 
 def _travel_limit(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
     """Arm with a travel that ends before where the rig stands: the board must trip at once."""
-    here = _read(logger, SETTLE_S).samples[-1]
+    here = read_for(logger, SETTLE_S).samples[-1]
     limits, trip = machine_of(config).too_narrow(_limits(config), here)
     return _must_trip(logger, config, limits, trip, SETTLE_S)
 
@@ -117,7 +111,7 @@ def _stop(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
     """Arm, disarm, and read back: what `rig stop` and every way out rely on."""
     logger.arm(machine_of(config).gains(config), _limits(config))
     logger.disarm()
-    status = int(_read(logger, SETTLE_S).samples["status"][-1])
+    status = int(read_for(logger, SETTLE_S).samples["status"][-1])
     return not status & STATUS_ARMED, f"status {status:#06x} read back after disarming"
 
 
@@ -141,30 +135,6 @@ def _must_trip(
     logger: TeensyLogger, config: Config, limits: ArmLimits, trip: Trip, within_s: float
 ) -> tuple[bool, str]:
     logger.arm(machine_of(config).gains(config), limits)
-    status = int(_read(logger, within_s).samples["status"][-1])
+    status = int(read_for(logger, within_s).samples["status"][-1])
     told = Trip(status >> TRIP_SHIFT)
     return told is trip, f"status {status:#06x}: {told.name.lower().replace('_', ' ')}"
-
-
-def _clear_own(logger: TeensyLogger) -> None:
-    """Clear what this self-test made the board trip over."""
-    logger.clear(int(logger.trip().code))
-
-
-def _read(logger: TeensyLogger, duration_s: float) -> SampleBatch:
-    """Read for a while by the board's clock, without a heartbeat.
-
-    Raises:
-        DriverError: Nothing comes.
-    """
-    parts: list[SampleBatch] = []
-    while not parts or parts[-1].tick_us[-1] - parts[0].tick_us[0] < duration_s * 1e6:
-        batch = logger.read(1.0)
-        if not len(batch.samples):
-            raise DriverError("The logger sends nothing.", fix="Run: rig doctor")
-        parts.append(batch)
-    return SampleBatch(
-        np.concatenate([part.samples for part in parts]),
-        np.concatenate([part.tick_us for part in parts]),
-        parts[-1].lost,
-    )

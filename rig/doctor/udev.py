@@ -46,7 +46,7 @@ def has_rule(identity: str, root: Path = Path("/")) -> bool:
     """
     vendor = identity.split(":")[0].lower()
     return any(
-        vendor in text and "ID_MM_DEVICE_IGNORE" in text
+        vendor in text and "id_mm_device_ignore" in text
         for folder in _FOLDERS
         for path in (root / folder).glob("*.rules")
         for text in [_text(path)]
@@ -55,10 +55,6 @@ def has_rule(identity: str, root: Path = Path("/")) -> bool:
 
 def _text(path: Path) -> str:
     try:
-        return (
-            path.read_text(errors="replace")
-            .lower()
-            .replace("id_mm_device_ignore", "ID_MM_DEVICE_IGNORE")
-        )
+        return path.read_text(errors="replace").lower()
     except OSError:
         return ""

@@ -4,7 +4,6 @@ Within a tick of 0.5 ms: sensors are sampled, the board computes from them, the 
 """
 
 import hashlib
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -18,7 +17,7 @@ from drivers.teensy.logic import Drive
 from rig.grasper import plant as grasper_plant
 from rig.grasper.plant import PROTOTYPES, Prototype, vary
 from rig.simulation import noise
-from rig.simulation.bench import call_board_tick
+from rig.simulation.bench import call_board_tick, hash_of
 
 MOTORS = GRASPER.motors
 COUNTS_A_TURN = 2048
@@ -86,14 +85,9 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
     return with_controllers, with_board
 
 
-def _fingerprint() -> str:
-    digest = hashlib.sha256()
-    for module in (control, grasper_board, grasper_plant, noise):
-        digest.update(Path(str(module.__file__)).read_bytes())
-    return digest.hexdigest()
-
-
-_run_with_controllers, _run_with_board = _build_loops(_fingerprint())
+_run_with_controllers, _run_with_board = _build_loops(
+    hash_of((control, grasper_board, grasper_plant, noise))
+)
 
 
 class GrasperBench:

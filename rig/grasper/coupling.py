@@ -12,7 +12,6 @@ numbers of `rig.grasper.dvrk` come.
 """
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,25 +26,6 @@ class GrasperError(RigError):
     exit_code = ExitCode.USAGE
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Range of each joint, rad.
-
-    Attributes:
-        low_rad: Least angle of each joint, shape (n,).
-        high_rad: Greatest angle of each joint, shape (n,).
-    """
-
-    low_rad: tuple[float, ...]
-    high_rad: tuple[float, ...]
-
-    @classmethod
-    def degrees(cls, *ranges: tuple[float, float]) -> Self:
-        """Return limits given in degrees, one (low, high) a joint."""
-        lows, highs = np.radians(np.array(ranges).T)
-        return cls(tuple(lows.tolist()), tuple(highs.tolist()))
-
-
 @dataclass(frozen=True, eq=False)
 class Coupling:
     """A loss-free transmission from actuators to joints.
@@ -55,23 +35,17 @@ class Coupling:
     Attributes:
         name: Name.
         joints: Names of the joints, n of them.
-        actuators: Names of the actuators, n of them.
         jacobian: A, joint velocity over actuator velocity, shape (n, n).
-        limits: Limits of the joints; None where unknown.
     """
 
     name: str
     joints: tuple[str, ...]
-    actuators: tuple[str, ...]
     jacobian: FloatArray
-    limits: Limits | None = None
 
     def __post_init__(self) -> None:
         size = len(self.joints)
-        if self.jacobian.shape != (size, size) or len(self.actuators) != size:
+        if self.jacobian.shape != (size, size):
             raise GrasperError(f"{self.name}: {size} joints need a matrix of {size} x {size}.")
-        if self.limits and {len(self.limits.low_rad), len(self.limits.high_rad)} != {size}:
-            raise GrasperError(f"{self.name}: {size} joints need {size} limits.")
         finite = np.isfinite(self.jacobian).all()
         if not finite or np.linalg.matrix_rank(self.jacobian) < size:
             raise GrasperError(
@@ -80,20 +54,12 @@ class Coupling:
             )
 
     def joint_position(self, actuator_rad: ArrayLike) -> FloatArray:
-        """Forward kinematics: actuator angles to joint angles, rad."""
+        """Forward kinematics: actuator angles to joint angles, rad, or velocities, rad/s."""
         return self._through(self.jacobian, actuator_rad)
 
     def actuator_position(self, joint_rad: ArrayLike) -> FloatArray:
-        """Inverse kinematics: joint angles to actuator angles, rad."""
+        """Inverse kinematics: joint angles to actuator angles, rad, or velocities, rad/s."""
         return self._through(self._inverse, joint_rad)
-
-    def joint_velocity(self, actuator_rad_s: ArrayLike) -> FloatArray:
-        """Actuator velocities to joint velocities, rad/s."""
-        return self.joint_position(actuator_rad_s)
-
-    def actuator_velocity(self, joint_rad_s: ArrayLike) -> FloatArray:
-        """Joint velocities to actuator velocities, rad/s."""
-        return self.actuator_position(joint_rad_s)
 
     def joint_torque(self, actuator_n_m: ArrayLike) -> FloatArray:
         """Statics: actuator torques to the joint torques they hold, N m; A^-T."""
@@ -108,13 +74,10 @@ class Coupling:
         return np.asarray(np.linalg.inv(self.jacobian), dtype=np.float64)
 
     def _through(self, matrix: FloatArray, values: ArrayLike) -> FloatArray:
-        return np.asarray(self._checked(values) @ matrix.T)
-
-    def _checked(self, values: ArrayLike) -> FloatArray:
         array = np.asarray(values, dtype=np.float64)
         if array.ndim == 0 or array.shape[-1] != len(self.joints):
             raise GrasperError(
                 f"{self.name}: the values have shape {array.shape}.",
                 f"The last axis has one value for each of {len(self.joints)} joints.",
             )
-        return array
+        return np.asarray(array @ matrix.T)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rig.grasper.plant import RATE_HZ, AxisParameters, FloatArray
+from rig.protocols.trajectory import minimum_jerk
 
 LEAD_S = 0.5
 """Rest before the motion, and length of the motion itself."""
@@ -35,5 +36,4 @@ def _depth(axis: AxisParameters, force_n: float) -> float:
 
 
 def _rise(start: float, stop: float, duration_s: float = LEAD_S) -> FloatArray:
-    s = np.linspace(0.0, 1.0, round(duration_s * RATE_HZ))
-    return np.asarray(start + (stop - start) * (10 * s**3 - 15 * s**4 + 6 * s**5))
+    return minimum_jerk(start, stop, duration_s, RATE_HZ)

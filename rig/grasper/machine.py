@@ -7,8 +7,6 @@ between them, so jaw 1 turns by pitch + grasp / 2 and jaw 2 closes by grasp / 2 
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,38 +14,44 @@ from numpy.typing import NDArray
 from calibration.linear import CalibrationSet
 from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
 from drivers.teensy.profile import ArmLimits
-from drivers.teensy.protocol import TOP, SafeState, Trip
+from drivers.teensy.protocol import TOP, Trip
 from rig.configuration.config import Config
 from rig.errors import UsageError
-from rig.grasper.counts import GRASPER_COUNTS
-from rig.machines.machine import FloatArray, MachinePlan
-from rig.machines.plausible_counts import jump_limit, loop_limits
-from rig.machines.safety import InCounts, check_setpoints, ticks_of
-from rig.protocols import trajectory
+from rig.log.schema import Field, Stream
+from rig.log.streams import COUNTS
+from rig.machines.machine import FloatArray, Machine
+from rig.machines.safety import InCounts, choices, motor_limits
 from rig.protocols.joints import JointPlan
-from rig.protocols.motion import RELAX_CYCLES, RELAX_HZ
+from rig.protocols.motion import Motion, path_of, relaxed
+from rig.protocols.protocol import Plan
 
 AXES = ("yaw", "jaw_1", "jaw_2")
 """What motor 1, 2 and 3 turn."""
 APPROACH_SPEED_RAD_S = 0.5
-SHORTEST_MOVE_S = 0.5
 RELAX_RAD = 0.03
 """Less than what is open before the jaws touch anything."""
 
+_MOTORS = ((1, "yaw"), (2, "jaw 1"), (3, "jaw 2"))
 
-@dataclass(frozen=True, eq=False)
-class JointMotion:
-    """Angles of the three axes over a whole motion, at 2 kHz.
-
-    Attributes:
-        setpoints: Yaw, jaw 1, jaw 2, each of shape (n,), rad.
-        first: Index of the run's first setpoint.
-        last: Index behind its last.
-    """
-
-    setpoints: tuple[FloatArray, ...]
-    first: int
-    last: int
+GRASPER_COUNTS = Stream(
+    COUNTS,
+    "rig_msgs/msg/GrasperCounts",
+    (
+        *(Field(f"motor_{k}", "int32", "", f"encoder of the motor of {a}") for k, a in _MOTORS),
+        *(Field(f"target_{k}", "int32", "", f"target of {a}, counts") for k, a in _MOTORS),
+        *(Field(f"current_{k}", "int32", "", f"measured current of {a}") for k, a in _MOTORS),
+        *(Field(f"force_{k}", "int32", "", f"force sensor of {a}") for k, a in _MOTORS),
+        *(
+            Field(f"command_{k}_e4", "int32", "", f"command to {a}, 1e-4 of full")
+            for k, a in _MOTORS
+        ),
+        Field("sequence", "uint32", "", "number of the sample since the stream began"),
+        Field("tick_us", "uint32", "", "device clock as sent, wraps at 2^32"),
+        Field("status", "uint32", "", "status bits of the logger"),
+    ),
+    GRASPER.rate_hz,
+)
+"""The grasper's raw counts; all rise on closing."""
 
 
 def axes_of_joints(joint_rad: FloatArray) -> FloatArray:
@@ -56,8 +60,8 @@ def axes_of_joints(joint_rad: FloatArray) -> FloatArray:
     return np.stack([yaw, pitch + grasp / 2, grasp / 2 - pitch], axis=1)
 
 
-class GrasperMachine:
-    """Implements `rig.machines.machine.Machine`."""
+class GrasperMachine(Machine):
+    """The grasper."""
 
     profile = GRASPER
     counts = GRASPER_COUNTS
@@ -71,17 +75,8 @@ class GrasperMachine:
             ("force", "force_n"),
         )
     }
-    here_channels = tuple(f"{axis}_angle_rad" for axis in AXES)
+    setpoint_limits = here_channels = tuple(f"{axis}_angle_rad" for axis in AXES)
     shown = ("grasp_force_n", "pitch_force_n", "yaw_force_n")
-
-    @classmethod
-    def of(cls, config: Config) -> Self:
-        """Return the machine, the same for every configuration."""
-        return cls()
-
-    def at(self, rate_hz: float) -> Self:
-        """Return itself: its board has one rate."""
-        return self
 
     def first_look(self, config: Config) -> str:
         """Return the grasper's own protocol."""
@@ -98,68 +93,27 @@ class GrasperMachine:
         counts = InCounts(calibrations)
 
         def axis_limits(axis: str) -> AxisLimits:
-            current, motor = f"{axis}_current_a", f"{axis}_motor_angle_rad"
-            angle = f"{axis}_angle_rad"
+            current, angle, force = f"{axis}_current_a", f"{axis}_angle_rad", f"{axis}_force_n"
             low, high = counts.ends(angle, -given[angle], given[angle])
-            force = f"{axis}_force_n"
-            max_motor_step = counts.size(motor, safety.motor_speed_rad_s * tick_s)
-            loop = {
-                "motor": motor,
+            channels = {
+                "motor": f"{axis}_motor_angle_rad",
                 "followed": angle,
                 "current": current,
                 "command": f"{axis}_command_ratio",
             }
+            motor = motor_limits(config, calibrations, channels, given[current], (tick_s, tick_s))
             return AxisLimits(
-                max_current=counts.size(current, given[current]),
                 max_force=counts.ends(force, None, given[force])[1],
                 min_motor=low,
                 max_motor=high,
-                max_motor_step=max_motor_step,
-                max_motor_jump=jump_limit(max_motor_step),
-                max_target_step=min(TOP, max_motor_step + 1),
-                continuous_current=counts.size(current, safety.continuous_current_a),
-                i2t=counts.heat(current, safety.heat_a2_s),
-                stall_current=counts.size(current, safety.stall_current_a),
-                stall_motion=counts.size(motor, safety.stall_motor_angle_rad),
-                **loop_limits(config.plausibility, calibrations, loop, given[current], tick_s),
+                max_target_step=min(TOP, motor["max_motor_step"] + 1),
+                **motor,
             )
 
         yaw, jaw_1, jaw_2 = (axis_limits(axis) for axis in AXES)
-        return GrasperLimits(
-            (yaw, jaw_1, jaw_2),
-            stall_ticks=ticks_of(safety.stall_s, tick_s),
-            saturated_ticks=ticks_of(safety.saturated_s, tick_s),
-            stale_ticks=ticks_of(safety.stale_s, tick_s),
-            dry_ticks=ticks_of(safety.dry_s, tick_s),
-            hold_ticks=ticks_of(safety.hold_s, tick_s),
-            watchdog_us=round(safety.watchdog_s * 1e6),
-            safe_state=SafeState[safety.safe_state.upper()],
-            hold_command_e4=round(safety.hold_command_ratio * 1e4),
-        )
+        return GrasperLimits((yaw, jaw_1, jaw_2), **choices(safety, tick_s))
 
-    def reference_counts(
-        self, config: Config, calibrations: CalibrationSet, here: Sequence[float]
-    ) -> tuple[int, ...]:
-        """Return the counts of the three motors."""
-        lines = [calibrations.channels[f"{axis}_angle_rad"] for axis in AXES]
-        return tuple(
-            round(angle / line.slope + line.zero_counts)
-            for angle, line in zip(here, lines, strict=True)
-        )
-
-    def check_setpoints(self, config: Config, setpoints: Sequence[FloatArray]) -> None:
-        """Hold the limits of every motor's travel against a trajectory."""
-        given = config.limits.model_dump()
-        names = [f"{axis}_angle_rad" for axis in AXES]
-        check_setpoints(
-            (name, values, given[name]) for name, values in zip(names, setpoints, strict=True)
-        )
-
-    def here(self, columns: Mapping[str, FloatArray]) -> tuple[float, ...]:
-        """Return where each motor stands."""
-        return tuple(float(columns[f"{axis}_angle_rad"][-1]) for axis in AXES)
-
-    def motion(self, plan: MachinePlan, here: tuple[float, ...]) -> JointMotion:
+    def motion(self, plan: Plan, here: tuple[float, ...]) -> Motion:
         """Return approach, run and the way back to where nothing is touched."""
         if not isinstance(plan, JointPlan):
             raise UsageError(
@@ -168,16 +122,13 @@ class GrasperMachine:
                 "Choose a protocol for it, such as grasper.",
             )
         run = axes_of_joints(plan.joint_rad)
-        approach = _move(np.array(here), run[0])
-        parts = [approach, run, _move(run[-1], run[0]), _relaxation(run[0])]
-        first = len(approach)
-        whole = np.concatenate(parts)
-        return JointMotion(tuple(whole.T), first, first + len(run))
+        whole, first = path_of(run, here, GRASPER.rate_hz, APPROACH_SPEED_RAD_S, RELAX_RAD)
+        return Motion(tuple(whole.T), first, first + len(run))
 
-    def settling(self, here: tuple[float, ...]) -> JointMotion:
+    def settling(self, here: tuple[float, ...]) -> Motion:
         """Return a little motion of every motor about where it stands."""
-        whole = _relaxation(np.array(here))
-        return JointMotion(tuple(whole.T), 0, len(whole))
+        whole = relaxed(np.array(here), GRASPER.rate_hz, RELAX_RAD)
+        return Motion(tuple(whole.T), 0, len(whole))
 
     def too_narrow(self, limits: ArmLimits, sample: np.void) -> tuple[ArmLimits, Trip]:
         """Return limits whose travel of the last motor begins beyond where it stands."""
@@ -197,17 +148,3 @@ class GrasperMachine:
         assert isinstance(limits, GrasperLimits)  # noqa: S101
         one, two, three = (dataclasses.replace(axis, max_force=TOP) for axis in limits.axes)
         return dataclasses.replace(limits, axes=(one, two, three), stale_ticks=TOP)
-
-
-def _move(start_rad: FloatArray, stop_rad: FloatArray) -> FloatArray:
-    """Return a move of all axes that ends for all at once, shape (n, 3)."""
-    farthest = float(np.abs(stop_rad - start_rad).max())
-    duration_s = max(farthest / APPROACH_SPEED_RAD_S, SHORTEST_MOVE_S)
-    there = trajectory.minimum_jerk(0.0, 1.0, duration_s, GRASPER.rate_hz)
-    move: FloatArray = start_rad + there[:, None] * (stop_rad - start_rad)
-    return move
-
-
-def _relaxation(centre_rad: FloatArray) -> FloatArray:
-    swing = trajectory.relaxation(0.0, RELAX_RAD, RELAX_HZ, RELAX_CYCLES, GRASPER.rate_hz)
-    return centre_rad + swing[:, None]

@@ -3,8 +3,11 @@
 import math
 from typing import Annotated
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
+from estimation.recording import FloatArray
 from rig.configuration.config import Config
 from rig.configuration.machine_settings import (
     DriftSection,
@@ -14,8 +17,11 @@ from rig.configuration.machine_settings import (
 )
 from rig.configuration.sections import Angle, Current, Force, Number, Section
 from rig.errors import UsageError
+from rig.grasper.coupling import GrasperError
 
-POT_RAD_PER_COUNT = math.radians(300.0) / 4095
+TOP_COUNT = 4095
+"""Of a 12-bit converter."""
+POT_RAD_PER_COUNT = math.radians(300.0) / TOP_COUNT
 
 
 def _not_zero(value: float) -> float:
@@ -62,6 +68,20 @@ class MasterSection(Section):
     url: str | None = None
     zero_counts: tuple[Number, Number, Number] = (2048.0, 2048.0, 2048.0)
     rad_per_count: tuple[Turn, Turn, Turn] = (POT_RAD_PER_COUNT,) * 3
+
+    def joint_rad(self, counts: ArrayLike) -> FloatArray:
+        """Return yaw, pitch and grasp, shape (..., 3), from counts of that shape.
+
+        Raises:
+            GrasperError: A count is at a rail: the potentiometer is at its end, or its wire broken.
+        """
+        read = np.asarray(counts, dtype=np.float64)
+        if not ((read > 0) & (read < TOP_COUNT)).all():
+            raise GrasperError(
+                "A potentiometer of the master reads its rail.",
+                "It is at its end, or its wire is broken; the motors must not follow it.",
+            )
+        return np.asarray((read - self.zero_counts) * self.rad_per_count)
 
 
 class GrasperSection(OwnSection):

@@ -10,7 +10,17 @@ import itertools
 import math
 from dataclasses import dataclass
 
-from rig.grasper.coupling import GrasperError
+import numpy as np
+
+from rig.grasper.coupling import Coupling, GrasperError
+from rig.protocols.joints import JOINTS
+
+MOTORS = ("yaw_motor", "jaw_1_motor", "jaw_2_motor")
+
+GEARHEAD_RATIO, DRUM_M = 66.0, 0.008
+"""The paper's gearhead, and drums that pull the jaws' cables, which the paper does not state."""
+
+JAWS_TO_PITCH_AND_GRASP = np.array([[0.5, 0.5], [1.0, -1.0]])
 
 GEAR_RATIOS = (1.0, 2.0, 3.0)
 """Planet over sun diameter of Table 1's first step (1:1, 1:2, 1:3 read as sun:planet)."""
@@ -145,6 +155,10 @@ class Planetary:
         return self.alpha_over_beta
 
 
+EQUAL_GEARS = Planetary(1.0)
+"""The paper's wrist: equal gears, the sun fixed; yaw is twice the carrier's angle."""
+
+
 @dataclass(frozen=True, slots=True)
 class Design:
     """One combination of Table 1.
@@ -217,3 +231,30 @@ def _design(planetary: Planetary, drive: str) -> Design:
 def _with_least_one(ratio: float) -> tuple[float, float]:
     """Return two diameters of the given ratio, second over first, the smaller being 1."""
     return max(1.0, 1.0 / ratio), max(1.0, ratio)
+
+
+def planetary_grasper(path: CablePath, planetary: Planetary = EQUAL_GEARS) -> Coupling:
+    """Return the grasper with the planetary wrist, driven at the carrier.
+
+    Both jaws' angles are measured in one sense about their common axis. Pitch is their mean. Grasp
+    is the angle of jaw 1 less that of jaw 2; jaw 1 closes by turning in the positive sense. Motor
+    angles are those of the motor's shaft.
+
+    With d2/d1 = alpha/beta each motor moves its own joint. With another pulley ratio turning the
+    yaw shortens the jaws' cables by equation 5, and both jaws, so the pitch, turn along.
+
+    Args:
+        path: Pulleys of the jaws' cables.
+        planetary: Gears of the wrist.
+
+    Raises:
+        GrasperError: Pulleys overlap.
+    """
+    path.tangent_angles_rad()
+    beta = 1.0 / planetary.alpha_over_beta  # for a carrier angle of one
+    jaw_per_carrier = -path.shortening_m(1.0, beta) / (path.d3_m / 2)
+    yaw, along = planetary.yaw_over_carrier / GEARHEAD_RATIO, jaw_per_carrier / GEARHEAD_RATIO
+    jaw = DRUM_M / path.d3_m / GEARHEAD_RATIO
+    jaws = np.array([[along, jaw, 0.0], [along, 0.0, jaw]])
+    jacobian = np.vstack([[yaw, 0.0, 0.0], JAWS_TO_PITCH_AND_GRASP @ jaws])
+    return Coupling("planetary grasper", JOINTS, jacobian)

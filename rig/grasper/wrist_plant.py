@@ -24,8 +24,8 @@ import numpy as np
 
 from estimation.recording import FloatArray, Recording
 from rig.grasper.coupling import Coupling
-from rig.grasper.three_dof import JOINTS, MOTORS, planetary_grasper
-from rig.grasper.wrist import CablePath
+from rig.grasper.wrist import MOTORS, CablePath, planetary_grasper
+from rig.protocols.joints import JOINTS
 
 RATE_HZ = 1000.0
 SUBSTEPS = 10

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import correlate
 
-from estimation.channels import UnknownUnitError, unit_of
+from estimation.channels import unit_or_none
 from estimation.recording import FloatArray, Recording
 from rig.errors import DataError
 
@@ -117,9 +117,8 @@ def pairs(recording: Recording) -> Iterator[tuple[str, str]]:
 
 def _stem(name: str) -> tuple[str, str]:
     """Return the part and the unit of a channel: `joint_1`, `rad` of `joint_1_angle_rad`."""
-    try:
-        unit = unit_of(name)
-    except UnknownUnitError:
+    unit = unit_or_none(name)
+    if unit is None:
         return name, ""
     parts = name.split("_")
     last = max((i for i, part in enumerate(parts) if part in QUANTITIES), default=None)

@@ -18,6 +18,7 @@ from functools import partial
 from itertools import combinations
 
 import numpy as np
+from scipy.linalg import orth
 
 from estimation.campaign import Campaign, Run
 from estimation.recording import FloatArray, Recording
@@ -137,10 +138,10 @@ def _segmented(means: FloatArray, shares: FloatArray) -> FloatArray:
 
     Args:
         means: Mean angle of each run, shape (runs,).
-        shares: Independent columns of the conditions' levels, shape (runs, columns).
+        shares: Columns of the conditions' levels, shape (runs, columns).
     """
-    count, free = shares.shape
-    basis = np.linalg.qr(shares)[0]
+    basis = orth(shares)
+    count, free = basis.shape
     after = np.tri(count, count - 1, -1)  # column k: the runs after a cut before run k + 1
     own, rest = (part - basis @ (basis.T @ part) for part in (after, means))
     gram, cross = own.T @ own, own.T @ rest
@@ -180,11 +181,10 @@ def _levels(recording: Recording) -> tuple[object, ...]:
 
 
 def _shares(levels: Sequence[tuple[object, ...]]) -> FloatArray:
-    """Return independent columns of the levels of each condition, shape (runs, columns)."""
+    """Return a column for each level of each condition, shape (runs, columns)."""
     columns = [np.ones(len(levels))]
     for one in zip(*levels, strict=True):
-        for level in list(dict.fromkeys(one))[1:]:
-            more = [*columns, np.array([float(other == level) for other in one])]
-            if np.linalg.matrix_rank(np.column_stack(more)) == len(more):
-                columns = more
+        columns += [
+            np.array([float(other == level) for other in one]) for level in dict.fromkeys(one)
+        ]
     return np.column_stack(columns)

@@ -69,24 +69,17 @@ def read_mat5(content: bytes) -> dict[str, Value]:
     if len(content) < HEADER_BYTES or order is None:
         raise Mat5Error("no MATLAB 5 header in the first 128 bytes")
     variables: dict[str, Value] = {}
-    for kind, data in _elements(content[HEADER_BYTES:], order):
-        if kind == COMPRESSED:
-            for inner, inflated in _elements(_inflate(data), order):
-                _add(variables, inner, inflated, order)
-        else:
-            _add(variables, kind, data, order)
+    for outer in _elements(content[HEADER_BYTES:], order):
+        packed = outer[0] == COMPRESSED
+        for kind, data in _elements(_inflate(outer[1]), order) if packed else [outer]:
+            if kind != MATRIX:
+                raise Mat5Error(f"an element of type {kind} where a variable was expected")
+            name, value = _matrix(data, order, 0)
+            if name in variables:
+                raise Mat5Error(f"the variable {name!r} is there twice")
+            if name:  # one without a name holds MATLAB's own notes about objects
+                variables[name] = value
     return variables
-
-
-def _add(variables: dict[str, Value], kind: int, data: bytes, order: str) -> None:
-    if kind != MATRIX:
-        raise Mat5Error(f"an element of type {kind} where a variable was expected")
-    name, value = _matrix(data, order, 0)
-    if not name:
-        return  # MATLAB's own notes about objects
-    if name in variables:
-        raise Mat5Error(f"the variable {name!r} is there twice")
-    variables[name] = value
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:

@@ -13,15 +13,15 @@ Closing motion and torque are positive, and units are SI.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.campaign import Campaign, Run
-from estimation.channels import CHANNELS, UnknownUnitError, unit_of
+from estimation.channels import CHANNELS, unit_or_none
 from estimation.recording import FloatArray, Recording, RecordingError
 from rig.errors import DataError
 from rig.importers.mat5 import Mat5Error, Unread, Value, read_mat5
@@ -32,15 +32,6 @@ HDF5_VERSION = b"MATLAB 7.3 MAT-file"
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"  # after the 512 bytes MATLAB puts before it
 
 Values = Mapping[str, Value]
-
-
-@dataclass(frozen=True, slots=True)
-class Content:
-    """What a run holds: columns with time, conditions, notes."""
-
-    columns: dict[str, FloatArray]
-    conditions: dict[str, float | str]
-    notes: str = ""
 
 
 class MatlabImporter:
@@ -97,17 +88,8 @@ def load_run(path: Path, name: str, part: str = "") -> Recording:
     contents = _contents(path)
     if part not in contents:
         raise DataError(f"{path} no longer holds the run {part or path.stem!r}.")
-    content = contents[part]
-    columns = dict(content.columns)
     try:
-        return Recording(
-            name=name,
-            time_s=columns.pop(TIME),
-            columns=columns,
-            conditions=content.conditions,
-            notes=content.notes,
-            source=f"{path}:{part}" if part else str(path),
-        )
+        return Recording(name, **contents[part], source=f"{path}:{part}" if part else str(path))
     except RecordingError as error:
         raise DataError(f"{path}: {error.what}", error.why, error.fix) from error
 
@@ -117,8 +99,8 @@ def _files(path: Path) -> list[Path]:
     return [entry for entry in entries if entry.suffix.lower() == ".mat" and entry.is_file()]
 
 
-def _contents(path: Path) -> dict[str, Content]:
-    """Return the variables of each run of a file, by the name of its struct; "" is the file."""
+def _contents(path: Path) -> dict[str, dict[str, Any]]:
+    """Return the fields of each run's recording, by the name of its struct; "" is the file."""
     variables = read_variables(path)
     if TIME in variables:
         return {"": _named(path, variables)}
@@ -156,36 +138,30 @@ def read_variables(path: Path) -> dict[str, Value]:
         ) from error
 
 
-def _named(path: Path, values: Values) -> Content:
-    """Sort values into channels, conditions and notes by their names and shapes."""
+def _named(path: Path, values: Values) -> dict[str, Any]:
+    """Sort values into time, channels, conditions and notes by their names and shapes."""
     time = values[TIME]
     shape = time.shape if isinstance(time, np.ndarray) and time.ndim == 1 else None
-    content = Content({}, {}, notes=str(values.get("notes", "")))
+    columns: dict[str, FloatArray] = {}
+    conditions: dict[str, float | str] = {}
     wrong = []
     for name, value in values.items():
         if isinstance(value, str):
             if name != "notes":
-                content.conditions[name] = value
-        elif not isinstance(value, np.ndarray) or not carries_unit(name):
+                conditions[name] = value
+        elif not isinstance(value, np.ndarray) or unit_or_none(name) is None:
             wrong.append(name)
         elif value.shape == shape:
-            content.columns[name] = _finite(path, name, value)
+            columns[name] = _finite(path, name, value)
         elif value.ndim == 0 and name != TIME:
-            content.conditions[name] = float(_finite(path, name, value))
+            conditions[name] = float(_finite(path, name, value))
         else:
             wrong.append(name)
     if wrong:
         raise _unknown(path, values, wrong)
-    return content
-
-
-def carries_unit(name: str) -> bool:
-    """Whether a name ends in a unit, as a channel's must."""
-    try:
-        unit_of(name)
-    except UnknownUnitError:
-        return False
-    return True
+    notes = str(values.get("notes", ""))
+    time_s = columns.pop(TIME)
+    return {"time_s": time_s, "columns": columns, "conditions": conditions, "notes": notes}
 
 
 def _finite(path: Path, name: str, values: NDArray[np.generic]) -> FloatArray:

@@ -7,13 +7,18 @@ each run with a jerk of 0.5 to 1.7 rad/s within 50 ms: there the speed limit cut
 only the largest jerks are flagged.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.recording import Flag, FloatArray, Stretch
+from estimation.recording import Flag, FloatArray, Recording, Stretch
 
-CURRENT_LIMIT_A = 0.5
-COMMAND_LIMIT_RATIO = 1.0
+SATURATED = {
+    "motor_current_a": (0.5, "the current controller is at its limit: {:.3f} A"),
+    "motor_command_ratio": (1.0, "the command is beyond full scale: {:.3f}"),
+}
+"""Channel to its limit and the reason that is stated beyond it."""
 TRACKING_LIMIT_RAD = 0.25
 SPEED_LIMIT_RAD_S = 1.5
 SPEED_SPAN_SAMPLES = 10
@@ -26,101 +31,68 @@ START_S = 0.3
 """An event that begins within this time of the first sample is a start transient."""
 
 
-def saturated(time_s: FloatArray, current_a: FloatArray, command: FloatArray) -> list[Stretch]:
-    """Flag clipped current and a command beyond full scale.
-
-    Args:
-        time_s: Time, shape (n,).
-        current_a: Measured motor current, shape (n,).
-        command: Command to the current controller, 1 is full scale, shape (n,).
-    """
-    found = []
-    for channel, values, limit, reason in (
-        (
-            "motor_current_a",
-            current_a,
-            CURRENT_LIMIT_A,
-            "the current controller is at its limit: {:.3f} A",
-        ),
-        (
-            "motor_command_ratio",
-            command,
-            COMMAND_LIMIT_RATIO,
-            "the command is beyond full scale: {:.3f}",
-        ),
-    ):
-        for first, last in _events(time_s, np.abs(values) > limit, MERGE_S):
-            peak = float(np.abs(values[first : last + 1]).max())
-            found.append(
-                Stretch(
-                    float(time_s[first]),
-                    float(time_s[last]),
-                    Flag.SATURATED,
-                    reason.format(peak),
-                    channel,
-                )
-            )
-    return found
-
-
-def missing(time_s: FloatArray, step_s: float) -> list[Stretch]:
-    """Flag the sample after each gap in time.
-
-    Args:
-        time_s: Time, shape (n,).
-        step_s: Sample period, s.
-    """
-    steps = np.diff(time_s)
-    return [
-        Stretch(
-            float(time_s[i + 1]),
-            float(time_s[i + 1]),
-            Flag.MISSING,
-            f"{round(steps[i] / step_s) - 1} samples are missing before this one",
-        )
-        for i in np.flatnonzero(steps > 1.5 * step_s)
-    ]
-
-
-def runaways(
-    time_s: FloatArray,
-    spindle_angle_rad: FloatArray,
-    motor_angle_rad: FloatArray,
-    intended_angle_rad: FloatArray,
-    gear_ratio: float,
+def bad_stretches(
+    recording: Recording, intended_angle_rad: FloatArray | None, step_s: float, gear_ratio: float
 ) -> list[Stretch]:
+    """Return the stretches in which something is missing, saturated or runs away, by their start.
+
+    Args:
+        recording: The run.
+        intended_angle_rad: Target of the spindle, shape (n,); None where it is not known, and then
+            runaways are not looked for.
+        step_s: Sample period, s.
+        gear_ratio: Motor turns a spindle turn.
+    """
+    found = [*_missing(recording.time_s, step_s), *_saturated(recording)]
+    if intended_angle_rad is not None:
+        found += _runaways(recording, intended_angle_rad, gear_ratio)
+    return sorted(found, key=lambda stretch: stretch.start_s)
+
+
+def _saturated(recording: Recording) -> Iterator[Stretch]:
+    """Flag clipped current and a command beyond full scale."""
+    time_s = recording.time_s
+    for channel, (limit, reason) in SATURATED.items():
+        size = np.abs(recording[channel])
+        for first, last in _events(time_s, size > limit):
+            why = reason.format(float(size[first : last + 1].max()))
+            start_s, stop_s = float(time_s[first]), float(time_s[last])
+            yield Stretch(start_s, stop_s, Flag.SATURATED, why, channel)
+
+
+def _missing(time_s: FloatArray, step_s: float) -> Iterator[Stretch]:
+    """Flag the sample after each gap in time."""
+    steps = np.diff(time_s)
+    for place in np.flatnonzero(steps > 1.5 * step_s):
+        at_s, lost = float(time_s[place + 1]), round(steps[place] / step_s) - 1
+        why = f"{lost} samples are missing before this one"
+        yield Stretch(at_s, at_s, Flag.MISSING, why)
+
+
+def _runaways(
+    recording: Recording, intended_angle_rad: FloatArray, gear_ratio: float
+) -> Iterator[Stretch]:
     """Flag events in which the rig left its trajectory.
 
     Either the spindle is far from the intended angle, or the motor runs at another speed than the
     trajectory asks for: a gear or cable that lets go shows in the motor first.
-
-    Args:
-        time_s: Time, shape (n,).
-        spindle_angle_rad: Spindle, shape (n,).
-        motor_angle_rad: Motor shaft before the gear, shape (n,).
-        intended_angle_rad: Target of the spindle, shape (n,).
-        gear_ratio: Motor turns a spindle turn.
     """
-    distance = np.abs(spindle_angle_rad - intended_angle_rad)
-    lag = motor_angle_rad / gear_ratio - intended_angle_rad
-    excess = np.abs(_slope(time_s, lag))
-    found = []
+    time_s = recording.time_s
+    distance = np.abs(recording["spindle_angle_rad"] - intended_angle_rad)
+    excess = np.abs(_slope(time_s, recording["motor_angle_rad"] / gear_ratio - intended_angle_rad))
     bad = (distance > TRACKING_LIMIT_RAD) | (excess > SPEED_LIMIT_RAD_S)
-    for first, last in _events(time_s, bad, MERGE_S):
+    for first, last in _events(time_s, bad):
         start_s, stop_s = float(time_s[first]) - MARGIN_S, float(time_s[last]) + MARGIN_S
         at_start = start_s < time_s[0] + START_S
         inside = slice(first, last + 1)
-        found.append(
-            Stretch(
-                float(time_s[0]) if at_start else start_s,
-                min(stop_s, float(time_s[-1])),
-                Flag.SUSPECT,
-                f"{'start transient' if at_start else 'runaway'}: the motor departs from the "
-                f"trajectory by up to {excess[inside].max():.1f} rad/s (behind the gear), the "
-                f"spindle by {distance[inside].max():.2f} rad",
-            )
+        yield Stretch(
+            float(time_s[0]) if at_start else start_s,
+            min(stop_s, float(time_s[-1])),
+            Flag.SUSPECT,
+            f"{'start transient' if at_start else 'runaway'}: the motor departs from the "
+            f"trajectory by up to {excess[inside].max():.1f} rad/s (behind the gear), the "
+            f"spindle by {distance[inside].max():.2f} rad",
         )
-    return found
 
 
 def _slope(time_s: FloatArray, values: FloatArray) -> FloatArray:
@@ -133,12 +105,9 @@ def _slope(time_s: FloatArray, values: FloatArray) -> FloatArray:
     return slope
 
 
-def _events(time_s: FloatArray, bad: NDArray[np.bool_], merge_s: float) -> list[tuple[int, int]]:
+def _events(time_s: FloatArray, bad: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     """Group bad samples into events (first index, last index)."""
     index = np.flatnonzero(bad)
-    if index.size == 0:
-        return []
-    breaks = np.flatnonzero(np.diff(time_s[index]) > merge_s)
-    firsts = index[np.concatenate([[0], breaks + 1])]
-    lasts = index[np.concatenate([breaks, [index.size - 1]])]
-    return [(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
+    if index.size:
+        for event in np.split(index, np.flatnonzero(np.diff(time_s[index]) > MERGE_S) + 1):
+            yield int(event[0]), int(event[-1])

@@ -9,16 +9,14 @@ taken from a whole run carries that run's mean load into every sample:
   stretches the cable, so it falls with the load; compare runs of equal load (`jaw_steps`).
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from estimation.recording import FloatArray, Recording, Stretch, read_only
+from estimation.recording import FloatArray, Recording, read_only
 from rig.importers import mrdlab_text as raw
-from rig.importers.mrdlab_flags import missing, runaways, saturated
-from rig.importers.mrdlab_identity import identify
-from rig.importers.mrdlab_side import follows, side_of
+from rig.importers.mrdlab_flags import bad_stretches
+from rig.importers.mrdlab_identity import follows, identify
 from rig.importers.sine_fit import Sine, fit_sine
 
 SPINDLE_RAD = 2 * np.pi / 8192
@@ -30,7 +28,7 @@ GEAR_RATIO = 35.0
 CLOSING_SIGN = {raw.SPINDLE: -1.0, raw.COMMAND: -1.0, raw.DISTAL: -1.0, raw.TARGET: -1.0}
 """Raw channels that fall on closing (left jaw). Motor, jaw, current and proximal torque rise.
 
-All of them turn on a right jaw (`mrdlab_side`)."""
+All of them turn on a right jaw (`mrdlab_identity`)."""
 
 TARGET_UNITS = {"counts": SPINDLE_RAD, "rad": 1.0}
 TARGET_TOLERANCE_RATIO = 2.0
@@ -62,17 +60,18 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
         DataError: The file is not a whole log; names the file, the line and what was expected.
     """
     text = raw.read_text(path)
-    identity = identify(path.parent.name, path.stem, text.header)
-    side = side_of(path, identity.instrument.side, text.header, text.columns)
-    remarks = [*identity.remarks, *side.remarks]
-    text.columns[raw.MIRRORED] *= side.sign
+    identity = identify(path, text.header, text.columns)
+    remarks = [*identity.remarks]
+    duration_s = float(text.columns[raw.TIME, -1] - text.columns[raw.TIME, 0])
+    if abs(duration_s - USUAL_DURATION_S) >= 0.5:
+        remarks.insert(0, f"The run lasts {duration_s:.2f} s; runs of this rig usually last 20 s.")
+    text.columns[raw.MIRRORED] *= identity.sign
     time_s = read_only(text.columns[raw.TIME])  # a copy: the text's block can be freed
     columns = _channels(text.columns, remarks)
     target = _target(text.columns, remarks)
     if target is not None:
         columns["target_angle_rad"] = target
-    intended = target if target is not None else columns["spindle_angle_rad"]
-    sine = fit_sine(time_s, intended)
+    sine = fit_sine(time_s, columns["spindle_angle_rad"] if target is None else target)
     if sine is not None and sine.explained_ratio < SINE_SHARE_RATIO:
         sine = None
     if sine is None:
@@ -88,11 +87,14 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
         columns=columns,
         conditions=conditions,
         rig="MRDLab",
-        instrument=replace(identity.instrument, side=side.name),
-        notes="\n".join([*_duration_remark(time_s), *remarks, *([companions] * bool(companions))]),
+        instrument=identity.instrument,
+        notes="\n".join([*remarks, *([companions] * bool(companions))]),
         source=source,
     )
-    for stretch in _bad_stretches(recording, sine, target):
+    if sine is not None and target is None:
+        target = sine.angle_rad(time_s)
+    intended = None if sine is None else target
+    for stretch in bad_stretches(recording, intended, raw.STEP_S, GEAR_RATIO):
         recording = recording.with_stretch(stretch)
     return recording
 
@@ -193,28 +195,3 @@ def _quantum(command: FloatArray) -> float:
 def _multiples(values: FloatArray, quantum: float) -> bool:
     ticks = values / quantum
     return bool(np.all(np.abs(ticks - np.rint(ticks)) < 1e-6))
-
-
-def _bad_stretches(
-    recording: Recording, sine: Sine | None, target: FloatArray | None
-) -> list[Stretch]:
-    time_s = recording.time_s
-    found = missing(time_s, raw.STEP_S)
-    found += saturated(time_s, recording["motor_current_a"], recording["motor_command_ratio"])
-    if sine is not None:
-        intended = sine.angle_rad(time_s) if target is None else target
-        found += runaways(
-            time_s,
-            recording["spindle_angle_rad"],
-            recording["motor_angle_rad"],
-            intended,
-            GEAR_RATIO,
-        )
-    return sorted(found, key=lambda stretch: stretch.start_s)
-
-
-def _duration_remark(time_s: FloatArray) -> list[str]:
-    duration_s = float(time_s[-1] - time_s[0])
-    if abs(duration_s - USUAL_DURATION_S) < 0.5:
-        return []
-    return [f"The run lasts {duration_s:.2f} s; runs of this rig usually last 20 s."]

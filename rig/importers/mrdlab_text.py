@@ -1,14 +1,20 @@
-"""Read the text of one MRDLab log: header lines, ten columns of decimals, every fault by line."""
+"""Read the text of one MRDLab log: header lines, ten columns of decimals, every fault by line.
 
+The grammar of a number is small on purpose: `[+-]digits[.digits]`. Values are correctly rounded: up
+to 15 digits are an exact integer in float64 and the power of ten below it is exact too, so one
+division rounds once, as Python's `float` does. Lines end in LF or CR LF.
+"""
+
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.recording import FloatArray
 from rig.errors import DataError
-from rig.importers.decimal_text import MAX_DIGITS, Fault, parse_decimals
 
 COLUMNS = (
     ("Back-end Time", "time", 1e7),
@@ -28,6 +34,9 @@ MIRRORED = [SPINDLE, PROXIMAL, CURRENT, JAW, DISTAL, COMMAND, MOTOR, TARGET]
 """Columns whose sign on a right jaw is opposite to that on a left one."""
 
 MAX_BYTES = 1 << 30
+MAX_DIGITS = 15
+DIGITS = [bytes([digit]) for digit in b"0123456789"]
+DECIMAL = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)")
 STEP_S = 1e-3
 STEP_TOLERANCE_RATIO = 0.01
 
@@ -114,12 +123,13 @@ def _parse(path: Path, content: bytes, start: int, header_lines: int) -> FloatAr
         )
     text = np.frombuffer(content, np.uint8, offset=start)
     columns = np.empty((len(COLUMNS), _likely_rows(content, start)))
-    fault, row, column, position = parse_decimals(text, columns)
-    if fault == Fault.TOO_MANY_ROWS:
+    row, position = parse_decimals(text, columns)
+    if position < text.size and row == columns.shape[1]:
         columns = np.empty((len(COLUMNS), content.count(b"\n", start)))
-        fault, row, column, position = parse_decimals(text, columns)
-    if fault != Fault.NONE:
-        raise _parse_fault(path, content, start + position, fault, column, header_lines + row + 1)
+        row, position = parse_decimals(text, columns)
+    if position < text.size:
+        line = content[start + position : content.index(b"\n", start + position)]
+        raise _line_fault(path, header_lines + row + 1, line)
     if row < 2:
         raise _fault(
             path, header_lines + row + 1, f"the log holds {row} samples", "at least two samples"
@@ -133,25 +143,19 @@ def _likely_rows(content: bytes, start: int) -> int:
     return 16 + sample.count(b"\n") * (len(content) - start) * 11 // (10 * max(len(sample), 1))
 
 
-def _parse_fault(
-    path: Path, content: bytes, position: int, fault: int, column: int, line: int
-) -> DataError:
-    expected = f"{len(COLUMNS)} decimal numbers with commas between them"
-    if fault == Fault.TOO_FEW_COLUMNS:
-        return _fault(path, line, f"the line has {column} columns", expected)
-    if fault == Fault.TOO_MANY_COLUMNS:
-        return _fault(path, line, f"the line has more than {column} columns", expected)
-    first = max(content.rfind(b",", 0, position), content.rfind(b"\n", 0, position)) + 1
-    field = content[first : content.index(b"\n", position)].split(b",")[0][:40].decode("latin-1")
-    name = COLUMNS[column][0]
-    if fault == Fault.TOO_MANY_DIGITS:
-        return _fault(
-            path,
-            line,
-            f"column {column + 1} is {field!r}",
-            f"{name} of at most {MAX_DIGITS} digits",
-        )
-    return _fault(path, line, f"column {column + 1} is {field!r}", f"a decimal number, {name}")
+def _line_fault(path: Path, number: int, line: bytes) -> DataError:
+    """Return the error that names what is wrong in a line that was not parsed."""
+    fields = line.removesuffix(b"\r").split(b",")
+    for column, (field, (name, _, _)) in enumerate(zip(fields, COLUMNS, strict=False), 1):
+        what = f"column {column} is {field[:40].decode('latin-1')!r}"
+        if DECIMAL.fullmatch(field) is None:
+            return _fault(path, number, what, f"a decimal number, {name}")
+        if sum(map(field.count, DIGITS)) > MAX_DIGITS:
+            return _fault(path, number, what, f"{name} of at most {MAX_DIGITS} digits")
+    width = len(COLUMNS)
+    has = f"{len(fields)}" if len(fields) < width else f"more than {width}"
+    expected = f"{width} decimal numbers with commas between them"
+    return _fault(path, number, f"the line has {has} columns", expected)
 
 
 def _check_range(path: Path, columns: FloatArray, header_lines: int) -> None:
@@ -199,3 +203,70 @@ def _fault(path: Path, line: int, what: str, expected: str = "a whole MRDLab log
         "Restore the file from its source, omit it (fit, diagnose, view: --skip-bad), or name the"
         " format with --format if it is another one.",
     )
+
+
+_POWERS = 10.0 ** np.arange(MAX_DIGITS + 1)
+_NEWLINE, _RETURN, _COMMA, _POINT, _PLUS, _MINUS, _ZERO = 10, 13, 44, 46, 43, 45, 48
+
+
+@numba.njit(cache=True)
+def parse_decimals(text: NDArray[np.uint8], columns: NDArray[np.float64]) -> tuple[int, int]:
+    """Parse decimal text into columns, one pass over the bytes.
+
+    Args:
+        text: Bytes of the lines, shape (bytes,); the last one must be a line feed, which is the
+            sentinel that stops every loop.
+        columns: Filled in place, shape (number of columns, rows).
+
+    Returns:
+        Complete rows, and the byte at which the line after them begins. That is the text's end, or
+        the first line that is not a row of decimals, or for which there is no room.
+    """
+    width, room = columns.shape
+    row, column = 0, 0
+    one = np.uint64(1)  # unsigned positions: no wrap-around test at each access
+    position, size = np.uint64(0), np.uint64(text.size)
+    line = position
+    while position < size and row < room:
+        sign = text[position]
+        position += np.uint64((sign == _MINUS) | (sign == _PLUS))
+        first = position
+        mantissa = np.int64(0)
+        digit = np.int64(text[position]) - _ZERO
+        while 0 <= digit <= 9:
+            mantissa = mantissa * 10 + digit
+            position += one
+            digit = np.int64(text[position]) - _ZERO
+        digits = np.int64(position - first)
+        decimals = np.int64(0)
+        if text[position] == _POINT:
+            position += one
+            first = position
+            digit = np.int64(text[position]) - _ZERO
+            while 0 <= digit <= 9:
+                mantissa = mantissa * 10 + digit
+                position += one
+                digit = np.int64(text[position]) - _ZERO
+            decimals = np.int64(position - first)
+            digits += decimals
+        if column == width or digits == 0 or digits > MAX_DIGITS:
+            break
+        value = np.float64(mantissa)
+        if decimals > 0:
+            value /= _POWERS[decimals]
+        columns[column, row] = -value if sign == _MINUS else value
+        column += 1
+        end = text[position]
+        if end == _COMMA:
+            position += one
+            continue
+        if end == _RETURN:
+            position += one
+            end = text[position]
+        if end != _NEWLINE or column < width:
+            break
+        position += one
+        line = position
+        row += 1
+        column = 0
+    return row, int(line)

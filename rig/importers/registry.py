@@ -2,11 +2,13 @@
 
 An importer is an object in the entry point group `rig.importers`. It recognises the format of a
 path without reading the samples, and opens it as a campaign of run handles. Whatever the
-format, a run that is read is checked for channels that contradict their derivatives.
+format, a run that is read is checked for channels that contradict their derivatives, and the runs
+are of one rig and one instrument: the first run that is read sets them, the first that differs is
+refused.
 """
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
@@ -18,7 +20,16 @@ from estimation.errors import EstimationError
 from estimation.recording import Recording
 from rig.errors import DataError, UsageError
 from rig.importers.derivatives import checked
-from rig.importers.one_rig import MixedRunsError, of_one_rig
+
+MAX_DEPTH = 3
+"""Folders below the one given that are looked into."""
+
+MAX_NAMES = 8
+"""Files named in one line; more are counted."""
+
+
+class MixedRunsError(DataError):
+    """Runs of different rigs or instruments were opened as one campaign."""
 
 
 @runtime_checkable
@@ -86,8 +97,9 @@ def open_campaign(path: Path, format_name: str | None = None, skip_bad: bool = F
         DataError: No importer recognises the path, or the one that does finds damage. Reading a
             run raises it where a channel and its derivative differ by a factor, a sign or a shift.
     """
-    campaign = _opened(path, format_name)
-    runs = [replace(run, load=partial(_read, run.load)) for run in campaign.runs]
+    campaign = _importer(path, format_name).open(path)
+    first: dict[str, tuple[str, str]] = {}
+    runs = [replace(run, load=partial(_read, run, first)) for run in campaign.runs]
     return Campaign(tuple(map(_or_excluded, runs) if skip_bad else runs))
 
 
@@ -102,11 +114,25 @@ def _or_excluded(run: Run) -> Run:
     return run
 
 
-def _read(load: Callable[[], Recording]) -> Recording:
-    return checked(load())
+def _read(run: Run, first: dict[str, tuple[str, str]]) -> Recording:
+    """Read and check a run; `first` holds each property of the first run, and that run's name."""
+    recording = run.load()
+    if run.excluded is not None or recording.excluded is not None:
+        return checked(recording)
+    own = recording.instrument
+    instrument = " ".join(part for part in (own.model, own.serial) if part) or "an unnamed one"
+    for what, value in (("rigs", recording.rig or "an unnamed one"), ("instruments", instrument)):
+        known, name = first.setdefault(what, (value, run.name))
+        if known != value:
+            raise MixedRunsError(
+                f"The runs are of several {what}: {name} of {known}, {run.name} of {value}.",
+                f"What differs between {what} would be taken for an effect.",
+                "Give the folder of one of them.",
+            )
+    return checked(recording)
 
 
-def _opened(path: Path, format_name: str | None) -> Campaign:
+def _importer(path: Path, format_name: str | None) -> Importer:
     if not path.exists():
         raise UsageError(f"There is no file or folder {path}.", fix="Check the path.")
     known = importers()
@@ -115,10 +141,9 @@ def _opened(path: Path, format_name: str | None) -> Campaign:
             raise UsageError(
                 f"There is no importer {format_name!r}.", f"Installed: {', '.join(known)}."
             )
-        return of_one_rig(known[format_name].open(path))
-    for importer in known.values():
-        if importer.recognises(path):
-            return of_one_rig(importer.open(path))
+        return known[format_name]
+    if (name := _format_of(path)) is not None:
+        return known[name]
     raise DataError(
         f"{path} holds no recording that rig reads by itself.",
         f"{_content(path)} Tried: {', '.join(known)}.".lstrip(),
@@ -134,3 +159,54 @@ def _content(path: Path) -> str:
     if not endings:
         return "The folder holds no file."
     return f"Its files: {', '.join(f'{n} {ending}' for ending, n in endings.most_common(4))}."
+
+
+def left_out(path: Path, campaign: Campaign) -> list[str]:
+    """Return the exclusions of an open campaign, one line per reason; empty if there are none.
+
+    Files that no importer recognises as recordings (notes, pictures) are not listed.
+
+    Args:
+        path: What was opened.
+        campaign: What it was opened as.
+    """
+    lines = [f"Run {r.name} does not count: {r.excluded}" for r in campaign.runs if r.excluded]
+    if not path.is_dir():
+        return lines
+    taken = {run.source for run in campaign.runs}
+    if None in taken:  # a table, whose machine file states which files are read
+        return lines
+    formats = {_format_of(source) for source in taken if source is not None}
+    reasons: dict[str, list[str]] = {}
+    for file in _files(path):
+        if file in taken or (name := _format_of(file)) is None:
+            continue
+        reason = (
+            "an earlier attempt of a run, or repaired"
+            if name in formats
+            else f"another format; --format {name} opens it"
+        )
+        reasons.setdefault(reason, []).append(str(file.relative_to(path)))
+    return lines + [
+        f"Left out, {reason}: {_named(files)}." for reason, files in sorted(reasons.items())
+    ]
+
+
+def _format_of(file: Path) -> str | None:
+    """Return the name of the importer that recognises a file."""
+    return next((name for name, one in importers().items() if one.recognises(file)), None)
+
+
+def _files(folder: Path, depth: int = MAX_DEPTH) -> Iterator[Path]:
+    for entry in sorted(folder.iterdir()):
+        if entry.name.startswith("."):
+            continue
+        if entry.is_file():
+            yield entry
+        elif depth and entry.is_dir() and not entry.is_symlink():
+            yield from _files(entry, depth - 1)
+
+
+def _named(files: list[str]) -> str:
+    shown = ", ".join(files[:MAX_NAMES])
+    return f"{len(files)} files, {shown}, ..." if len(files) > MAX_NAMES else shown

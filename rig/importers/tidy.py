@@ -1,37 +1,25 @@
 """A campaign as one tidy table: a row a sample, with its run and conditions, in Parquet or CSV."""
 
 import json
-import os
 from collections.abc import Iterator
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.channels import UnknownUnitError, unit_of
-from estimation.file_kinds import CSV, PARQUET
+from estimation.channels import unit_or_none
 from estimation.files import OutputError, check_output, write_text_atomic
 from estimation.recording import Recording
 from rig.errors import DataError
+from rig.log.export import KINDS, ExportFormat, part_of
 
 RUN, FLAGS, TIME = "run", "flags", "time_s"
 CONDITION = "condition_"
 """What the name of a condition's column begins with, so that no channel's name is taken twice."""
 
 
-class TidyFormat(Enum):
-    """File formats of a tidy table."""
-
-    CSV = "csv"
-    PARQUET = "parquet"
-
-
-KINDS = {TidyFormat.CSV: CSV, TidyFormat.PARQUET: PARQUET}
-
-
-def write_tidy(campaign: Campaign, path: Path, format_: TidyFormat, force: bool = False) -> Path:
+def write_tidy(campaign: Campaign, path: Path, format_: ExportFormat, force: bool = False) -> Path:
     """Write all runs of a campaign that count into one table; one run is held in memory at a time.
 
     Columns: `run`, one for each condition, `time_s`, `flags`, one for each channel that any run has
@@ -42,7 +30,7 @@ def write_tidy(campaign: Campaign, path: Path, format_: TidyFormat, force: bool 
     Args:
         campaign: The runs; excluded ones are left out.
         path: File to write.
-        format_: Its format.
+        format_: CSV or Parquet.
         force: Replace a file that is there.
 
     Returns:
@@ -58,18 +46,14 @@ def write_tidy(campaign: Campaign, path: Path, format_: TidyFormat, force: bool 
         raise OutputError(f"There is a file {path} already.", fix="Overwrite it with --force.")
     check_output(path, KINDS[format_])
     schema = _schema(campaign.evidence)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with _writer(part, schema, format_) as writer:
+        with part_of(path) as part, _writer(part, schema, format_) as writer:
             for table in _tables(campaign.evidence, schema):
                 writer.write_table(table)
-        part.replace(path)
     except OSError as error:
         raise OutputError(f"{path} cannot be written.", str(error)) from error
-    finally:
-        part.unlink(missing_ok=True)
-    if format_ is TidyFormat.CSV:
+    if format_ is ExportFormat.CSV:
         units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in schema}
         about = {"units": units, "runs": json.loads(schema.metadata[b"rig.runs"])}
         write_text_atomic(path.with_name(f"{path.name}.json"), json.dumps(about, indent=1) + "\n")
@@ -101,10 +85,8 @@ def _schema(campaign: Campaign) -> Any:
 
 
 def _unit(name: str) -> dict[str, str]:
-    try:
-        return {"unit": unit_of(name)}
-    except UnknownUnitError:
-        return {}
+    unit = unit_or_none(name)
+    return {} if unit is None else {"unit": unit}
 
 
 def _about(recording: Recording) -> dict[str, Any]:
@@ -145,8 +127,8 @@ def _tables(campaign: Campaign, schema: Any) -> Iterator[Any]:
         yield pa.table(values, schema=schema)
 
 
-def _writer(path: Path, schema: Any, format_: TidyFormat) -> Any:
-    if format_ is TidyFormat.PARQUET:
+def _writer(path: Path, schema: Any, format_: ExportFormat) -> Any:
+    if format_ is ExportFormat.PARQUET:
         from pyarrow import parquet
 
         return parquet.ParquetWriter(path, schema, compression="zstd")

@@ -13,11 +13,11 @@ from estimation.channels import ESTIMATED
 from estimation.estimator import Stepper, load
 from estimation.estimators.bank import BankEstimator, BankStepper
 from estimation.estimators.instrument import require_own
+from estimation.estimators.model import Stream
 from estimation.estimators.network import NetworkEstimator, NetworkStepper
 from estimation.model import Model
 from estimation.recording import MissingChannelError, Recording
 from estimation.signals import reference
-from estimation.stream import Stream
 from rig.live.block import FloatArray
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints
 from rig.live.replay import within_range

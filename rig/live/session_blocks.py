@@ -15,8 +15,8 @@ from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
 from rig.live.calibration_status import CalibrationStatus
 from rig.live.keys import LEAVE, MARK, RECORD, STOP, TARE, Keys, no_keys
 from rig.live.replay import EstimateStream, within_range
-from rig.machines.machine import MachinePlan
 from rig.machines.reading import Reading
+from rig.protocols.protocol import Plan
 from rig.recording.recorder import LiveRecorder
 
 ZERO_S = 0.5
@@ -25,7 +25,7 @@ ZERO_S = 0.5
 def session_blocks(
     config: Config,
     open_transport: Callable[[], Transport],
-    plans: Sequence[MachinePlan],
+    plans: Sequence[Plan],
     estimators: Sequence[EstimateStream],
     keys: Keys = no_keys,
     folder: Path = Path("logs"),
@@ -119,7 +119,7 @@ class _Hand:
             self._said = "tared"
 
 
-def _readings(session: Session, plans: Sequence[MachinePlan], hand: _Hand) -> Iterator[Reading]:
+def _readings(session: Session, plans: Sequence[Plan], hand: _Hand) -> Iterator[Reading]:
     """Play the runs; once the rig is stopped it is only watched."""
     for plan in plans:
         for reading in session.play(*session.machine.motion(plan, session.here).setpoints):

@@ -10,9 +10,9 @@ import os
 import struct
 import zlib
 from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 import zstandard
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rig.errors import DataError
 from rig.log.scan import ChunkRef, Damage
-from rig.log.schema import CDR_HEADER, MESSAGE_OPCODE, Stream
+from rig.log.schema import CDR_HEADER, MESSAGE_HEAD_BYTES, MESSAGE_OPCODE, Stream
 
 BATCH_BYTES = 1 << 19
 """Unpacked bytes a thread takes at a time: it fits in a core's cache, and hides the hand-over."""
@@ -28,30 +28,14 @@ BATCH_BYTES = 1 << 19
 MAX_CHUNK_BYTES = 1 << 30
 """A chunk that states more than this is taken for damaged, not unpacked."""
 
+MIXED = -1
+"""In place of a channel: a chunk in which several may be."""
+
 _MESSAGE = struct.Struct("<BQH")
+_CDR = CDR_HEADER.to_bytes(4, "little")
 
 
-@dataclass(frozen=True)
-class Layout:
-    """Layout of a message record of one channel."""
-
-    topic: str
-    stream: Stream
-
-    @cached_property
-    def record(self) -> np.dtype[np.void]:
-        """NumPy type of a whole record."""
-        return self.stream.record_dtype
-
-    @cached_property
-    def length(self) -> int:
-        """Length a record states."""
-        return self.stream.record_length
-
-    @cached_property
-    def size(self) -> int:
-        """Bytes of a whole record."""
-        return self.record.itemsize
+Bytes = NDArray[np.uint8]
 
 
 @dataclass
@@ -59,190 +43,141 @@ class Found:
     """Messages of the wanted channels, and what is damaged.
 
     Attributes:
-        rows: Channel to fields, structured array of the stream's dtype, shape (n,), in file order.
-        log_time_ns: Channel to log times, ns, shape (n,).
+        data: Channel to the bytes of its message records, in file order.
         damage: Chunks that could not be read.
         salvaged: Channel to the number of its messages that come from a torn chunk.
     """
 
-    rows: dict[int, NDArray[np.void]] = field(default_factory=dict)
-    log_time_ns: dict[int, NDArray[np.uint64]] = field(default_factory=dict)
+    data: dict[int, Bytes] = field(default_factory=dict)
     damage: list[Damage] = field(default_factory=list)
     salvaged: dict[int, int] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class _Target:
-    """Where the messages of one channel go, as raw bytes of each row and as log times."""
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A chunk, the one channel in it (`MIXED` if others may be), and where its bytes go."""
 
-    rows: NDArray[np.uint8]
-    log_time_ns: NDArray[np.uint64]
-
-    def part(self, first: int, stop: int) -> "_Target":
-        return _Target(self.rows[first:stop], self.log_time_ns[first:stop])
-
-
-@dataclass(frozen=True)
-class _Batch:
-    """Neighbouring chunks; with a channel, if they hold messages of that one and nothing else."""
-
-    chunks: list[ChunkRef]
-    channel: int | None
-    target: _Target | None
-
-
-@dataclass
-class _Read:
-    """Result of a batch."""
-
-    pieces: list[tuple[int, _Target]] = field(default_factory=list)
-    damage: list[Damage] = field(default_factory=list)
-    salvaged: dict[int, int] = field(default_factory=dict)
+    chunk: ChunkRef
+    channel: int
+    start: int
 
 
 def read_chunks(
-    buffer: memoryview, chunks: list[ChunkRef], layouts: dict[int, Layout], wanted: set[int]
+    buffer: memoryview, chunks: Sequence[ChunkRef], streams: dict[int, Stream], wanted: set[int]
 ) -> Found:
     """Unpack chunks and gather the messages of the wanted channels.
 
     Args:
         buffer: The bytes of the file.
         chunks: Its chunks, in file order.
-        layouts: Layout of each channel of fixed size.
-        wanted: Channels to read, keys of `layouts`.
+        streams: Stream of each channel of fixed size.
+        wanted: Channels to read, keys of `streams`.
     """
-    found = Found()
     if not wanted:
-        return found
-    targets, batches = _plan(chunks, layouts, wanted)
+        return Found()
+    parts, sizes = _parts(chunks, streams, wanted)
+    whole = {channel: np.empty(size, np.uint8) for channel, size in sizes.items()}
+    batches = list(_batches(parts))
     threads = max(1, min(len(batches), os.cpu_count() or 1))
     with ThreadPoolExecutor(threads) as pool:
-        done = list(pool.map(lambda batch: _read_batch(buffer, batch, layouts, wanted), batches))
-    for channel in wanted:
-        whole = _joined(
-            targets[channel],
-            [piece for read in done for number, piece in read.pieces if number == channel],
-        )
-        found.rows[channel] = whole.rows.view(layouts[channel].stream.dtype)[:, 0]
-        found.log_time_ns[channel] = whole.log_time_ns
+        done = list(pool.map(lambda batch: _read_batch(buffer, batch, streams, whole), batches))
+    found = Found()
+    for channel, target in whole.items():
+        pieces = [read.data[channel] for read in done if channel in read.data]
+        in_place = sum(map(len, pieces)) == len(target) and all(p.base is target for p in pieces)
+        found.data[channel] = target if in_place else np.concatenate([target[:0], *pieces])
     for read in done:
         found.damage += read.damage
         found.salvaged |= read.salvaged
     return found
 
 
-def _plan(
-    chunks: list[ChunkRef], layouts: dict[int, Layout], wanted: set[int]
-) -> tuple[dict[int, _Target], list[_Batch]]:
-    """Divide the chunks among batches and give each batch its place in the result."""
-    owners = [_owner(chunk, layouts) for chunk in chunks]
-    counts = dict.fromkeys(wanted, 0)
-    for chunk, owner in zip(chunks, owners, strict=True):
-        if owner in wanted:
-            counts[owner] += chunk.unpacked_bytes // layouts[owner].size
-    targets = {
-        channel: _Target(
-            np.empty((count, layouts[channel].stream.dtype.itemsize), np.uint8),
-            np.empty(count, np.uint64),
-        )
-        for channel, count in counts.items()
-    }
-    placed = dict.fromkeys(wanted, 0)
-    gathered: dict[int | None, list[ChunkRef]] = defaultdict(list)
-    gathered_bytes: dict[int | None, int] = defaultdict(int)
-    batches: list[_Batch] = []
-
-    def send(owner: int | None) -> None:
-        batch = gathered.pop(owner, [])
-        size = gathered_bytes.pop(owner, 0)
-        if not batch:
-            return
-        target = None
-        if owner is not None:
-            first = placed[owner]
-            placed[owner] += size // layouts[owner].size
-            target = targets[owner].part(first, placed[owner])
-        batches.append(_Batch(batch, owner, target))
-
-    for chunk, owner in zip(chunks, owners, strict=True):
-        if owner is None:
-            for other in list(gathered):  # so that each channel's messages stay in file order
-                send(other)
-        elif owner not in wanted:
-            continue
-        gathered[owner].append(chunk)
-        gathered_bytes[owner] += chunk.unpacked_bytes
-        if gathered_bytes[owner] > BATCH_BYTES:
-            send(owner)
-    for owner in list(gathered):
-        send(owner)
-    return targets, batches
+def _parts(
+    chunks: Sequence[ChunkRef], streams: dict[int, Stream], wanted: set[int]
+) -> tuple[list[_Part], dict[int, int]]:
+    """Return the chunks to read, and the bytes of each channel that have a place."""
+    parts, sizes = [], dict.fromkeys(wanted, 0)
+    for chunk in chunks:
+        channel = _owner(chunk, streams)
+        if channel == MIXED:
+            parts.append(_Part(chunk, MIXED, 0))
+        elif channel in wanted:
+            parts.append(_Part(chunk, channel, sizes[channel]))
+            sizes[channel] += chunk.unpacked_bytes
+    return parts, sizes
 
 
-def _owner(chunk: ChunkRef, layouts: dict[int, Layout]) -> int | None:
+def _owner(chunk: ChunkRef, streams: dict[int, Stream]) -> int:
     """Return the one channel in a chunk's index, if the sizes confirm it."""
     if chunk.torn or len(chunk.indexed) != 1:
-        return None
+        return MIXED
     ((channel, count),) = chunk.indexed.items()
-    if channel not in layouts or count * layouts[channel].size != chunk.unpacked_bytes:
-        return None
-    return channel
+    if channel not in streams:
+        return MIXED
+    size = streams[channel].record_dtype.itemsize
+    return channel if count * size == chunk.unpacked_bytes else MIXED
 
 
-def _joined(target: _Target, pieces: list[_Target]) -> _Target:
-    """Return the pieces as one; without a copy where they fill the target in its own order."""
-    if sum(len(piece.rows) for piece in pieces) == len(target.rows) and all(
-        piece.rows.base is target.rows for piece in pieces
-    ):
-        return target
-    return _Target(
-        np.concatenate([target.rows[:0], *(piece.rows for piece in pieces)]),
-        np.concatenate([target.log_time_ns[:0], *(piece.log_time_ns for piece in pieces)]),
-    )
+def _batches(parts: Sequence[_Part]) -> Iterator[list[_Part]]:
+    """Yield neighbouring chunks; one in which several channels may be stands alone."""
+    batch: list[_Part] = []
+    size = 0
+    for part in parts:
+        if batch and (size > BATCH_BYTES or MIXED in (part.channel, batch[-1].channel)):
+            yield batch
+            batch, size = [], 0
+        batch.append(part)
+        size += part.chunk.unpacked_bytes
+    if batch:
+        yield batch
 
 
 def _read_batch(
-    buffer: memoryview, batch: _Batch, layouts: dict[int, Layout], wanted: set[int]
-) -> _Read:
-    if batch.channel is not None and batch.target is not None:
+    buffer: memoryview, batch: list[_Part], streams: dict[int, Stream], whole: dict[int, Bytes]
+) -> Found:
+    if batch[0].channel != MIXED:
         try:
-            _read_array(buffer, batch.chunks, batch.channel, layouts[batch.channel], batch.target)
+            return Found(_read_arrays(buffer, batch, streams, whole))
         except (DataError, zstandard.ZstdError):
             pass  # one of the chunks does not match its index: take them one at a time
-        else:
-            return _Read([(batch.channel, batch.target)])
-    return _read_singly(buffer, batch.chunks, layouts, wanted)
+    return _read_singly(buffer, [part.chunk for part in batch], streams, set(whole))
 
 
-def _read_array(
-    buffer: memoryview, chunks: list[ChunkRef], channel: int, layout: Layout, target: _Target
-) -> None:
-    """Read chunks that hold messages of one channel only, as one array.
+def _read_arrays(
+    buffer: memoryview, batch: list[_Part], streams: dict[int, Stream], whole: dict[int, Bytes]
+) -> dict[int, Bytes]:
+    """Read chunks that hold messages of one channel each into their places.
 
     Raises:
         DataError: A chunk is damaged, or holds something else.
         zstandard.ZstdError: A chunk cannot be unpacked.
     """
     decompressor = zstandard.ZstdDecompressor()
-    data = b"".join([_unpack(buffer, chunk, decompressor) for chunk in chunks])
-    records = np.frombuffer(data, layout.record)
-    if not (
-        (records["opcode"] == MESSAGE_OPCODE).all()
-        and (records["length"] == layout.length).all()
-        and (records["channel"] == channel).all()
-        and (records["cdr"] == CDR_HEADER).all()
-    ):
-        raise DataError("The chunks hold other records too.")
-    raw = np.frombuffer(data, np.uint8).reshape(len(records), layout.size)
-    target.rows[:] = raw[:, layout.size - layout.stream.dtype.itemsize :]
-    target.log_time_ns[:] = records["log_time"]
+    spans: dict[int, slice] = {}
+    for part in batch:
+        data = _unpack(buffer, part.chunk, decompressor)
+        stop = part.start + len(data)
+        whole[part.channel][part.start : stop] = np.frombuffer(data, np.uint8)
+        first = spans.get(part.channel, slice(part.start, 0)).start
+        spans[part.channel] = slice(first, stop)
+    read = {channel: whole[channel][span] for channel, span in spans.items()}
+    for channel, content in read.items():
+        records = content.view(streams[channel].record_dtype)
+        if not (
+            (records["opcode"] == MESSAGE_OPCODE).all()
+            and (records["length"] == streams[channel].record_length).all()
+            and (records["channel"] == channel).all()
+            and (records["cdr"] == CDR_HEADER).all()
+        ):
+            raise DataError("The chunks hold other records too.")
+    return read
 
 
 def _read_singly(
-    buffer: memoryview, chunks: list[ChunkRef], layouts: dict[int, Layout], wanted: set[int]
-) -> _Read:
+    buffer: memoryview, chunks: list[ChunkRef], streams: dict[int, Stream], wanted: set[int]
+) -> Found:
     """Read chunks record by record, leaving out the damaged ones."""
-    read = _Read()
+    read = Found()
     decompressor = zstandard.ZstdDecompressor()
     for chunk in chunks:
         try:
@@ -251,11 +186,14 @@ def _read_singly(
             what = f"a chunk cannot be unpacked: {error}"
             read.damage.append(Damage(chunk.offset, len(chunk.data), what))
             continue
-        pieces, problem = _walk(data, layouts, wanted)
-        read.pieces += pieces
-        if chunk.torn:
-            read.salvaged |= {channel: len(piece.rows) for channel, piece in pieces}
-        elif problem:
+        records, problem = _walk(data, streams, wanted)
+        for channel, content in records.items():
+            before = read.data.get(channel, np.empty(0, np.uint8))
+            read.data[channel] = np.concatenate([before, np.frombuffer(content, np.uint8)])
+            if chunk.torn:
+                size = streams[channel].record_dtype.itemsize
+                read.salvaged[channel] = len(content) // size
+        if problem and not chunk.torn:
             read.damage.append(Damage(chunk.offset, len(chunk.data), problem))
     return read
 
@@ -288,36 +226,27 @@ def _unpack(buffer: memoryview, chunk: ChunkRef, decompressor: zstandard.ZstdDec
 
 
 def _walk(
-    data: bytes, layouts: dict[int, Layout], wanted: set[int]
-) -> tuple[list[tuple[int, _Target]], str | None]:
+    data: bytes, streams: dict[int, Stream], wanted: set[int]
+) -> tuple[dict[int, bytes], str | None]:
     """Read a chunk record by record; stop with the reason where that is not possible."""
-    places: dict[int, list[int]] = defaultdict(list)
+    found: dict[int, list[bytes]] = defaultdict(list)
     position, problem = 0, None
     while position < len(data):
-        if position + _MESSAGE.size > len(data):
-            problem = "a chunk ends inside a record"
-            break
-        opcode, length, channel = _MESSAGE.unpack_from(data, position)
-        stop = position + 9 + length
+        stop = position + _MESSAGE.size
+        if stop <= len(data):
+            opcode, length, channel = _MESSAGE.unpack_from(data, position)
+            stop = position + 9 + length
         if stop > len(data):
             problem = "a chunk ends inside a record"
             break
-        if opcode == MESSAGE_OPCODE and channel in layouts:
-            if length != layouts[channel].length:
-                problem = f"a message of {layouts[channel].topic} has a wrong length"
+        if opcode == MESSAGE_OPCODE and channel in streams:
+            if length != streams[channel].record_length:
+                problem = f"a message of {streams[channel].topic} has a wrong length"
                 break
-            places[channel].append(position)
+            record = data[position:stop]
+            if record.startswith(_CDR, 9 + MESSAGE_HEAD_BYTES):
+                found[channel].append(record)
+            else:
+                problem = f"a message of {streams[channel].topic} is not little-endian CDR"
         position = stop
-    pieces = []
-    array = np.frombuffer(data, np.uint8)
-    for channel in sorted(places.keys() & wanted):
-        layout = layouts[channel]
-        windows = np.lib.stride_tricks.sliding_window_view(array, layout.size)
-        raw = windows[places[channel]]
-        records = raw.view(layout.record)[:, 0]
-        if (records["cdr"] != CDR_HEADER).any():
-            problem = f"a message of {layout.topic} is not little-endian CDR"
-            continue
-        payload = np.ascontiguousarray(raw[:, layout.size - layout.stream.dtype.itemsize :])
-        pieces.append((channel, _Target(payload, records["log_time"].copy())))
-    return pieces, problem
+    return {channel: b"".join(found[channel]) for channel in found.keys() & wanted}, problem

@@ -76,10 +76,7 @@ def write_recording(path: Path, recording: Recording) -> Path:
     }
     writer = LogWriter(path, run_info(recording), [stream])
     try:
-        for mark in recording.marks:
-            writer.mark(mark)
-        for stretch in recording.stretches:
-            writer.stretch(stretch)
+        writer.add(*recording.marks, *recording.stretches)
         writer.write(SAMPLE, rows, log_time_ns)
         return writer.close(RunEnd(expected_samples={SAMPLE: len(recording)}))
     except BaseException:

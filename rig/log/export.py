@@ -1,7 +1,8 @@
 """Export of a log as CSV, Parquet or NPZ: one file for each topic, units in the headers."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
@@ -30,6 +31,10 @@ class ExportFormat(Enum):
     CSV = "csv"
     PARQUET = "parquet"
     NPZ = "npz"
+
+
+KINDS = {ExportFormat.CSV: CSV, ExportFormat.PARQUET: PARQUET, ExportFormat.NPZ: ARRAYS}
+"""What a file of each format is replaced by with `force`: its own kind."""
 
 
 class ExportExistsError(UsageError):
@@ -82,9 +87,10 @@ def export_log(
             f"There is a file {taken[0]} already.", fix="Overwrite it with --force."
         )
     for target in targets.values():
-        check_output(target, _KINDS[export_format])
+        check_output(target, KINDS[export_format])
     for name, target in targets.items():
-        _write_atomically(_WRITERS[export_format], target, log.topics[name])
+        with part_of(target) as part:
+            _WRITERS[export_format](part, log.topics[name])
     return list(targets.values())
 
 
@@ -108,14 +114,15 @@ def _targets(
     }
 
 
-def _write_atomically(write: Callable[[Path, Topic], None], target: Path, topic: Topic) -> None:
-    """Write a file in its target's folder and rename it when it is complete."""
-    partial = target.with_name(f".{target.name}.{os.getpid()}{PART_SUFFIX}")
+@contextmanager
+def part_of(target: Path) -> Iterator[Path]:
+    """Yield the name to write a file under, in its folder; it is renamed when it is complete."""
+    part = target.with_name(f".{target.name}.{os.getpid()}{PART_SUFFIX}")
     try:
-        write(partial, topic)
-        partial.replace(target)
+        yield part
+        part.replace(target)
     finally:
-        partial.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
 
 
 def _columns(topic: Topic) -> Columns:
@@ -165,9 +172,6 @@ def _write_npz(path: Path, topic: Topic) -> None:
     with path.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **_columns(topic))
 
-
-_KINDS = {ExportFormat.CSV: CSV, ExportFormat.PARQUET: PARQUET, ExportFormat.NPZ: ARRAYS}
-"""What a file of each format is replaced by with `force`: its own kind."""
 
 _WRITERS: dict[ExportFormat, Callable[[Path, Topic], None]] = {
     ExportFormat.CSV: _write_csv,

@@ -3,8 +3,9 @@
 import mmap
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.records import Channel
@@ -12,17 +13,9 @@ from numpy.typing import NDArray
 
 from estimation.recording import Mark, Stretch
 from rig.errors import DataError, UsageError
-from rig.log.chunks import Layout, read_chunks
+from rig.log.chunks import read_chunks
 from rig.log.container import LIBRARY, Attached
-from rig.log.run import (
-    END_RECORD,
-    MARK_RECORD,
-    RUN_RECORD,
-    STRETCH_RECORD,
-    RunEnd,
-    RunInfo,
-    from_metadata,
-)
+from rig.log.run import KINDS, RunEnd, RunInfo, from_metadata
 from rig.log.scan import Damage, NotALogError, Skeleton, scan
 from rig.log.schema import CHECKSUM_KEY, LayoutError, Stream
 
@@ -37,13 +30,23 @@ class Topic:
 
     Attributes:
         stream: Their layout.
-        rows: Their fields, structured array of the stream's dtype, shape (n,), in file order.
-        log_time_ns: When each was taken, ns, uint64, shape (n,).
+        records: Message records of the stream's `record_dtype`, shape (n,), in file order.
     """
 
     stream: Stream
-    rows: NDArray[np.void]
-    log_time_ns: NDArray[np.uint64]
+    records: NDArray[np.void]
+
+    @property
+    def rows(self) -> NDArray[np.void]:
+        """Their fields, structured array of the stream's dtype, shape (n,)."""
+        rows: NDArray[np.void] = self.records["payload"].view(self.stream.dtype)
+        return rows
+
+    @property
+    def log_time_ns(self) -> NDArray[np.uint64]:
+        """When each was taken, ns, shape (n,)."""
+        times: NDArray[np.uint64] = self.records["log_time"]
+        return times
 
     def __len__(self) -> int:
         return int(self.rows.size)
@@ -116,41 +119,41 @@ def read_log(
     """
     buffer = _map(path)
     skeleton = scan(buffer, path, checksums=checksums)
-    layouts, unread = _layouts(skeleton)
-    known = {layout.topic for layout in layouts.values()}
+    streams, unread = _streams(skeleton)
+    known = {stream.topic for stream in streams.values()}
     missing = set(topics or ()) - known
     if missing and not skeleton.damage:
         raise UsageError(
             f"{path} has no topic {', '.join(sorted(missing))}.",
             f"It has: {', '.join(sorted(known)) or 'none'}.",
         )
-    wanted = {n for n, layout in layouts.items() if topics is None or layout.topic in topics}
-    found = read_chunks(buffer, skeleton.chunks, layouts, wanted)
+    wanted = {n for n, stream in streams.items() if topics is None or stream.topic in topics}
+    found = read_chunks(buffer, skeleton.chunks, streams, wanted)
+    records, damage = _records(skeleton)
     log = LogFile(
         path=path,
         library=skeleton.library,
-        run=None,
-        end=None,
-        marks=(),
-        stretches=(),
+        run=(records[RunInfo] or [None])[-1],
+        end=(records[RunEnd] or [None])[-1],
+        marks=tuple(records[Mark]),
+        stretches=tuple(records[Stretch]),
         topics={
-            layouts[n].topic: Topic(layouts[n].stream, found.rows[n], found.log_time_ns[n])
+            streams[n].topic: Topic(streams[n], found.data[n].view(streams[n].record_dtype))
             for n in sorted(wanted)
         },
         attachments=tuple(
             Attached(item.name, item.media_type, item.data) for item in skeleton.attachments
         ),
-        metadata=(),
+        metadata=tuple(item for item in skeleton.metadata if item[0] not in KINDS),
         unread=unread,
-        damage=(*skeleton.damage, *found.damage),
+        damage=(*skeleton.damage, *found.damage, *damage),
         unchecked_chunks=sum(chunk.crc == 0 for chunk in skeleton.chunks),
-        salvaged={layouts[number].topic: count for number, count in found.salvaged.items()},
+        salvaged={streams[number].topic: count for number, count in found.salvaged.items()},
         indexed={
-            layout.topic: sum(chunk.indexed.get(number, 0) for chunk in skeleton.chunks)
-            for number, layout in layouts.items()
+            stream.topic: sum(chunk.indexed.get(number, 0) for chunk in skeleton.chunks)
+            for number, stream in streams.items()
         },
     )
-    log = _with_records(log, skeleton.metadata)
     if log.damage and not tolerant:
         raise damaged(log)
     return log
@@ -183,18 +186,17 @@ def _map(path: Path) -> memoryview:
         ) from None
 
 
-def _layouts(skeleton: Skeleton) -> tuple[dict[int, Layout], tuple[str, ...]]:
-    """Return the layout of each channel of fixed size by number, and the topics of the others."""
-    layouts: dict[int, Layout] = {}
+def _streams(skeleton: Skeleton) -> tuple[dict[int, Stream], tuple[str, ...]]:
+    """Return the stream of each channel of fixed size by number, and the topics of the others."""
+    streams: dict[int, Stream] = {}
     unread = []
     for number, channels in skeleton.channels.items():
-        taken = {layout.topic for layout in layouts.values()}
         stream = _stream(skeleton, channels)
-        if stream is None or stream.topic in taken:
+        if stream is None or stream.topic in {known.topic for known in streams.values()}:
             unread.append(channels[0].topic)
         else:
-            layouts[number] = Layout(stream.topic, stream)
-    return layouts, tuple(unread)
+            streams[number] = stream
+    return streams, tuple(unread)
 
 
 def _stream(skeleton: Skeleton, channels: list[Channel]) -> Stream | None:
@@ -217,30 +219,14 @@ def _stream(skeleton: Skeleton, channels: list[Channel]) -> Stream | None:
     return None
 
 
-def _with_records(log: LogFile, metadata: list[tuple[str, dict[str, str]]]) -> LogFile:
-    """Return the log with its metadata records understood."""
-    run, end = log.run, log.end
-    marks, stretches, others, damage = [], [], [], list(log.damage)
-    for name, data in metadata:
-        try:
-            if name == RUN_RECORD:
-                run = from_metadata(RunInfo, data)
-            elif name == END_RECORD:
-                end = from_metadata(RunEnd, data)
-            elif name == MARK_RECORD:
-                marks.append(from_metadata(Mark, data))
-            elif name == STRETCH_RECORD:
-                stretches.append(from_metadata(Stretch, data))
-            else:
-                others.append((name, data))
-        except DataError as error:
-            damage.append(Damage(0, 0, error.what))
-    return replace(
-        log,
-        run=run,
-        end=end,
-        marks=tuple(marks),
-        stretches=tuple(stretches),
-        metadata=tuple(others),
-        damage=tuple(damage),
-    )
+def _records(skeleton: Skeleton) -> tuple[dict[type, list[Any]], list[Damage]]:
+    """Return the metadata records of our own kinds by kind, and those that cannot be read."""
+    records: dict[type, list[Any]] = {kind: [] for kind in KINDS.values()}
+    damage = []
+    for name, data in skeleton.metadata:
+        if name in KINDS:
+            try:
+                records[KINDS[name]].append(from_metadata(name, data))
+            except DataError as error:
+                damage.append(Damage(0, 0, error.what))
+    return records, damage

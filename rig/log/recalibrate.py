@@ -64,7 +64,7 @@ def recalibrated(log: LogFile, calibrations: CalibrationSet) -> LogFile:
             )
     zeros = {} if log.run is None else log.run.zeros_before
     measured = {name.removesuffix(ZERO_SUFFIX): value for name, value in zeros.items()}
-    rows = sample.rows.copy()
+    again = replace(sample, records=sample.records.copy())
     for name, values in CalibrationSet(calibrations.name, lines).apply(counts, measured).items():
-        rows[name] = values
-    return replace(log, topics={**log.topics, SAMPLE: replace(sample, rows=rows)})
+        again.rows[name] = values
+    return replace(log, topics={**log.topics, SAMPLE: again})

@@ -97,10 +97,7 @@ def _write(log: LogFile, report: LogReport, target: Path) -> None:
     streams = [topic.stream for topic in log.topics.values()]
     writer = LogWriter(target, run, streams, attachments=log.attachments)
     try:
-        for mark in log.marks:
-            writer.mark(mark)
-        for stretch in log.stretches:
-            writer.stretch(stretch)
+        writer.add(*log.marks, *log.stretches)
         for record_name, data in log.metadata:
             writer.add_metadata(record_name, data)
         writer.add_metadata(

@@ -7,20 +7,14 @@ recorder did not close the file.
 """
 
 import json
-import math
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any, TypeVar
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
 
 from estimation.recording import Flag, Instrument, Mark, Stretch
 from rig.errors import DataError
 from rig.log.schema import CHECKSUM_KEY
-
-RUN_RECORD = "rig.run"
-END_RECORD = "rig.end"
-MARK_RECORD = "rig.mark"
-STRETCH_RECORD = "rig.stretch"
 
 
 @dataclass(frozen=True)
@@ -84,11 +78,18 @@ class RunEnd:
 
 
 Record = RunInfo | RunEnd | Mark | Stretch
-R = TypeVar("R", RunInfo, RunEnd, Mark, Stretch)
+KINDS: dict[str, type[Record]] = {
+    "rig.run": RunInfo,
+    "rig.end": RunEnd,
+    "rig.mark": Mark,
+    "rig.stretch": Stretch,
+}
+"""Name of a metadata record to what it holds."""
+NAMES = {kind: name for name, kind in KINDS.items()}
 
 
-def to_metadata(record: Record) -> dict[str, str]:
-    """Return a record as MCAP metadata: field name to JSON text.
+def to_metadata(record: Record) -> tuple[str, dict[str, str]]:
+    """Return a record as MCAP metadata: its name, and field name to JSON text.
 
     Raises:
         DataError: A value is not finite or cannot be written as JSON.
@@ -96,15 +97,15 @@ def to_metadata(record: Record) -> dict[str, str]:
     metadata = {}
     for item in fields(record):
         try:
-            value = _plain(getattr(record, item.name))
-            metadata[item.name] = json.dumps(value, allow_nan=False)
+            value = getattr(record, item.name)
+            metadata[item.name] = json.dumps(value, allow_nan=False, default=_plain)
         except (TypeError, ValueError) as error:
             raise DataError(
                 f"{item.name} of the run cannot be written: {error}.",
                 "Metadata holds text, finite numbers, lists and tables of them.",
                 "Leave out what is not known instead of writing NaN.",
             ) from None
-    return metadata | {CHECKSUM_KEY: _checksum(metadata)}
+    return NAMES[type(record)], metadata | {CHECKSUM_KEY: _checksum(metadata)}
 
 
 def _checksum(metadata: Mapping[str, str]) -> str:
@@ -113,12 +114,13 @@ def _checksum(metadata: Mapping[str, str]) -> str:
     return f"{zlib.crc32(json.dumps(items).encode()):08x}"
 
 
-def from_metadata(kind: type[R], metadata: Mapping[str, str]) -> R:
-    """Return the record that `to_metadata` wrote; unknown fields are ignored.
+def from_metadata(name: str, metadata: Mapping[str, str]) -> Record:
+    """Return the record that `to_metadata` wrote, by its name; unknown fields are ignored.
 
     Raises:
         DataError: The record does not match its checksum, or a value is of the wrong kind.
     """
+    kind = KINDS[name]
     if metadata.get(CHECKSUM_KEY) != _checksum(metadata):
         raise DataError(f"The {kind.__name__} record of the log does not match its checksum.")
     try:
@@ -152,15 +154,11 @@ def _check_types(record: Record) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as plain JSON types."""
+    """Return as plain types what JSON does not know."""
     if isinstance(value, Instrument):
-        return {item.name: getattr(value, item.name) for item in fields(value)}
+        return asdict(value)
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return dict(value)
     if hasattr(value, "tolist"):  # NumPy scalars and arrays
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{value} is not finite")
-    return value
+        return value.tolist()
+    raise TypeError(f"a {type(value).__name__} is not JSON")

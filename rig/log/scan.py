@@ -4,6 +4,7 @@ A record is taken only if its body is consumed exactly by its own inner lengths.
 the walk looks for the next place where it succeeds, so one damaged length does not hide the rest.
 """
 
+import io
 import struct
 import zlib
 from dataclasses import dataclass, field
@@ -96,14 +97,6 @@ class ChunkRef:
     indexed: dict[int, int] = field(default_factory=dict)
 
 
-@dataclass(slots=True)
-class Indexed:
-    """What a message index states: how many messages of a channel the chunk before it holds."""
-
-    channel: int
-    messages: int
-
-
 @dataclass
 class Skeleton:
     """Everything of a file but the messages in its chunks, in file order.
@@ -133,20 +126,20 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
         NotALogError: It contains no MCAP record.
     """
     skeleton = Skeleton()
-    position = 8
+    position, size = 8, len(buffer)
     if bytes(buffer[:8]) != MAGIC:
-        skeleton.damage.append(Damage(0, min(8, len(buffer)), "the file does not begin as MCAP"))
+        skeleton.damage.append(Damage(0, min(8, size), "the file does not begin as MCAP"))
         position = 0
-    while position < len(buffer) and not skeleton.finished:
+    while position < size and not skeleton.finished:
         parsed = _parse(buffer, position)
         if parsed is None:
             found = _next_record(buffer, position + 1)
-            torn = None if found < len(buffer) else _torn_chunk(buffer, position)
+            torn = None if found < size else _torn_chunk(buffer, position)
             if torn is not None:
                 skeleton.chunks.append(torn)
                 what = "the file ends inside a chunk"
             else:
-                what = "unreadable record" if found < len(buffer) else "unreadable end of the file"
+                what = "unreadable record" if found < size else "unreadable end of the file"
             skeleton.damage.append(Damage(position, found - position, what))
             position = found
             continue
@@ -166,10 +159,10 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
 
 def _parse(buffer: memoryview, start: int) -> tuple[Any, int] | None:
     """Return the record at a place and where the next begins; None without a whole one."""
-    if start + _HEAD.size > len(buffer):
+    first = start + _HEAD.size
+    if first > len(buffer):
         return None
     opcode, length = _HEAD.unpack_from(buffer, start)
-    first = start + _HEAD.size
     stop = first + length
     if stop > len(buffer):
         return None
@@ -181,13 +174,13 @@ def _parse(buffer: memoryview, start: int) -> tuple[Any, int] | None:
             return None
         channel, size = _INDEX.unpack_from(buffer, first)
         whole = size == length - 6 and size % 16 == 0
-        return (Indexed(channel, size // 16), stop) if whole else None
+        return ((channel, size // 16), stop) if whole else None
     if opcode == _CHUNK_INDEX_OPCODE:
         # the chunks were met already; the summary's checksum covers this
         return (None, stop) if length >= 64 else None
     if opcode not in _READERS:
         return None
-    stream = ReadDataStream(_View(buffer[first:stop]))  # type: ignore[arg-type]
+    stream = ReadDataStream(_Body(buffer[first:stop]))
     try:
         record = _READERS[Opcode(opcode)].read(stream)
     except (struct.error, UnicodeDecodeError, EndOfFile, ValueError, OverflowError):
@@ -195,18 +188,13 @@ def _parse(buffer: memoryview, start: int) -> tuple[Any, int] | None:
     return (record, stop) if stream.count == length else None
 
 
-class _View:
-    """Reads bytes from a view, never more than are there, whatever length is asked for."""
+class _Body(io.BytesIO):
+    """The bytes of a record; fewer than are asked for are never read."""
 
-    def __init__(self, view: memoryview) -> None:
-        self._view = view
-        self._position = 0
-
-    def read(self, count: int) -> bytes:
-        data = bytes(self._view[self._position : self._position + count])
-        if len(data) < count:
+    def read(self, count: int | None = -1) -> bytes:
+        data = super().read(count)
+        if count is not None and len(data) < count:
             raise EndOfFile
-        self._position += count
         return data
 
 
@@ -276,8 +264,8 @@ def _take(
     match record:
         case ChunkRef():
             skeleton.chunks.append(record)
-        case Indexed() if skeleton.chunks:
-            skeleton.chunks[-1].indexed[record.channel] = record.messages
+        case (channel, messages) if skeleton.chunks:  # of a message index
+            skeleton.chunks[-1].indexed[channel] = messages
         case Header():
             skeleton.library = record.library
         case Schema():

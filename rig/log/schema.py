@@ -129,7 +129,7 @@ class Stream:
             ]
         )
 
-    @property
+    @cached_property
     def record_length(self) -> int:
         """The length an MCAP message record of this stream states, which excludes its own head."""
         return MESSAGE_HEAD_BYTES + 4 + self.dtype.itemsize

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,15 +28,7 @@ from rig import __version__
 from rig.errors import RigError, UsageError
 from rig.log.container import LIBRARY, Attached, Container
 from rig.log.messages import Rows, message_records, packed_rows
-from rig.log.run import (
-    END_RECORD,
-    MARK_RECORD,
-    RUN_RECORD,
-    STRETCH_RECORD,
-    RunEnd,
-    RunInfo,
-    to_metadata,
-)
+from rig.log.run import RunEnd, RunInfo, to_metadata
 from rig.log.schema import Stream
 
 PART_SUFFIX = ".part"
@@ -116,7 +109,7 @@ class LogWriter:
         try:
             with self._giving_to_system():
                 self._container = Container(self._file, f"{LIBRARY} {__version__}")
-                self._container.add_metadata(RUN_RECORD, run_metadata)
+                self._container.add_metadata(*run_metadata)
                 self._channels = {s.topic: self._container.add_stream(s) for s in streams}
                 for attached in attachments:
                     self._container.add_attachment(attached, run.started_at_ns or 0)
@@ -125,7 +118,7 @@ class LogWriter:
             self.discard()
             raise
 
-    def __enter__(self) -> "LogWriter":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -203,13 +196,10 @@ class LogWriter:
                     self._container.add_chunk(self._channels[topic], part)
             self._file.flush()
 
-    def mark(self, mark: Mark) -> None:
-        """Write an operator's mark at once."""
-        self.add_metadata(MARK_RECORD, to_metadata(mark))
-
-    def stretch(self, stretch: Stretch) -> None:
-        """Write a flagged stretch at once."""
-        self.add_metadata(STRETCH_RECORD, to_metadata(stretch))
+    def add(self, *records: Mark | Stretch) -> None:
+        """Write operator's marks and flagged stretches at once."""
+        for record in records:
+            self.add_metadata(*to_metadata(record))
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
         """Write a metadata record of any name at once.
@@ -236,7 +226,7 @@ class LogWriter:
         end_metadata = to_metadata(end or RunEnd())
         self.flush()
         with self._giving_to_system():
-            self._container.add_metadata(END_RECORD, end_metadata)
+            self._container.add_metadata(*end_metadata)
             self._container.finish()
             self._file.flush()
             os.fsync(self._file.fileno())

@@ -20,8 +20,8 @@ from drivers.device import Channel, Drive
 from drivers.errors import LinkLostError
 from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.protocol import MISSING, TOP
+from drivers.transport.simulated import Pace
 from rig.logic.latch import TripLatch
-from rig.logic.pace import Pace
 
 READ_S = 0.02
 """Time of the ticks between two polls of the host; shorter than any watchdog of the board."""

@@ -4,46 +4,27 @@ The drive's shaft counts as motor and as spindle. It has no load motor.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import replace
 from typing import Self
 
-from calibration.linear import CalibrationSet
 from drivers.registry import drivers
 from drivers.teensy.profile import Profile
-from drivers.teensy.reference import REFERENCE, Limits
+from drivers.teensy.reference import REFERENCE
 from rig.configuration.config import Config
 from rig.errors import UsageError
-from rig.machines.machine import MachinePlan
 from rig.machines.reference import ReferenceMachine
-from rig.machines.safety import board_limits
 from rig.protocols.motion import Motion
+from rig.protocols.protocol import Plan
 from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
 
-@dataclass(frozen=True, eq=False)
-class SampledProfile(Profile):
-    """The reference rig's profile with a tick of its core, and samples at another rate.
-
-    Attributes:
-        sampled_hz: Samples a second.
-    """
-
-    sampled_hz: float = 1000.0
-
-    @property
-    def rate_hz(self) -> float:
-        """Samples a second."""
-        return self.sampled_hz
-
-
-def sampled_at(rate_hz: float) -> SampledProfile:
-    """Return the profile of a drive that is sampled at a rate."""
-    same = {field.name: getattr(REFERENCE, field.name) for field in fields(REFERENCE)}
-    return SampledProfile(**same, sampled_hz=rate_hz)
+def sampled_at(rate_hz: float) -> Profile:
+    """Return the reference rig's profile, with the tick of its core, sampled at another rate."""
+    return replace(REFERENCE, sampled_hz=rate_hz)
 
 
 class DriveMachine(ReferenceMachine):
-    """Implements `rig.machines.machine.Machine`.
+    """A drive in place of the reference rig's motor and spindle.
 
     Args:
         rate_hz: Samples a second; divides 1000, the rate of the trajectories.
@@ -76,11 +57,7 @@ class DriveMachine(ReferenceMachine):
         """Return the protocol without load."""
         return "unloaded"
 
-    def board_limits(self, config: Config, calibrations: CalibrationSet) -> Limits:  # type: ignore[override]
-        """Return the limits of the core that runs in this computer."""
-        return board_limits(config, calibrations, 1 / self.profile.rate_hz)
-
-    def motion(self, plan: MachinePlan, here: tuple[float, ...]) -> Motion:
+    def motion(self, plan: Plan, here: tuple[float, ...]) -> Motion:
         """Return approach, run and release, at the drive's rate."""
         return self._taken(super().motion(plan, here))
 
@@ -89,9 +66,9 @@ class DriveMachine(ReferenceMachine):
         return self._taken(super().settling(here))
 
     def _taken(self, motion: Motion) -> Motion:
-        angle, load = (column[:: self._every] for column in motion.setpoints)
+        setpoints = tuple(column[:: self._every] for column in motion.setpoints)
         first, last = (math.ceil(index / self._every) for index in (motion.first, motion.last))
-        return Motion(angle, load, first, last)
+        return Motion(setpoints, first, last)
 
 
 def rate_of(config: Config) -> float:

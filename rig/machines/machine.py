@@ -1,7 +1,7 @@
 """The interface of a machine to a session, the same for every kind of rig."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, Self
+from typing import Any, NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,98 +10,72 @@ from calibration.linear import CalibrationSet
 from drivers.teensy.profile import ArmLimits, Profile
 from drivers.teensy.protocol import Trip
 from rig.configuration.config import Config
+from rig.errors import SafetyTripError, UsageError
 from rig.log.schema import Stream
+from rig.log.streams import COUNTS_STREAM
+from rig.protocols.motion import Motion
+from rig.protocols.protocol import Plan
 
 FloatArray = NDArray[np.float64]
 
 
-class MachinePlan(Protocol):
-    """One run to be made."""
-
-    @property
-    def name(self) -> str:
-        """Name of the run, unique in its protocol."""
-
-    @property
-    def conditions(self) -> dict[str, float | str]:
-        """The constant conditions of the run."""
-
-    @property
-    def samples(self) -> int:
-        """Samples the run will have."""
-
-    @property
-    def duration_s(self) -> float:
-        """Length of the run, s."""
-
-
-class MachineMotion(Protocol):
-    """Setpoints of a whole motion: approach, the run, release."""
-
-    @property
-    def setpoints(self) -> tuple[FloatArray, ...]:
-        """What is asked for, one array of shape (n,) for each field of a setpoint, SI units."""
-
-    @property
-    def first(self) -> int:
-        """Index of the run's first setpoint."""
-
-    @property
-    def last(self) -> int:
-        """Index behind its last."""
-
-
-class Machine(Protocol):
-    """One kind of rig.
+class Machine:
+    """One kind of rig; what a kind does not define is that of a rig without motors.
 
     Attributes:
         profile: Samples and motors of its board.
         counts: Stream of its raw counts in a log.
         setpoint_channels: Channel whose calibration makes counts of each field of a setpoint.
+        setpoint_limits: Key of `[limits]` of each field of a setpoint.
         channels_of_inputs: Channel of each input of the board.
         here_channels: Channels whose values say where it stands, in the order of its setpoints.
         shown: Channels the live display shows, the main one first.
     """
 
+    profile: Profile
+    counts: Stream = COUNTS_STREAM
+    setpoint_channels: tuple[str, ...] = ()
+    setpoint_limits: tuple[str, ...] = ()
+    channels_of_inputs: Mapping[str, str] = {}
+    here_channels: tuple[str, ...] = ()
+    shown: tuple[str, ...] = ()
+
     @classmethod
     def of(cls, config: Config) -> Self:
-        """Return the machine of a configuration."""
-        ...
+        """Return the machine of a configuration; by default the same for every one."""
+        return cls()
 
     def at(self, rate_hz: float) -> Self:
-        """Return the machine with the rate that its device really has."""
-        ...
-
-    @property
-    def profile(self) -> Profile: ...  # noqa: D102
-    @property
-    def counts(self) -> Stream: ...  # noqa: D102
-    @property
-    def setpoint_channels(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def channels_of_inputs(self) -> Mapping[str, str]: ...  # noqa: D102
-    @property
-    def here_channels(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def shown(self) -> tuple[str, ...]: ...  # noqa: D102
+        """Return the machine with the rate that its device really has; by default its only one."""
+        return self
 
     def first_look(self, config: Config) -> str:
         """Return the shipped protocol for a quick check of this rig."""
-        ...
+        return "still"
 
     def gains(self, config: Config) -> Sequence[Any]:
         """Return the gains of every controller, as `TeensyLogger.arm` takes them."""
-        ...
+        self._refuse(config.logger.driver)
 
     def board_limits(self, config: Config, calibrations: CalibrationSet) -> ArmLimits:
         """Return the limits the board holds against every sample itself, in its own counts."""
-        ...
+        self._refuse(config.logger.driver)
+
+    def train_rad(self, config: Config, here: Sequence[float]) -> dict[str, float]:
+        """Return the angle of each encoder where the rig stands at `here`, without slack, rad."""
+        return dict(zip(self.here_channels, here, strict=True))
 
     def reference_counts(
         self, config: Config, calibrations: CalibrationSet, here: Sequence[float]
     ) -> tuple[int, ...]:
         """Return the counts of the three encoders where the rig stands at `here`, rad."""
-        ...
+        if not self.here_channels:
+            self._refuse(config.logger.driver)
+        lines = calibrations.channels
+        return tuple(
+            round(angle / lines[name].slope + lines[name].zero_counts) if name in lines else 0
+            for name, angle in self.train_rad(config, here).items()
+        )
 
     def check_setpoints(self, config: Config, setpoints: Sequence[FloatArray]) -> None:
         """Refuse setpoints that the limits forbid, before anything moves.
@@ -109,32 +83,48 @@ class Machine(Protocol):
         Raises:
             SafetyTripError: One is beyond its limit or not finite.
         """
-        ...
+        given = config.limits.model_dump()
+        for name, values in zip(self.setpoint_limits, setpoints, strict=True):
+            limit = given[name]
+            if not np.isfinite(values).all() or np.abs(values).max(initial=0.0) > limit:
+                raise SafetyTripError(
+                    f"The trajectory asks for {name} = {np.abs(values).max():.3g}.",
+                    f"The configured limit is {limit:g}; nothing was moved.",
+                    f"Change the protocol, or [limits] {name} if the rig can take it.",
+                )
 
     def here(self, columns: Mapping[str, FloatArray]) -> tuple[float, ...]:
         """Return where it stood in the newest sample: the positions its setpoints ask for, rad."""
-        ...
+        return tuple(float(columns[name][-1]) for name in self.here_channels)
 
-    def motion(self, plan: MachinePlan, here: tuple[float, ...]) -> MachineMotion:
+    def motion(self, plan: Plan, here: tuple[float, ...]) -> Motion:
         """Return the motion that makes a run, beginning where it stands.
 
         Raises:
             UsageError: The run is for another kind of rig.
         """
-        ...
+        samples = round(plan.duration_s * self.profile.rate_hz)
+        return Motion((np.zeros(samples),), 0, samples)
 
-    def settling(self, here: tuple[float, ...]) -> MachineMotion:
+    def settling(self, here: tuple[float, ...]) -> Motion:
         """Return the motion that lets friction give up the torque it holds."""
-        ...
+        return Motion((np.zeros(0),), 0, 0)
 
     def too_narrow(self, limits: ArmLimits, sample: np.void) -> tuple[ArmLimits, Trip]:
         """Return limits whose travel ends before where a sample stands, and the trip they make."""
-        ...
+        self._refuse("device")
 
     def beyond(self, limits: ArmLimits) -> tuple[NDArray[np.integer], ...]:
         """Return one setpoint beyond the travel, in counts."""
-        ...
+        self._refuse("device")
 
     def untroubled(self, limits: ArmLimits) -> ArmLimits:
         """Return the limits without those that a rig at rest may already be beyond."""
-        ...
+        self._refuse("device")
+
+    def _refuse(self, name: str) -> NoReturn:
+        raise UsageError(
+            f"A {name} has no motor that could be armed, moved or stopped.",
+            'The configuration has [logger] profile = "sensor".',
+            "Use `rig live` or `rig record` with it.",
+        )

@@ -4,11 +4,7 @@ import math
 from typing import Any
 
 from calibration.linear import CalibrationSet
-from drivers.teensy.protocol import TOP
 from rig.configuration.plausibility import PlausibilitySection
-
-JUMP_SPEEDS = 4
-"""A motor's count that goes so many times its fastest way in one tick has jumped."""
 
 SEEN_COUNTS = 2
 """Counts of the spindle that are a motion and not the edge of one count."""
@@ -31,7 +27,7 @@ def loop_limits(
         tick_s: Period of a tick.
 
     Returns:
-        `drivers.teensy.protocol.LOOP_LIMIT_NAMES` but the motor's jump; what the rig has no channel
+        `drivers.teensy.limits.LOOP_LIMIT_NAMES` but the motor's jump; what the rig has no channel
         for is not limited.
     """
     lines = {role: calibrations.channels.get(name) for role, name in channels.items()}
@@ -55,11 +51,6 @@ def loop_limits(
         limits["frozen_current"] = round(abs(frozen_a / current.slope))
         limits["frozen_motion"] = math.ceil(abs(believed.frozen_motor_rad / motor.slope))
     return limits
-
-
-def jump_limit(max_motor_step: int) -> int:
-    """Return how far a motor's count may go in one tick."""
-    return min(TOP, JUMP_SPEEDS * max_motor_step)
 
 
 def pair_limits(

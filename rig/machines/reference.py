@@ -2,30 +2,28 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
-from drivers.teensy.profile import ArmLimits
+from drivers.teensy.profile import ArmLimits, Profile
 from drivers.teensy.protocol import TOP, Trip
 from drivers.teensy.reference import REFERENCE, Limits
 from rig.configuration.config import Config
 from rig.errors import UsageError
-from rig.log.streams import COUNTS_STREAM
-from rig.machines.machine import FloatArray, MachinePlan
-from rig.machines.safety import board_limits, check_setpoints
+from rig.machines.machine import Machine
+from rig.machines.safety import board_limits
 from rig.protocols.motion import Motion, motion_of, settling
-from rig.protocols.protocol import RunPlan
+from rig.protocols.protocol import Plan, RunPlan
 
 
-class ReferenceMachine:
-    """Implements `rig.machines.machine.Machine`."""
+class ReferenceMachine(Machine):
+    """The reference rig."""
 
-    profile = REFERENCE
-    counts = COUNTS_STREAM
+    profile: Profile = REFERENCE
     setpoint_channels = ("target_angle_rad", "load_command_a")
+    setpoint_limits = ("spindle_angle_rad", "load_command_a")
     channels_of_inputs: Mapping[str, str] = {
         "motor": "motor_angle_rad",
         "spindle": "spindle_angle_rad",
@@ -37,16 +35,6 @@ class ReferenceMachine:
     }
     here_channels = ("spindle_angle_rad",)
     shown: tuple[str, ...] = ("distal_torque_n_m",)
-    board_limits = staticmethod(board_limits)
-
-    @classmethod
-    def of(cls, config: Config) -> Self:
-        """Return the machine, the same for every configuration."""
-        return cls()
-
-    def at(self, rate_hz: float) -> Self:
-        """Return itself: its board has one rate."""
-        return self
 
     def first_look(self, config: Config) -> str:
         """Return the quick protocol, without load if the rig lacks a load motor."""
@@ -56,41 +44,20 @@ class ReferenceMachine:
         """Return the gains of the position controller."""
         return config.controller.gains()
 
-    def reference_counts(
-        self, config: Config, calibrations: CalibrationSet, here: Sequence[float]
-    ) -> tuple[int, ...]:
-        """Return the counts of motor, spindle and jaw, of a train without slack."""
+    def board_limits(self, config: Config, calibrations: CalibrationSet) -> Limits:
+        """Return the limits at the rate of the samples."""
+        return board_limits(config, calibrations, 1 / self.profile.rate_hz)
+
+    def train_rad(self, config: Config, here: Sequence[float]) -> dict[str, float]:
+        """Return the angles of motor, spindle and jaw."""
         believed, (spindle_rad,) = config.plausibility, here
-        angles = {
+        return {
             "motor_angle_rad": believed.gear_ratio * spindle_rad,
             "spindle_angle_rad": spindle_rad,
             "jaw_angle_rad": believed.jaw_zero_rad + believed.jaw_ratio * spindle_rad,
         }
-        lines = calibrations.channels
-        return tuple(
-            round(angle / lines[name].slope + lines[name].zero_counts) if name in lines else 0
-            for name, angle in angles.items()
-        )
 
-    def check_setpoints(self, config: Config, setpoints: Sequence[FloatArray]) -> None:
-        """Hold the limits of travel and load against a trajectory."""
-        limits = config.reference_limits
-        asked = (
-            ("spindle_angle_rad", limits.spindle_angle_rad),
-            (
-                "load_command_a",
-                limits.load_command_a,
-            ),
-        )
-        check_setpoints(
-            (name, values, limit) for (name, limit), values in zip(asked, setpoints, strict=True)
-        )
-
-    def here(self, columns: Mapping[str, FloatArray]) -> tuple[float, ...]:
-        """Return where the spindle stands."""
-        return (float(columns["spindle_angle_rad"][-1]),)
-
-    def motion(self, plan: MachinePlan, here: tuple[float, ...]) -> Motion:
+    def motion(self, plan: Plan, here: tuple[float, ...]) -> Motion:
         """Return approach, run and release of the spindle."""
         if not isinstance(plan, RunPlan):
             raise UsageError(

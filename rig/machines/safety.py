@@ -1,21 +1,25 @@
-"""The limits of the rig: refused setpoints, trips, and limits checked by the board itself."""
+"""The limits of the rig: trips, and limits checked by the board itself."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
 from drivers.teensy.protocol import TOP, SafeState
 from drivers.teensy.reference import Limits
 from rig.configuration.config import Config
 from rig.configuration.machine_settings import LimitsSection
+from rig.configuration.sections import SafetySection
 from rig.errors import SafetyTripError
-from rig.machines.plausible_counts import jaw_ends_rad, jump_limit, loop_limits, pair_limits
+from rig.machines.plausible_counts import jaw_ends_rad, loop_limits, pair_limits
 from rig.machines.reading import Reading
 
 TICK_S = 1e-3
+
+JUMP_SPEEDS = 4
+"""A motor's count that goes so many times its fastest way in one tick has jumped."""
 
 
 @dataclass(frozen=True)
@@ -75,16 +79,20 @@ def board_limits(config: Config, calibrations: CalibrationSet, period_s: float =
         open_rad if safety.jaw_open_rad is None else safety.jaw_open_rad,
         closed_rad if safety.jaw_closed_rad is None else safety.jaw_closed_rad,
     )
-    max_motor_step = size("motor_angle_rad", safety.motor_speed_rad_s * TICK_S)
     load_a = safety.load_continuous_a or limits.load_command_a
-    loop = {
-        "motor": "motor_angle_rad",
-        "followed": "spindle_angle_rad",
-        "current": "motor_current_a",
-        "command": "motor_command_ratio",
-    }
+    motor = motor_limits(
+        config,
+        calibrations,
+        {
+            "motor": "motor_angle_rad",
+            "followed": "spindle_angle_rad",
+            "current": "motor_current_a",
+            "command": "motor_command_ratio",
+        },
+        limits.motor_current_a,
+        (TICK_S, period_s),
+    )
     return Limits(
-        max_current=size("motor_current_a", limits.motor_current_a),
         max_load_ma=size("load_command_a", limits.load_command_a),
         max_proximal=size("proximal_torque_n_m", limits.proximal_torque_n_m),
         max_distal=size("distal_torque_n_m", limits.distal_torque_n_m),
@@ -94,26 +102,55 @@ def board_limits(config: Config, calibrations: CalibrationSet, period_s: float =
         max_jaw=max_jaw,
         continuous_load_ma=size("load_command_a", load_a),
         load_i2t=counts.heat("load_command_a", safety.load_heat_a2_s),
-        max_motor_step=max_motor_step,
-        max_motor_jump=jump_limit(max_motor_step),
         max_target_step=target_step(
             size, safety.motor_speed_rad_s * period_s, config.plausibility.gear_ratio
         ),
-        continuous_current=size("motor_current_a", safety.continuous_current_a),
-        i2t=counts.heat("motor_current_a", safety.heat_a2_s),
-        stall_current=size("motor_current_a", safety.stall_current_a),
-        stall_motion=size("motor_angle_rad", safety.stall_motor_angle_rad),
-        **loop_limits(config.plausibility, calibrations, loop, limits.motor_current_a, period_s),
+        **motor,
         **pair_limits(config.plausibility, calibrations, period_s),
-        stall_ticks=ticks_of(safety.stall_s, period_s),
-        saturated_ticks=ticks_of(safety.saturated_s, period_s),
-        stale_ticks=ticks_of(safety.stale_s, period_s),
-        dry_ticks=ticks_of(safety.dry_s, period_s),
-        hold_ticks=ticks_of(safety.hold_s, period_s),
-        watchdog_us=round(safety.watchdog_s * 1e6),
-        safe_state=SafeState[safety.safe_state.upper()],
-        hold_command_e4=round(safety.hold_command_ratio * 1e4),
+        **choices(safety, period_s),
     )
+
+
+def motor_limits(
+    config: Config,
+    calibrations: CalibrationSet,
+    channels: dict[str, str],
+    max_current_a: float,
+    ticks_s: tuple[float, float],
+) -> dict[str, Any]:
+    """Return the limits of one motor and of its position loop.
+
+    Args:
+        config: The configuration.
+        calibrations: Counts to SI.
+        channels: Names of the channels `motor`, `followed`, `current` and `command`.
+        max_current_a: Largest measured current.
+        ticks_s: Period of a tick of the core, and of a sample.
+    """
+    safety, counts = config.safety, InCounts(calibrations)
+    motor, current = channels["motor"], channels["current"]
+    max_motor_step = counts.size(motor, safety.motor_speed_rad_s * ticks_s[0])
+    return {
+        "max_current": counts.size(current, max_current_a),
+        "max_motor_step": max_motor_step,
+        "max_motor_jump": min(TOP, JUMP_SPEEDS * max_motor_step),
+        "continuous_current": counts.size(current, safety.continuous_current_a),
+        "i2t": counts.heat(current, safety.heat_a2_s),
+        "stall_current": counts.size(current, safety.stall_current_a),
+        "stall_motion": counts.size(motor, safety.stall_motor_angle_rad),
+        **loop_limits(config.plausibility, calibrations, channels, max_current_a, ticks_s[1]),
+    }
+
+
+def choices(safety: SafetySection, tick_s: float) -> dict[str, Any]:
+    """Return how long what may last, and the safe state, the same for every machine."""
+    lasting = ("stall", "saturated", "stale", "dry", "hold")
+    return {
+        **{f"{name}_ticks": ticks_of(getattr(safety, f"{name}_s"), tick_s) for name in lasting},
+        "watchdog_us": round(safety.watchdog_s * 1e6),
+        "safe_state": SafeState[safety.safe_state.upper()],
+        "hold_command_e4": round(safety.hold_command_ratio * 1e4),
+    }
 
 
 def target_step(size: Callable[[str, float], int], motor_step_rad: float, gear_ratio: float) -> int:
@@ -126,24 +163,6 @@ def target_step(size: Callable[[str, float], int], motor_step_rad: float, gear_r
 def ticks_of(duration_s: float, tick_s: float) -> int:
     """Return how many samples may be so on end; 0 s is for ever."""
     return max(1, round(duration_s / tick_s)) if duration_s else TOP
-
-
-def check_setpoints(asked: Iterable[tuple[str, NDArray[np.float64], float]]) -> None:
-    """Refuse setpoints that the limits forbid, before anything moves.
-
-    Args:
-        asked: Name of the limit, setpoints and the largest size allowed.
-
-    Raises:
-        SafetyTripError: A setpoint is beyond its limit or not finite.
-    """
-    for name, values, limit in asked:
-        if not np.isfinite(values).all() or np.abs(values).max(initial=0.0) > limit:
-            raise SafetyTripError(
-                f"The trajectory asks for {name} = {np.abs(values).max():.3g}.",
-                f"The configured limit is {limit:g}; nothing was moved.",
-                f"Change the protocol, or [limits] {name} if the rig can take it.",
-            )
 
 
 def check_samples(limits: LimitsSection, reading: Reading) -> None:

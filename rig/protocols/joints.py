@@ -6,22 +6,20 @@ Joints are yaw, pitch and grasp; angles are closing-positive. What is grasped de
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from drivers.teensy.grasper import GRASPER
+from rig.configuration.sections import Number, Positive, Section
 from rig.protocols import trajectory
 
 JOINTS = ("yaw", "pitch", "grasp")
 Joint = Literal["yaw", "pitch", "grasp"]
 REST_S = 0.5
 """Rest before and after the motion of a run."""
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +47,7 @@ class JointPlan:
         return len(self.joint_rad) / GRASPER.rate_hz
 
 
-class _JointTable(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
+class _JointTable(Section):
     joints: list[Joint] = Field(min_length=1)
     angles_rad: list[Number] = Field(min_length=1)
     repeats: int = Field(default=1, ge=1)

@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from rig.protocols import trajectory
 from rig.protocols.protocol import RunPlan
+from rig.protocols.trajectory import SAMPLE_RATE_HZ, FloatArray
 
 APPROACH_SPEED_RAD_S = 0.8
-LOAD_RAMP_S = 0.5
+LOAD_RAMP_S = SHORTEST_MOVE_S = 0.5
 
 RELAX_RAD = 0.15
 RELAX_HZ = 4.0
@@ -18,43 +19,59 @@ RELAX_CYCLES = 12
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Setpoints of a whole motion at 1 kHz.
+    """Setpoints of a whole motion: approach, the run, release.
 
     Attributes:
-        target_angle_rad: Spindle, closing-positive, shape (n,).
-        load_command_a: Load motor, shape (n,).
+        setpoints: One array of shape (n,) for each field of a setpoint, closing-positive, SI units.
         first: Index of the run's first setpoint.
         last: Index behind its last.
     """
 
-    target_angle_rad: NDArray[np.float64]
-    load_command_a: NDArray[np.float64]
+    setpoints: tuple[FloatArray, ...]
     first: int
     last: int
 
-    @property
-    def setpoints(self) -> tuple[NDArray[np.float64], ...]:
-        """Spindle and load motor."""
-        return self.target_angle_rad, self.load_command_a
+
+def path_of(
+    run_rad: FloatArray, here_rad: ArrayLike, rate_hz: float, speed_rad_s: float, relax_rad: float
+) -> tuple[FloatArray, int]:
+    """Return the approach, a run, the way back to its start and a relaxation there.
+
+    Args:
+        run_rad: Angles of every axis in the run, shape (n, axes).
+        here_rad: Where the axes stand, shape (axes,).
+        rate_hz: Setpoints a second.
+        speed_rad_s: Mean speed of approach and way back; all axes arrive at once.
+        relax_rad: Amplitude of the relaxation.
+
+    Returns:
+        The angles, shape (m, axes), and the index of the run's first.
+    """
+    approach = _move(np.asarray(here_rad), run_rad[0], rate_hz, speed_rad_s)
+    back = _move(run_rad[-1], run_rad[0], rate_hz, speed_rad_s)
+    parts = [approach, run_rad, back, relaxed(run_rad[0], rate_hz, relax_rad)]
+    return np.concatenate(parts), len(approach)
+
+
+def relaxed(centre_rad: FloatArray, rate_hz: float, relax_rad: float) -> FloatArray:
+    """Return an oscillation of every axis that dies out where it stands, shape (n, axes)."""
+    swing = trajectory.relaxation(0.0, relax_rad, RELAX_HZ, RELAX_CYCLES, rate_hz)
+    return np.asarray(centre_rad + swing[:, None])
 
 
 def motion_of(plan: RunPlan, here_rad: float) -> Motion:
-    """Return the motion that makes a run, beginning where the spindle stands.
+    """Return the motion of spindle and load motor at 1 kHz that makes a run.
 
     Args:
         plan: The run.
         here_rad: Where the spindle stands, rad.
     """
-    angle, load = plan.target_angle_rad, plan.load_command_a
-    start = float(angle[0])
-    approach = _move(here_rad, start)
+    run, load = plan.target_angle_rad[:, None], plan.load_command_a
+    whole, first = path_of(run, [here_rad], SAMPLE_RATE_HZ, APPROACH_SPEED_RAD_S, RELAX_RAD)
     load_up = trajectory.minimum_jerk(0.0, float(load[0]), LOAD_RAMP_S)
-    retreat = _move(float(angle[-1]), start)
     load_down = trajectory.minimum_jerk(float(load[-1]), 0.0, LOAD_RAMP_S)
-    whole_angle = np.concatenate([approach, angle, retreat, _relaxation(start)])
-    loads = np.concatenate([_hold(load_up, approach.size), load, load_down])
-    first = approach.size
-    return Motion(whole_angle, _hold(loads, whole_angle.size), first, first + angle.size)
+    loads = np.concatenate([_hold(load_up, first), load, load_down])
+    return Motion((whole[:, 0], _hold(loads, len(whole))), first, first + len(run))
 
 
 def settling(here_rad: float) -> Motion:
@@ -63,19 +80,19 @@ def settling(here_rad: float) -> Motion:
     Played before the first zero: without it the zero holds whatever torque the last motion left
     locked in gear and cable, some 30 mN m at the spindle on the simulated rig.
     """
-    angle = _relaxation(here_rad)
-    return Motion(angle, np.zeros(angle.size), 0, angle.size)
+    angle = relaxed(np.array([here_rad]), SAMPLE_RATE_HZ, RELAX_RAD)[:, 0]
+    return Motion((angle, np.zeros(angle.size)), 0, angle.size)
 
 
-def _relaxation(centre_rad: float) -> NDArray[np.float64]:
-    return trajectory.relaxation(centre_rad, RELAX_RAD, RELAX_HZ, RELAX_CYCLES)
+def _move(
+    start_rad: FloatArray, stop_rad: FloatArray, rate_hz: float, speed_rad_s: float
+) -> FloatArray:
+    farthest = float(np.abs(stop_rad - start_rad).max())
+    duration_s = max(farthest / speed_rad_s, SHORTEST_MOVE_S)
+    there = trajectory.minimum_jerk(0.0, 1.0, duration_s, rate_hz)
+    return np.asarray(start_rad + there[:, None] * (stop_rad - start_rad))
 
 
-def _move(start_rad: float, stop_rad: float) -> NDArray[np.float64]:
-    duration_s = max(abs(stop_rad - start_rad) / APPROACH_SPEED_RAD_S, LOAD_RAMP_S)
-    return trajectory.minimum_jerk(start_rad, stop_rad, duration_s)
-
-
-def _hold(values: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+def _hold(values: FloatArray, size: int) -> FloatArray:
     """Return values with the last one held up to a size."""
     return np.pad(values, (0, size - values.size), mode="edge")

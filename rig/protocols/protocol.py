@@ -16,17 +16,15 @@ from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
+from rig.configuration.sections import Number, Positive, Section
 from rig.configuration.validation import explain
 from rig.errors import UsageError
 from rig.protocols import trajectory
 from rig.protocols.joints import JointHoldRuns, JointPlan, JointSineRuns
 
 SHIPPED = Path(__file__).parent
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
 
 _Motion = tuple[str, NDArray[np.float64], dict[str, float]]
 """Name of a motion, its spindle angle and its conditions."""
@@ -59,9 +57,10 @@ class RunPlan:
         return self.samples / trajectory.SAMPLE_RATE_HZ
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+Plan = RunPlan | JointPlan
 
+
+class _Table(Section):
     jaw_starts_rad: list[Number] = Field(default=[-1.0471975511965976], min_length=1)
     repeats: int = Field(default=1, ge=1)
 
@@ -222,11 +221,11 @@ AnyTable = (
 )
 RunTable = Annotated[AnyTable, Field(discriminator="kind")]
 
-TABLES: tuple[type[BaseModel], ...] = get_args(AnyTable)
+TABLES: tuple[type[Section], ...] = get_args(AnyTable)
 """Every kind of `[[runs]]` table."""
 
 
-class Protocol(BaseModel):
+class Protocol(Section):
     """A protocol file.
 
     Attributes:
@@ -234,8 +233,6 @@ class Protocol(BaseModel):
         description: Purpose.
         runs: Tables that expand into runs.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(min_length=1)
     description: str = ""
@@ -267,9 +264,9 @@ class Protocol(BaseModel):
             )
         return [plan for plan in self.any_plans() if isinstance(plan, RunPlan)]
 
-    def any_plans(self) -> list[RunPlan | JointPlan]:
+    def any_plans(self) -> list[Plan]:
         """Return every run in order, of whatever rig, numbered likewise."""
-        plans: Iterator[RunPlan | JointPlan] = (p for table in self.runs for p in table.plans())
+        plans: Iterator[Plan] = (p for table in self.runs for p in table.plans())
         return [
             replace(
                 plan,
@@ -321,7 +318,7 @@ def load_protocol(name_or_path: str) -> Protocol:
         )
     try:
         text = path.read_text()
-        return TypeAdapter(Protocol).validate_python(tomllib.loads(text))
+        return Protocol.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path} is not TOML.", str(error)) from error
     except ValidationError as error:

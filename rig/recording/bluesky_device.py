@@ -36,7 +36,7 @@ from rig.bench.session import Session
 from rig.configuration.check import refuse_problems
 from rig.configuration.config import load_config
 from rig.errors import RigError, UsageError
-from rig.protocols.protocol import load_protocol
+from rig.protocols.protocol import Plan, load_protocol
 from rig.recording.campaign import RunResult, open_campaign_folder, record_campaign
 
 Result = TypeVar("Result")
@@ -129,7 +129,7 @@ class RecordedRuns(StandardReadable, Triggerable):
     def _open(self) -> None:
         self._closing.clear()
         session = self._ways_out.enter_context(Session(self._config, open_logger(self._config)))
-        plans = iter(lambda: self._plan, None)
+        plans: Iterator[Plan] = iter(lambda: self._plan, None)
         self._results = record_campaign(
             session, plans, self.folder, notes=self._notes, on_progress=self._go_on
         )

@@ -14,29 +14,20 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from calibration.zero import Drift, SensorZero, drift_verdicts
-from drivers.clock import ClockLine
 from estimation.files import write_text_atomic
-from rig import __version__
-from rig.bench.companions import Beside
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.errors import SafetyTripError, UsageError
-from rig.log.container import Attached
 from rig.log.reader import read_log
 from rig.log.run import RunEnd, RunInfo
-from rig.log.schema import Stream
-from rig.log.streams import COUNTS, FLIGHT_STREAM, SAMPLE, sample_stream
-from rig.log.writer import PART_SUFFIX, LogWriter
-from rig.machines.machine import MachineMotion, MachinePlan
+from rig.log.streams import COUNTS, SAMPLE
+from rig.log.writer import PART_SUFFIX
 from rig.machines.reading import Reading
-from rig.protocols.protocol import Protocol
-from rig.recording.flight import FlightStream
+from rig.protocols.motion import Motion
+from rig.protocols.protocol import Plan, Protocol
+from rig.recording.session_log import SessionLog, mean_counts
 
 MANIFEST = "campaign.json"
 
@@ -92,7 +83,7 @@ class RunResult:
         return tuple(d.channel for d in self.drift if not d.passes)
 
 
-def check_disk_space(folder: Path, plans: Iterable[MachinePlan]) -> None:
+def check_disk_space(folder: Path, plans: Iterable[Plan]) -> None:
     """Refuse to begin what the disk cannot hold.
 
     Raises:
@@ -131,7 +122,7 @@ def read_manifest(folder: Path) -> tuple[Protocol, Config]:
 
 def open_campaign_folder(
     folder: Path, protocol: Protocol, config: Config, resume: bool
-) -> list[MachinePlan]:
+) -> list[Plan]:
     """Prepare a campaign's folder and return the runs that are still to be made.
 
     Raises:
@@ -172,7 +163,7 @@ def open_campaign_folder(
 
 def record_campaign(
     session: Session,
-    plans: Iterable[MachinePlan],
+    plans: Iterable[Plan],
     folder: Path,
     notes: str = "",
     on_progress: Progress | None = None,
@@ -196,7 +187,7 @@ def record_campaign(
 
 def _record_run(
     session: Session,
-    plan: MachinePlan,
+    plan: Plan,
     path: Path,
     epoch_ns: int,
     notes: str,
@@ -208,33 +199,27 @@ def _record_run(
     lost_before = session.counters["lost"]
     samples = 0
     readings = session.play(*motion.setpoints)
-    flight = FlightStream(session)
     first = next(r for r in readings if len(_of_run(r, motion)))
     run_start_us = int(_of_run(first, motion).tick_us[0])
     with (
         _new_log(session, plan, path, epoch_ns + run_start_us * 1000, before, notes) as log,
-        _crossing_in(log, session, flight, run_start_us, epoch_ns),
+        _crossing_in(log, session, run_start_us),
     ):
         for reading in itertools.chain([first], readings):
             run = _of_run(reading, motion)
             beside = {c.stream().topic: c.take() for c in session.companions}
             if len(run):
-                _write_reading(log, session.raw, run, run_start_us, epoch_ns)
-                line = session.clock.line
+                log.write_reading(run)
                 for topic, block in beside.items():
-                    _write_beside(log, topic, block, line, run_start_us, epoch_ns)
+                    log.write_beside(topic, block)
                 samples += len(run)
                 if on_progress:
                     on_progress(plan.name, samples, expected)
-            flight.write(log, epoch_ns + run_start_us * 1000)
+            log.write_flight()
             log.poll()
         after = session.take_zeros(REST_S)
-        drift = drift_verdicts(
-            before,
-            after,
-            session.calibrations,
-            session.config.drift_limits,
-        )
+        limits = session.config.drift_limits
+        drift = drift_verdicts(before, after, session.calibrations, limits)
         lost = session.counters["lost"] - lost_before
         result = RunResult(plan.name, path, samples, expected, lost, tuple(drift))
         log.close(_end_of_run(result, after, session.counters))
@@ -242,90 +227,42 @@ def _record_run(
 
 
 @contextmanager
-def _crossing_in(
-    log: LogWriter, session: Session, flight: FlightStream, run_start_us: int, epoch_ns: int
-) -> Iterator[None]:
+def _crossing_in(log: SessionLog, session: Session, run_start_us: int) -> Iterator[None]:
     """Write the samples in which a limit was crossed, too: they end the run."""
     try:
         yield
     except SafetyTripError:
         newest = session.newest
         if newest is not None and newest.tick_us[0] > run_start_us:
-            _write_reading(log, session.raw, newest, run_start_us, epoch_ns)
-            flight.write(log, epoch_ns + run_start_us * 1000)
+            log.write_reading(newest)
+            log.write_flight()
         raise
 
 
-def _of_run(reading: Reading, motion: MachineMotion) -> Reading:
+def _of_run(reading: Reading, motion: Motion) -> Reading:
     """Return the samples that belong to the run itself, not to its approach or release."""
     return reading.where((reading.setpoint >= motion.first) & (reading.setpoint < motion.last))
 
 
 def _new_log(
     session: Session,
-    plan: MachinePlan,
+    plan: Plan,
     path: Path,
     started_at_ns: int,
     before: Mapping[str, SensorZero],
     notes: str,
-) -> LogWriter:
-    config, calibrations = session.config, session.calibrations
+) -> SessionLog:
     info = RunInfo(
         name=plan.name,
-        rig=config.name,
-        instrument=config.instrument.identity(),
         conditions=plan.conditions,
         notes=notes,
         started_at_ns=started_at_ns,
         duration_s=plan.duration_s,
-        calibrations={calibrations.name: calibrations.content_hash},
-        zeros_before=_mean_counts(before),
-        details={
-            "rig_version": __version__,
-            **session.board,
-            **_clock_residuals(session),
-        },
+        zeros_before=mean_counts(before),
+        details=_clock_residuals(session),
     )
-    settings = json.dumps(config.logged(), indent=1).encode()
-    attachments = [
-        Attached("config.json", "application/json", settings),
-        Attached("calibrations.json", "application/json", calibrations.to_json().encode()),
-    ]
     _set_aside(path)
-    raw = session.raw
-    streams = [sample_stream(tuple(calibrations.channels), raw.rate_hz), raw]
-    streams += [companion.stream() for companion in session.companions]
-    streams += [FLIGHT_STREAM] if session.flight else []
-    return LogWriter(path, info, streams, attachments=attachments)
-
-
-def _write_reading(
-    log: LogWriter, raw: Stream, reading: Reading, run_start_us: int, epoch_ns: int
-) -> None:
-    """Write a stretch of the run to both streams, with the run's own clock in `time_s`."""
-    log_time_ns = epoch_ns + reading.tick_us * 1000
-    sequence = reading.counts["sequence"]
-    time_s = (reading.tick_us - run_start_us) * 1e-6
-    log.write(
-        SAMPLE,
-        {**reading.columns, "time_s": time_s, "sequence": sequence, "flags": reading.flags},
-        log_time_ns,
-    )
-    counts = {field.name: reading.counts[field.name] for field in raw.fields}
-    log.write(COUNTS, counts, log_time_ns)
-
-
-def _write_beside(
-    log: LogWriter, topic: str, block: Beside, line: ClockLine, run_start_us: int, epoch_ns: int
-) -> None:
-    """Write what a further device measured meanwhile, on the logger's clock."""
-    tick_s = line.to_device(block.host_s)
-    time_s = tick_s - run_start_us * 1e-6
-    of_run = time_s >= 0  # what came before the run began is not of it
-    rows: dict[str, NDArray[Any]] = dict(block.columns)
-    rows |= {"sequence": block.sequence, "flags": block.flags, "time_s": time_s}
-    log_time_ns = epoch_ns + np.round(tick_s * 1e9).astype(np.int64)
-    log.write(topic, {name: values[of_run] for name, values in rows.items()}, log_time_ns[of_run])
+    return SessionLog(session, path, info, companions=session.companions)
 
 
 def _clock_residuals(session: Session) -> dict[str, str]:
@@ -342,17 +279,13 @@ def _end_of_run(
     return RunEnd(
         expected_samples=dict.fromkeys((SAMPLE, COUNTS), result.expected),
         counters=counters,
-        zeros_after=_mean_counts(after),
+        zeros_after=mean_counts(after),
         drift={d.channel: d.after - d.before for d in result.drift},
         drift_verdict="drifted: " + ", ".join(result.drifted) if result.drifted else "steady",
     )
 
 
-def _mean_counts(zeros: Mapping[str, SensorZero]) -> dict[str, float]:
-    return {f"{name}_counts": zero.mean_counts for name, zero in zeros.items()}
-
-
-def _log_path(folder: Path, plan: MachinePlan) -> Path:
+def _log_path(folder: Path, plan: Plan) -> Path:
     return folder / f"{plan.name}.mcap"
 
 

@@ -165,16 +165,16 @@ def _compared(logged: NDArray[np.void], again: NDArray[np.void]) -> tuple[int, s
     rows = np.array([place.get(key, -1) for key in _keys(logged)])
     if not len(rows):
         return 0, "the log has no samples"
-    found = rows >= 0
-    whole = again[np.where(found, rows, 0)] if len(again) else None
-    if whole is None:
+    if not len(again):
         return 0, "the core sent no sample"
+    found = rows >= 0
+    whole = again[np.where(found, rows, 0)]
     names = [n for n in logged.dtype.names or () if n in (again.dtype.names or ())]
     equal = {n: (logged[n].astype(np.int64) == whole[n].astype(np.int64)) & found for n in names}
     same = np.all(list(equal.values()), axis=0)
     if same.all():
         return len(logged), ""
-    first = int((~same).argmin() if same.all() else (~same).argmax())
+    first = int(np.argmin(same))
     number = int(logged["sequence"][first])
     if not found[first]:
         return int(same.sum()), f"sample {number} is not there"

@@ -14,13 +14,12 @@ from typing import Any
 from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
 from rig.campaigns.index import DIAGNOSIS, ENDINGS
-from rig.diagnosis.each import Start, for_each
-from rig.diagnosis.ledger import Ledger, Look, look_at
+from rig.diagnosis.ledger import Ledger, Look
 from rig.diagnosis.run import run_diagnosis
 from rig.diagnosis.subject import subject
 from rig.diagnosis.traces import traces
+from rig.diagnosis.work import Start, for_each
 from rig.errors import RigError
-from rig.output.console import plain
 from rig.output.provenance import Provenance
 from rig.output.render import write_report
 from rig.reports.diagnosis import page
@@ -69,10 +68,8 @@ def diagnose_all(
     """
     looks = Ledger(ledger)
     looks.check()
-    found = {folder: kept for folder in folders if (kept := _kept(folder))}
 
     def keep(folder: Path, done: FolderDiagnosis) -> None:
-        found[folder] = done
         if done.look is not None:
             place = folder / DIAGNOSIS
             write_report(place.with_suffix(".html"), done.page)
@@ -80,24 +77,22 @@ def diagnose_all(
             looks.enter(done.look)
         on_done(folder, done)
 
-    missing = [folder for folder in folders if folder not in found]
-    for_each(missing, partial(diagnose_folder, ledger), start, keep)
-    return {folder: found[folder] for folder in folders}
+    return for_each(folders, _kept, partial(diagnose_folder, ledger), start, keep)
 
 
 def diagnose_folder(ledger: Path, folder: Path) -> FolderDiagnosis:
     """Return the diagnosis of a folder's campaign, or why it could not be made."""
     try:
         asked = subject(folder, skip_bad=True)
-        done = run_diagnosis(asked.campaign, asked.models, Ledger(ledger), quick=True)
+        done, look = run_diagnosis(asked.campaign, asked.models, Ledger(ledger), quick=True)
     except (EstimationError, RigError) as error:
         return FolderDiagnosis(failed=str(error))
     found = done.diagnosis
     return FolderDiagnosis(
         tuple(sentences(found)),
-        plain(found.to_json()),
-        page(found, traces(done.answer), Provenance.now(found.sealed.seed)),
-        look_at(done.looked_at, done.sealed),
+        found.to_json(),
+        page(found, traces(done), Provenance.now(found.sealed.seed)),
+        look,
     )
 
 

@@ -7,6 +7,7 @@ row is written, then the physics moves 1 ms with that command.
 import hashlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numba
@@ -18,12 +19,12 @@ from numpy.typing import NDArray
 from drivers.teensy import control, reference_board
 from drivers.teensy.logic import Drive
 from drivers.teensy.reference_board import COLUMNS
+from estimation.recording import FloatArray
 from rig.errors import UsageError
 from rig.simulation import (
     hidden,
     hidden_cable,
     hidden_drive,
-    hidden_kinds,
     hidden_sensors,
     noise,
     parameters,
@@ -31,7 +32,7 @@ from rig.simulation import (
     plant,
     sensors,
 )
-from rig.simulation.parameters import PlantParameters, SensorParameters
+from rig.simulation.parameters import REFERENCE_GAINS, PlantParameters, SensorParameters
 
 REFERENCE_START_COUNT = 1366
 """Spindle count at which the reference campaign's runs start: 60 degrees open."""
@@ -41,27 +42,22 @@ class BenchInputError(UsageError):
     """The bench was asked for something it cannot run."""
 
 
-def _fingerprint() -> str:
-    """Return a hash of every source the compiled loops are made of.
+SOURCES = (
+    control, reference_board, hidden, hidden_cable, hidden_drive, hidden_sensors, noise,
+    parameters, places, plant, sensors,
+)  # fmt: skip
+"""What the compiled loops are made of."""
+
+
+def hash_of(modules: Iterable[ModuleType]) -> str:
+    """Return a hash of every source that compiled loops are made of.
 
     Numba's cache checks only the file of a function. The loops hold this hash as a
     closure variable, which is part of the cache's key, so a change in any of the files recompiles.
     It is the only closure variable: a function held that way would change the key in each process.
     """
     digest = hashlib.sha256()
-    for module in (
-        control,
-        reference_board,
-        hidden_cable,
-        hidden_drive,
-        hidden_kinds,
-        hidden_sensors,
-        noise,
-        parameters,
-        places,
-        plant,
-        sensors,
-    ):
+    for module in modules:
         digest.update(Path(str(module.__file__)).read_bytes())
     return digest.hexdigest()
 
@@ -104,7 +100,8 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         state, rig, first_tick, commands, drive, rows
     ):
         _ = source
-        p, s, effects, seed = rig
+        p, s, table, seed = rig
+        effects = table[0]
         target, load_ma = commands
         board, control_state, gains = drive
         for k in range(rows.shape[0]):
@@ -119,7 +116,8 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         state, rig, first_tick, ticks, call, tick_us
     ):
         _ = source
-        p, s, effects, seed = rig
+        p, s, table, seed = rig
+        effects = table[0]
         function, board = call
         inputs = np.zeros(7, np.int32)
         outputs = np.zeros(2, np.int32)
@@ -138,7 +136,7 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
     return with_controller, with_board
 
 
-_run_with_controller, _run_with_board = _build_loops(_fingerprint())
+_run_with_controller, _run_with_board = _build_loops(hash_of(SOURCES))
 
 
 class SimulatedBench:
@@ -177,6 +175,24 @@ class SimulatedBench:
     def state(self) -> NDArray[np.float64]:
         """A copy of the plant's true state, see `rig.simulation.places`."""
         return self._state.copy()
+
+    def play(
+        self, target_angle_rad: FloatArray, load_command_a: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Run the armed bench along a trajectory with the reference gains and a fresh controller.
+
+        Args:
+            target_angle_rad: Spindle trajectory at 1 kHz, closing positive, shape (n,).
+            load_command_a: Load current, shape (n,).
+
+        Returns:
+            SI channels as from `sensors.columns_of`, each of shape (n,).
+        """
+        per_rad = self.sensors.spindle_count_per_turn / sensors.TURN_RAD
+        target = np.round(-target_angle_rad * per_rad).astype(np.int32)
+        load_ma = np.round(1e3 * load_command_a).astype(np.int32)
+        counts = self.advance(target.size, target, load_ma, Drive.armed(REFERENCE_GAINS))
+        return sensors.columns_of(counts, target, self.sensors)
 
     def advance(
         self,

@@ -1,10 +1,10 @@
-"""A campaign of the simulated rig without logs in between: each run is simulated when it is read.
+"""Runs of the simulated rig without logs in between.
 
 For studies that need many runs and no bytes. `rig record` goes the whole way instead, through the
 logger's frames, its driver and the log.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 
 import numpy as np
@@ -16,8 +16,41 @@ from rig.protocols.protocol import RunPlan, load_protocol
 from rig.protocols.trajectory import SAMPLE_RATE_HZ
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import HiddenEffect, table
-from rig.simulation.parameters import PlantParameters
-from rig.simulation.play import play
+from rig.simulation.parameters import PlantParameters, SensorParameters
+from rig.simulation.sensors import spindle_count_of
+
+
+def bench_at(
+    angle_rad: float,
+    plant: PlantParameters | None = None,
+    sensors: SensorParameters | None = None,
+    effects: Iterable[HiddenEffect] = (),
+    seed: int = 0,
+) -> SimulatedBench:
+    """Return a bench whose spindle stands at an angle, closing positive."""
+    count = spindle_count_of(angle_rad, sensors or SensorParameters())
+    return SimulatedBench(plant, sensors, effects, seed, count)
+
+
+def simulated_run(bench: SimulatedBench, plan: RunPlan, source: str) -> Recording:
+    """Return one run of a bench: the load is ramped up before it, as when a rig is recorded.
+
+    Args:
+        bench: The bench, which stands at the start of the plan or near it.
+        plan: Trajectory and load.
+        source: Source of the recording.
+    """
+    motion = motion_of(plan, float(plan.target_angle_rad[0]))
+    columns = bench.play(*(values[: motion.last] for values in motion.setpoints))
+    return Recording(
+        plan.name,
+        np.arange(motion.last - motion.first) / SAMPLE_RATE_HZ,
+        {name: values[motion.first :] for name, values in columns.items()},
+        conditions=plan.conditions,
+        rig="simulated rig",
+        instrument=Instrument(model="Maryland", serial="SIM-TOOL-1", side="left"),
+        source=source,
+    )
 
 
 def simulate_reference_campaign(
@@ -26,7 +59,7 @@ def simulate_reference_campaign(
     effects: Sequence[HiddenEffect] = (),
     parameters: PlantParameters | None = None,
 ) -> Campaign:
-    """Return a campaign of the simulated rig.
+    """Return a campaign of the simulated rig; each run is simulated when it is read.
 
     Args:
         seed: Seed of the sensors' noise; each run has its own, made of this and its number.
@@ -37,17 +70,16 @@ def simulate_reference_campaign(
     Raises:
         UsageError: The protocol does not exist, or no such effect.
     """
-    plans = load_protocol(protocol).plans()
     table(effects)  # an unknown name is refused now
+    plans = load_protocol(protocol).plans()
     return Campaign(
         tuple(
-            Run(p.name, partial(_simulate, p, seed, i, effects, parameters))
-            for i, p in enumerate(plans)
+            Run(p.name, partial(_run, p, seed, k, effects, parameters)) for k, p in enumerate(plans)
         )
     )
 
 
-def _simulate(
+def _run(
     plan: RunPlan,
     seed: int,
     index: int,
@@ -55,16 +87,4 @@ def _simulate(
     parameters: PlantParameters | None,
 ) -> Recording:
     bench = SimulatedBench(parameters, effects=effects, seed=seed * 100_003 + index)
-    motion = motion_of(plan, float(plan.target_angle_rad[0]))
-    columns = play(bench, motion.target_angle_rad, motion.load_command_a)
-    run = slice(motion.first, motion.last)
-    columns = {name: values[run] for name, values in columns.items()}
-    return Recording(
-        plan.name,
-        np.arange(motion.last - motion.first) / SAMPLE_RATE_HZ,
-        columns,
-        conditions=plan.conditions,
-        rig="simulated rig",
-        instrument=Instrument(model="Maryland", serial="SIM-TOOL-1", side="left"),
-        source=f"simulated, seed {seed}",
-    )
+    return simulated_run(bench, plan, f"simulated, seed {seed}")

@@ -1,15 +1,12 @@
-"""Parameters of the simulated rig from fitted models and a recording: plant, load, sensors."""
+"""Parameters of the simulated plant from fitted models."""
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-import numpy as np
-from scipy import signal
-
 from estimation.model import Model, Term
-from estimation.recording import FloatArray, Recording
 from rig.errors import DataError
-from rig.simulation.parameters import PlantParameters, SensorParameters
+from rig.simulation.parameters import PlantParameters
 
 DECLARED_PLANT = PlantParameters(
     cable_load_friction_ratio=0.0,
@@ -26,9 +23,6 @@ the load; losses of the jaw in front of the sensor, which load the cable's stret
 torque sensor at the jaw; and friction that sticks, which at a reversal holds any torque until the
 gear is wound up. Here all of it is plain friction of the spindle that changes sign smoothly.
 """
-
-NOISE_ABOVE_HZ = 150.0
-"""White noise is measured above this frequency, where the rig barely moves."""
 
 
 def plant_of(models: Iterable[Model], start: PlantParameters = DECLARED_PLANT) -> PlantParameters:
@@ -47,12 +41,7 @@ def plant_of(models: Iterable[Model], start: PlantParameters = DECLARED_PLANT) -
     """
     by_balance = {model.balance: model for model in models}
     plant = replace(start, gear_ratio=_gear_ratio(by_balance.values(), start.gear_ratio))
-    for balance, change in (
-        ("motor", _with_motor),
-        ("gearbox", _with_gearbox),
-        ("stretch", _with_stretch),
-        ("cable", _with_cable),
-    ):
+    for balance, change in _READ.items():
         if balance in by_balance:
             plant = change(by_balance[balance], plant)
     return plant
@@ -75,7 +64,7 @@ def _with_motor(model: Model, plant: PlantParameters) -> PlantParameters:
     ratio = plant.gear_ratio
     return replace(
         plant,
-        torque_constant_n_m_a=_positive(model, "motor.torque_constant", "gain") / ratio,
+        torque_constant_n_m_a=_torque_constant(model) / ratio,
         rotor_inertia_kg_m2=max(
             _amplitude(model, "inertia.missing", "inertia", 0.0) / (ratio - 1.0),
             0.2 * plant.rotor_inertia_kg_m2,
@@ -145,14 +134,10 @@ def _amplitude(model: Model, effect: str, name: str, missing: float) -> float:
     return term.numbers(term.effect.amplitudes)[place]
 
 
-def _positive(model: Model, effect: str, name: str) -> float:
-    value = _amplitude(model, effect, name, float("nan"))
+def _torque_constant(model: Model) -> float:
+    value = _amplitude(model, "motor.torque_constant", "gain", math.nan)
     if not value > 0.0:
-        raise DataError(
-            f"The {model.balance} model {model.name!r} makes no plant: {effect} {name} is {value}.",
-            "The simulated null needs a positive value.",
-            "Fit the declared model on these runs first.",
-        )
+        raise DataError(f"The model {model.name!r} makes no plant: its torque constant is {value}.")
     return value
 
 
@@ -169,9 +154,7 @@ def _slope(model: Model, words: Sequence[str], side: int = 1) -> float | None:
         slope = side * term.weights[0]
         if slope <= 0.0:
             raise DataError(
-                f"The {model.balance} model {model.name!r} makes no plant: "
-                f"its slope over {names[0]} is {slope:g}.",
-                "A spring of no or negative stiffness cannot be simulated.",
+                f"The model {model.name!r} makes no plant: its slope over {names[0]} is {slope:g}."
             )
         return slope
     return None
@@ -193,103 +176,10 @@ def _per_spindle(term: Term, role: str, plant: PlantParameters) -> float:
     return plant.cable_ratio if channel.startswith("jaw_") else 1.0
 
 
-def with_load_unit(plant: PlantParameters, runs: Sequence[Recording]) -> PlantParameters:
-    """Return the plant with the load unit the runs show: torque a load current, and friction.
-
-    Least squares of distal torque on the load's current and the smooth direction of the spindle,
-    each run with its own offset only where the load varies in it.
-    """
-    tables = [
-        np.column_stack(
-            [
-                run["load_command_a"],
-                _direction(run),
-                np.ones(len(run)),
-                run["distal_torque_n_m"],
-            ]
-        )[::20]
-        for run in runs
-    ]
-    table = np.concatenate(tables)
-    if np.ptp(table[:, 0]) == 0.0:
-        return plant
-    slope, friction, _ = np.linalg.lstsq(table[:, :3], table[:, 3], rcond=None)[0]
-    if slope <= 0.0:
-        return plant
-    return replace(
-        plant, load_torque_n_m_a=float(slope), load_friction_n_m=max(float(friction), 0.0)
-    )
-
-
-def _direction(run: Recording) -> FloatArray:
-    speed = np.gradient(run["spindle_angle_rad"], run.time_s)
-    smooth = signal.sosfiltfilt(signal.butter(2, 20.0, fs=run.sample_rate_hz, output="sos"), speed)
-    direction: FloatArray = np.tanh(smooth / 0.02)
-    return direction
-
-
-def quantum(values: FloatArray) -> float | None:
-    """Return the resolution of a converter, or None with fewer than two different values."""
-    gaps = np.diff(np.unique(values))
-    gaps = gaps[gaps > 1e-9]
-    return float(gaps.min()) if gaps.size else None
-
-
-def noise_std(values: FloatArray, rate_hz: float) -> float:
-    """Return the standard deviation of white noise that has the power above `NOISE_ABOVE_HZ`."""
-    sos = signal.butter(6, NOISE_ABOVE_HZ, "highpass", fs=rate_hz, output="sos")
-    high = signal.sosfiltfilt(sos, values)
-    edge = min(100, values.size // 4)
-    share = 1.0 - NOISE_ABOVE_HZ / (0.5 * rate_hz)
-    return float(np.std(high[edge : values.size - edge]) / np.sqrt(share))
-
-
-def sensors_of(
-    runs: Sequence[Recording], silent: Mapping[str, float], start: SensorParameters
-) -> SensorParameters:
-    """Return sensors with the quanta and the noise of the recordings.
-
-    Args:
-        runs: Measured runs.
-        silent: Channel to the noise of a simulation without sensor noise, from quantisation and
-            the controller; it is subtracted from the recordings' noise to get that of the sensor.
-        start: Sensors whose other values are kept.
-    """
-
-    def own(channel: str) -> float:
-        found = float(np.median([noise_std(r[channel], r.sample_rate_hz) for r in runs]))
-        return float(np.sqrt(max(found**2 - silent[channel] ** 2, 0.0)))
-
-    return replace(
-        start,
-        proximal_noise_n_m=own("proximal_torque_n_m"),
-        distal_noise_n_m=own("distal_torque_n_m"),
-        current_noise_a=own("motor_current_a"),
-    )
-
-
-def with_quanta(sensors: SensorParameters, run: Recording) -> SensorParameters:
-    """Return silent sensors, drift and offset free, that round as the recording's do."""
-    torque = quantum(run["proximal_torque_n_m"]) or sensors.torque_n_m_per_count
-    current = quantum(run["motor_current_a"]) or sensors.current_a_per_count
-    counts = {
-        f"{name}_count_per_turn": round(2.0 * np.pi / step)
-        for name in ("motor", "spindle", "jaw")
-        if (step := quantum(run[f"{name}_angle_rad"])) is not None
-    }
-    return replace(
-        sensors,
-        **counts,
-        torque_n_m_per_count=torque,
-        torque_quantum_count=1.0,
-        torque_limit_count=sensors.torque_limit_count * sensors.torque_n_m_per_count / torque,
-        current_a_per_count=current,
-        proximal_noise_n_m=0.0,
-        distal_noise_n_m=0.0,
-        current_noise_a=0.0,
-        proximal_offset_n_m=0.0,
-        distal_offset_n_m=0.0,
-        proximal_ramp_n_m_s=0.0,
-        distal_ramp_n_m_s=0.0,
-        torque_walk_n_m_s=0.0,
-    )
+_READ = {
+    "motor": _with_motor,
+    "gearbox": _with_gearbox,
+    "stretch": _with_stretch,
+    "cable": _with_cable,
+}
+"""Equation to what its model is read by, in this order."""

@@ -1,38 +1,16 @@
 """Hidden effects of cable, spindle and jaw: compiled functions of one row of `hidden.table`."""
 
 import math
+from typing import Any
 
 import numba
-import numpy as np
-from numpy.typing import NDArray
 
-from rig.simulation import hidden_kinds as kinds
-from rig.simulation.hidden_kinds import FIRST, SECOND, STRENGTH, Row
-
-SPINDLE_FRICTIONS = np.array(
-    [
-        kinds.CABLE_POSITION_FRICTION,
-        kinds.CABLE_GROWING_FRICTION,
-        kinds.CABLE_LOAD_NOTCH,
-        kinds.FRICTION_STEP,
-        kinds.CABLE_STIFF,
-        kinds.CABLE_DWELL,
-        kinds.CABLE_CAPSTAN,
-        kinds.WRIST_CAPSTAN,
-        kinds.WRIST_PINCH,
-    ]
-)
-"""Effects that `spindle_friction_n_m` sums up."""
-
-JAW_TORQUES = np.array(
-    [kinds.JAW_SPRING, kinds.END_STOP_SPRING, kinds.JAW_DETENT, kinds.JAW_WEIGHT]
-)
-"""Effects that `jaw_torque_n_m` sums up."""
+from rig.simulation.hidden import FIRST, SECOND, STRENGTH, Row
 
 
 @numba.njit()
 def spindle_friction_n_m(
-    effects: NDArray[np.float64],
+    effects: Any,
     spindle_angle: float,
     spindle_speed: float,
     cable_torque: float,
@@ -50,20 +28,20 @@ def spindle_friction_n_m(
         age_s: State of the contact that ages.
     """
     extra = 0.0
-    extra += cable_position_friction_n_m(effects[kinds.CABLE_POSITION_FRICTION], spindle_angle)
-    extra += cable_growing_friction_n_m(effects[kinds.CABLE_GROWING_FRICTION], spindle_angle)
-    extra += cable_load_notch_n_m(effects[kinds.CABLE_LOAD_NOTCH], spindle_angle, cable_torque)
-    extra += friction_step_n_m(effects[kinds.FRICTION_STEP], clock_s)
-    extra += effects[kinds.CABLE_STIFF, STRENGTH] * 20e-3
-    extra += cable_dwell_n_m(effects[kinds.CABLE_DWELL], age_s)
-    row = effects[kinds.CABLE_CAPSTAN]
+    extra += cable_position_friction_n_m(effects.cable_position_friction, spindle_angle)
+    extra += cable_growing_friction_n_m(effects.cable_growing_friction, spindle_angle)
+    extra += cable_load_notch_n_m(effects.cable_load_notch, spindle_angle, cable_torque)
+    extra += friction_step_n_m(effects.friction_step, clock_s)
+    extra += effects.cable_stiff[STRENGTH] * 20e-3
+    extra += cable_dwell_n_m(effects.cable_dwell, age_s)
+    row = effects.cable_capstan
     extra += wrapped_n_m(row[STRENGTH] * row[FIRST], cable_torque, spindle_speed)
     return float(extra)
 
 
 @numba.njit()
 def wrist_friction_n_m(
-    effects: NDArray[np.float64], spindle_speed: float, cable_torque: float, wrist_angle: float
+    effects: Any, spindle_speed: float, cable_torque: float, wrist_angle: float
 ) -> float:
     """Return the contribution of effects of the wrist to the Coulomb level at the spindle.
 
@@ -74,21 +52,21 @@ def wrist_friction_n_m(
         wrist_angle: Pitch of the wrist, rad.
     """
     extra = 0.0
-    row = effects[kinds.WRIST_CAPSTAN]
+    row = effects.wrist_capstan
     wrap = row[STRENGTH] * row[FIRST] * abs(wrist_angle)
     extra += wrapped_n_m(wrap, cable_torque, spindle_speed)
-    extra += wrist_pinch_n_m(effects[kinds.WRIST_PINCH], wrist_angle)
+    extra += wrist_pinch_n_m(effects.wrist_pinch, wrist_angle)
     return extra
 
 
 @numba.njit()
-def jaw_torque_n_m(effects: NDArray[np.float64], jaw_angle: float) -> float:
+def jaw_torque_n_m(effects: Any, jaw_angle: float) -> float:
     """Return the hidden torque that opposes closing at the jaw."""
     extra = 0.0
-    extra += jaw_spring_n_m(effects[kinds.JAW_SPRING], jaw_angle)
-    extra += end_stop_spring_n_m(effects[kinds.END_STOP_SPRING], jaw_angle)
-    extra += jaw_detent_n_m(effects[kinds.JAW_DETENT], jaw_angle)
-    extra += jaw_weight_n_m(effects[kinds.JAW_WEIGHT], jaw_angle)
+    extra += jaw_spring_n_m(effects.jaw_spring, jaw_angle)
+    extra += end_stop_spring_n_m(effects.end_stop_spring, jaw_angle)
+    extra += jaw_detent_n_m(effects.jaw_detent, jaw_angle)
+    extra += jaw_weight_n_m(effects.jaw_weight, jaw_angle)
     return extra
 
 

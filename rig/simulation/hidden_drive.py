@@ -1,34 +1,16 @@
 """Hidden effects of motor and gear: compiled functions of one row of `hidden.table`."""
 
 import math
+from typing import Any
 
 import numba
-import numpy as np
-from numpy.typing import NDArray
 
-from rig.simulation import hidden_kinds as kinds
-from rig.simulation.hidden_kinds import FIRST, SECOND, STRENGTH, Row
-
-MOTOR_FRICTIONS = np.array(
-    [
-        kinds.GEAR_LOAD_FRICTION,
-        kinds.GEAR_STRIBECK,
-        kinds.MOTOR_ASYMMETRY,
-        kinds.MOTOR_DRAG,
-        kinds.GEAR_TWO_STATE,
-        kinds.GEAR_ANGLE_VISCOUS,
-        kinds.MOTOR_VISCOUS_ASYMMETRY,
-        kinds.GEAR_LOAD_VISCOUS,
-        kinds.GREASE_WARMUP,
-        kinds.GEAR_WEAR,
-    ]
-)
-"""Effects that `motor_friction_n_m` sums up."""
+from rig.simulation.hidden import FIRST, SECOND, STRENGTH, Row
 
 
 @numba.njit()
 def motor_friction_n_m(
-    effects: NDArray[np.float64],
+    effects: Any,
     speed: float,
     spindle_angle: float,
     state: float,
@@ -44,25 +26,23 @@ def motor_friction_n_m(
         clock_s: Time since the bench was started.
     """
     extra = 0.0
-    extra += gear_stribeck_n_m(effects[kinds.GEAR_STRIBECK], speed)
-    extra += motor_asymmetry_n_m(effects[kinds.MOTOR_ASYMMETRY], speed)
-    extra += motor_drag_n_m(effects[kinds.MOTOR_DRAG], speed)
-    extra += effects[kinds.GEAR_TWO_STATE, STRENGTH] * 0.35e-3 * state
-    extra += gear_angle_viscous_n_m(effects[kinds.GEAR_ANGLE_VISCOUS], speed, spindle_angle)
-    extra += motor_viscous_asymmetry_n_m(effects[kinds.MOTOR_VISCOUS_ASYMMETRY], speed)
-    extra += grease_warmup_n_m(effects[kinds.GREASE_WARMUP], clock_s)
-    extra += effects[kinds.GEAR_WEAR, STRENGTH] * 0.3e-3
+    extra += gear_stribeck_n_m(effects.gear_stribeck, speed)
+    extra += motor_asymmetry_n_m(effects.motor_asymmetry, speed)
+    extra += motor_drag_n_m(effects.motor_drag, speed)
+    extra += effects.gear_two_state[STRENGTH] * 0.35e-3 * state
+    extra += gear_angle_viscous_n_m(effects.gear_angle_viscous, speed, spindle_angle)
+    extra += motor_viscous_asymmetry_n_m(effects.motor_viscous_asymmetry, speed)
+    extra += grease_warmup_n_m(effects.grease_warmup, clock_s)
+    extra += effects.gear_wear[STRENGTH] * 0.3e-3
     return float(extra)
 
 
 @numba.njit()
-def gear_friction_n_m(
-    effects: NDArray[np.float64], motor_speed: float, twist_torque: float
-) -> float:
+def gear_friction_n_m(effects: Any, motor_speed: float, twist_torque: float) -> float:
     """Return the hidden friction that grows with the torque in the gear, at the spindle."""
     extra = 0.0
-    extra += gear_load_friction_n_m(effects[kinds.GEAR_LOAD_FRICTION], twist_torque)
-    extra += gear_load_viscous_n_m(effects[kinds.GEAR_LOAD_VISCOUS], motor_speed, twist_torque)
+    extra += gear_load_friction_n_m(effects.gear_load_friction, twist_torque)
+    extra += gear_load_viscous_n_m(effects.gear_load_viscous, motor_speed, twist_torque)
     return extra
 
 

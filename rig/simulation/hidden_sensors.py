@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation.hidden_kinds import FIRST, SECOND, STRENGTH, Row
+from rig.simulation.hidden import FIRST, SECOND, STRENGTH, Row
 
 RING = 64
 """Ticks of the jaw angle that the delayed encoder remembers."""

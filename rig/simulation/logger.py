@@ -4,8 +4,9 @@ from drivers.teensy.core import FirmwareBoard, firmware_library
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import Board, SimulatedTransport
+from rig.configuration.machine_settings import installed
 from rig.configuration.sections import SimulationSection
-from rig.machines.choose import SIMULATED_BOARDS, installed
+from rig.machines.choose import SIMULATED_BOARDS
 from rig.simulation import hidden, parameters
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.simulation import hidden_cable, hidden_drive
-from rig.simulation import hidden_kinds as kinds
+from rig.simulation.hidden import FIRST, STRENGTH
 from rig.simulation.parameters import PlantParameters
 from rig.simulation.places import (
     AGE,
@@ -120,18 +120,10 @@ def braking(speed: float, most: float, creep_speed: float) -> float:
 
 
 @numba.njit()
-def _any(strength: NDArray[np.float64], kinds: NDArray[np.int64]) -> bool:
-    for kind in kinds:  # noqa: SIM110 - a compiled loop
-        if strength[kind] != 0.0:
-            return True
-    return False
-
-
-@numba.njit()
 def step_tick(
     state: NDArray[np.float64],
     p: Any,
-    effects: NDArray[np.float64],
+    effects: Any,
     current_target_a: float,
     load_target_a: float,
 ) -> None:
@@ -147,7 +139,7 @@ def step_tick(
     Args:
         state: Shape (`STATE_SIZE`,), changed in place.
         p: From `constants_of`.
-        effects: From `hidden.table`.
+        effects: A record of `hidden.table`.
         current_target_a: Commanded motor current.
         load_target_a: Commanded load current.
     """
@@ -164,16 +156,12 @@ def step_tick(
     gear = 1.0 / p.gear_ratio
     jaw_friction = p.jaw_friction_n_m + p.load_friction_n_m
     load_share = p.load_friction_n_m / jaw_friction if jaw_friction > 0.0 else 0.0
-    strength = effects[:, kinds.STRENGTH]
-    motor_friction = _any(strength, hidden_drive.MOTOR_FRICTIONS)
-    spindle_friction = _any(strength, hidden_cable.SPINDLE_FRICTIONS)
-    jaw_effect = _any(strength, hidden_cable.JAW_TORQUES)
     lag_gain = 1.0
-    if strength[kinds.TORQUE_LAG] != 0.0:
-        row = effects[kinds.TORQUE_LAG]
-        lag_gain = min(2.0 * dt / (row[kinds.STRENGTH] * row[kinds.FIRST]), 1.0)
-    if strength[kinds.JAW_MASS] != 0.0:
-        mass = hidden_cable.jaw_mass_kg_m2(effects[kinds.JAW_MASS])
+    if effects.torque_lag[STRENGTH] != 0.0:
+        row = effects.torque_lag
+        lag_gain = min(2.0 * dt / (row[STRENGTH] * row[FIRST]), 1.0)
+    if effects.jaw_mass[STRENGTH] != 0.0:
+        mass = hidden_cable.jaw_mass_kg_m2(effects.jaw_mass)
         dt_jaw = dt / (p.jaw_inertia_kg_m2 + mass)
 
     motor, motor_speed = state[MOTOR_ANGLE], state[MOTOR_SPEED]
@@ -192,72 +180,70 @@ def step_tick(
         current += current_gain * (target - current)
         load_current += load_gain * (load_target_a - load_current)
         torque_current = current
-        if strength[kinds.TORQUE_LAG] != 0.0:
+        if effects.torque_lag[STRENGTH] != 0.0:
             lag_first += lag_gain * (current - lag_first)
             lag_second += lag_gain * (lag_first - lag_second)
             torque_current = lag_second
         motor_torque = p.torque_constant_n_m_a * torque_current
-        if strength[kinds.WINDING_HEAT] != 0.0:
-            row = effects[kinds.WINDING_HEAT]
+        if effects.winding_heat[STRENGTH] != 0.0:
+            row = effects.winding_heat
             heat += dt * hidden_drive.winding_heat_rate(row, heat, current)
             motor_torque *= hidden_drive.winding_heat_ratio(row, heat)
-        if strength[kinds.CURRENT_RIPPLE] != 0.0:
-            motor_torque *= hidden_drive.current_ripple_ratio(effects[kinds.CURRENT_RIPPLE], motor)
-        if strength[kinds.TORQUE_CONSTANT_SAG] != 0.0:
+        if effects.current_ripple[STRENGTH] != 0.0:
+            motor_torque *= hidden_drive.current_ripple_ratio(effects.current_ripple, motor)
+        if effects.torque_constant_sag[STRENGTH] != 0.0:
             motor_torque *= hidden_drive.torque_constant_sag_ratio(
-                effects[kinds.TORQUE_CONSTANT_SAG], current
+                effects.torque_constant_sag, current
             )
-        if strength[kinds.MOTOR_RIPPLE] != 0.0:
-            motor_torque += hidden_drive.motor_ripple_n_m(effects[kinds.MOTOR_RIPPLE], motor)
+        if effects.motor_ripple[STRENGTH] != 0.0:
+            motor_torque += hidden_drive.motor_ripple_n_m(effects.motor_ripple, motor)
 
         twist = gear * motor - spindle
         twist_rate = gear * motor_speed - spindle_speed
         spindle_per_twist = 1.0
-        if strength[kinds.GEAR_ECCENTRICITY] != 0.0:
-            row = effects[kinds.GEAR_ECCENTRICITY]
+        if effects.gear_eccentricity[STRENGTH] != 0.0:
+            row = effects.gear_eccentricity
             slope = hidden_drive.gear_eccentricity_slope(row, spindle)
             twist += hidden_drive.gear_eccentricity_rad(row, spindle)
             twist_rate += slope * spindle_speed
             spindle_per_twist -= slope
-        if strength[kinds.GEAR_BACKLASH] != 0.0:
+        if effects.gear_backlash[STRENGTH] != 0.0:
             twist_torque = hidden_drive.gear_backlash_n_m(
-                effects[kinds.GEAR_BACKLASH], twist, twist_rate, p.gear_stiffness_n_m_rad
+                effects.gear_backlash, twist, twist_rate, p.gear_stiffness_n_m_rad
             )
         else:
             twist_torque = p.gear_stiffness_n_m_rad * twist
-        if strength[kinds.GEAR_STIFFENING] != 0.0:
-            twist_torque *= hidden_drive.gear_stiffening_ratio(
-                effects[kinds.GEAR_STIFFENING], twist
-            )
+        if effects.gear_stiffening[STRENGTH] != 0.0:
+            twist_torque *= hidden_drive.gear_stiffening_ratio(effects.gear_stiffening, twist)
         twist_torque += p.gear_damping_n_m_s_rad * twist_rate
 
         stretch = p.cable_ratio * spindle + p.jaw_zero_rad - jaw
         stretch_rate = p.cable_ratio * spindle_speed - jaw_speed
         lever = p.cable_ratio
-        if strength[kinds.ECCENTRIC_PULLEY] != 0.0:
-            row = effects[kinds.ECCENTRIC_PULLEY]
+        if effects.eccentric_pulley[STRENGTH] != 0.0:
+            row = effects.eccentric_pulley
             slope = hidden_cable.eccentric_pulley_slope(row, spindle)
             stretch += hidden_cable.eccentric_pulley_rad(row, spindle)
             stretch_rate += slope * spindle_speed
             lever += slope
-        if strength[kinds.WRIST_PULL] != 0.0:
-            row = effects[kinds.WRIST_PULL]
+        if effects.wrist_pull[STRENGTH] != 0.0:
+            row = effects.wrist_pull
             stretch += hidden_cable.wrist_pull_rad(row, wrist)
             stretch_rate += hidden_cable.wrist_pull_slope(row, wrist) * wrist_speed
         cable = p.cable_stiffness_n_m_rad * stretch + p.cable_damping_n_m_s_rad * stretch_rate
-        if strength[kinds.CABLE_CREEP] != 0.0:
-            row = effects[kinds.CABLE_CREEP]
+        if effects.cable_creep[STRENGTH] != 0.0:
+            row = effects.cable_creep
             cable += hidden_cable.cable_creep_n_m(row, strain, p.cable_stiffness_n_m_rad)
             strain += dt * (stretch_rate - hidden_cable.cable_creep_rate(row, strain))
-        if strength[kinds.CABLE_HYSTERESIS] != 0.0:
-            row = effects[kinds.CABLE_HYSTERESIS]
+        if effects.cable_hysteresis[STRENGTH] != 0.0:
+            row = effects.cable_hysteresis
             cable += hidden_cable.cable_hysteresis_n_m(row, bend)
             bend += dt * hidden_cable.cable_hysteresis_rate(row, bend, stretch_rate)
 
         motor_limit = p.motor_friction_n_m
-        if motor_friction:
-            if strength[kinds.GEAR_TWO_STATE] != 0.0:
-                row = effects[kinds.GEAR_TWO_STATE]
+        if effects.motor_friction:
+            if effects.gear_two_state[STRENGTH] != 0.0:
+                row = effects.gear_two_state
                 rubbing = hidden_drive.gear_two_state(row, rubbing, motor_speed)
             motor_limit += hidden_drive.motor_friction_n_m(
                 effects, motor_speed, spindle, rubbing, clock
@@ -277,19 +263,19 @@ def step_tick(
             - lever * cable
             - p.spindle_viscous_n_m_s_rad * spindle_speed
         )
-        if spindle_friction:
-            if strength[kinds.CABLE_DWELL] != 0.0:
-                row = effects[kinds.CABLE_DWELL]
+        if effects.spindle_friction:
+            if effects.cable_dwell[STRENGTH] != 0.0:
+                row = effects.cable_dwell
                 age += dt * hidden_cable.cable_dwell_rate(row, age, spindle_speed)
             spindle_limit += hidden_cable.spindle_friction_n_m(
                 effects, spindle, spindle_speed, cable, clock, age
             )
             spindle_limit += hidden_cable.wrist_friction_n_m(effects, spindle_speed, cable, wrist)
-        if strength[kinds.SPINDLE_RIPPLE] != 0.0:
-            row = effects[kinds.SPINDLE_RIPPLE]
+        if effects.spindle_ripple[STRENGTH] != 0.0:
+            row = effects.spindle_ripple
             spindle_torque -= hidden_cable.spindle_ripple_n_m(row, spindle)
-        if strength[kinds.CABLE_PRESLIDING] != 0.0:
-            row = effects[kinds.CABLE_PRESLIDING]
+        if effects.cable_presliding[STRENGTH] != 0.0:
+            row = effects.cable_presliding
             spindle_torque -= hidden_cable.cable_presliding_n_m(row, bristle)
             bristle += dt * hidden_cable.cable_presliding_rate(row, bristle, spindle_speed)
         spindle_speed += dt_spindle * spindle_torque
@@ -313,7 +299,7 @@ def step_tick(
                 + p.stop_damping_n_m_s_rad * jaw_speed,
                 0.0,
             )
-        if jaw_effect:
+        if effects.jaw_torque:
             jaw_torque -= hidden_cable.jaw_torque_n_m(effects, jaw)
         jaw_speed += dt_jaw * jaw_torque
         impulse = braking(jaw_speed, dt_jaw * jaw_friction, p.spindle_creep_speed_rad_s)

@@ -15,8 +15,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation import hidden_kinds as kinds
 from rig.simulation import hidden_sensors, places, plant
+from rig.simulation.hidden import STRENGTH
 from rig.simulation.noise import normal
 from rig.simulation.parameters import SensorParameters
 
@@ -43,7 +43,7 @@ def _converted(value: float, quantum: float, low: float, high: float) -> int:
 def sample(
     state: NDArray[np.float64],
     s: Any,
-    effects: NDArray[np.float64],
+    effects: Any,
     seed: np.uint64,
     tick: int,
     counts: NDArray[np.int32],
@@ -54,7 +54,7 @@ def sample(
         state: State of the plant, shape (`places.STATE_SIZE`,); only its drifts and the states of
             the sensors are changed.
         s: From `scales_of`.
-        effects: From `hidden.table`.
+        effects: A record of `hidden.table`.
         seed: Scrambled seed of the bench.
         tick: Tick number since the bench was made.
         counts: Where to write, shape (7,) or longer, int32.
@@ -65,10 +65,10 @@ def sample(
         np.floor(-state[places.SPINDLE_ANGLE] / TURN_RAD * s.spindle_count_per_turn)
     )
     jaw = state[places.JAW_ANGLE]
-    if effects[kinds.JAW_ENCODER_WAVE, kinds.STRENGTH] != 0.0:
-        jaw += hidden_sensors.jaw_encoder_wave_rad(effects[kinds.JAW_ENCODER_WAVE], jaw)
-    if effects[kinds.JAW_DELAY, kinds.STRENGTH] != 0.0:
-        jaw = hidden_sensors.delayed(effects[kinds.JAW_DELAY], state[places.RING :], tick, jaw)
+    if effects.jaw_encoder_wave[STRENGTH] != 0.0:
+        jaw += hidden_sensors.jaw_encoder_wave_rad(effects.jaw_encoder_wave, jaw)
+    if effects.jaw_delay[STRENGTH] != 0.0:
+        jaw = hidden_sensors.delayed(effects.jaw_delay, state[places.RING :], tick, jaw)
     counts[JAW] = int(np.floor(jaw / TURN_RAD * s.jaw_count_per_turn))
 
     per_count = 1.0 / s.torque_n_m_per_count
@@ -91,8 +91,8 @@ def sample(
     counts[DISTAL] = _converted(-distal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
 
     current = state[places.CURRENT]
-    if effects[kinds.CURRENT_SENSOR_BEND, kinds.STRENGTH] != 0.0:
-        row = effects[kinds.CURRENT_SENSOR_BEND]
+    if effects.current_sensor_bend[STRENGTH] != 0.0:
+        row = effects.current_sensor_bend
         current *= hidden_sensors.current_sensor_bend_ratio(row, current)
     current += s.current_offset_a + s.current_noise_a * normal(seed, tick, 4)
     current += s.current_colour_a * state[places.CURRENT_COLOUR]
@@ -121,32 +121,32 @@ def _drift(state: NDArray[np.float64], s: Any, seed: np.uint64, tick: int) -> No
 
 
 @numba.njit()
-def _proximal_n_m(state: NDArray[np.float64], effects: NDArray[np.float64]) -> float:
+def _proximal_n_m(state: NDArray[np.float64], effects: Any) -> float:
     """Return the torque at the spindle as its sensor sees it, with the sensor's hidden effects."""
     seen = state[places.PROXIMAL_TORQUE]
-    row = effects[kinds.PROXIMAL_LAG]
-    if row[kinds.STRENGTH] != 0.0:
+    row = effects.proximal_lag
+    if row[STRENGTH] != 0.0:
         memory = state[places.SENSOR_LAG_FIRST :]
         seen = hidden_sensors.proximal_lag_n_m(row, memory, seen, plant.TICK_S)
-    row = effects[kinds.PROXIMAL_CREEP]
-    if row[kinds.STRENGTH] != 0.0:
+    row = effects.proximal_creep
+    if row[STRENGTH] != 0.0:
         memory = state[places.CREEP_FAST :]
         seen += hidden_sensors.proximal_creep_n_m(row, memory, seen, plant.TICK_S)
-    row = effects[kinds.PROXIMAL_BEND]
-    if row[kinds.STRENGTH] != 0.0:
+    row = effects.proximal_bend
+    if row[STRENGTH] != 0.0:
         seen *= hidden_sensors.proximal_bend_ratio(row, seen)
     return float(seen)
 
 
 @numba.njit()
-def _distal_n_m(state: NDArray[np.float64], effects: NDArray[np.float64]) -> float:
+def _distal_n_m(state: NDArray[np.float64], effects: Any) -> float:
     """Return the torque at the jaw as its sensor sees it, with the sensor's hidden effects."""
     seen = state[places.DISTAL_TORQUE]
-    row = effects[kinds.DISTAL_DRIFT]
-    if row[kinds.STRENGTH] != 0.0:
+    row = effects.distal_drift
+    if row[STRENGTH] != 0.0:
         seen += hidden_sensors.distal_drift_n_m(row, state[places.CLOCK])
-    row = effects[kinds.DISTAL_CROSSTALK]
-    if row[kinds.STRENGTH] != 0.0:
+    row = effects.distal_crosstalk
+    if row[STRENGTH] != 0.0:
         seen += hidden_sensors.distal_crosstalk_n_m(row, state[places.CURRENT])
     return float(seen)
 

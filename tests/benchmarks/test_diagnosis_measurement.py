@@ -4,9 +4,15 @@ from typing import Any
 
 import pytest
 
-from benchmarks.diagnosis.draw import CHAINS, CLEAN, Answer, draw, record
-from benchmarks.diagnosis.excitation import plans_of
-from benchmarks.diagnosis.own import truth_of
+from benchmarks.diagnosis.own import (
+    CHAINS,
+    CLEAN,
+    Answer,
+    draw,
+    plans_of,
+    record,
+    truth_of,
+)
 from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 from estimation.derived import zero_phase_channels

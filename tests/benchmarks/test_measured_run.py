@@ -22,7 +22,7 @@ def test_a_simulated_run_looks_like_the_measured_one(measured_data: Path) -> Non
     campaign = open_campaign(measured_data / "mrdlab-Tool_4_Maryland_L_4.tar.xz")
     recording = campaign.select(["24"]).runs[0].recording()
     assert recording.conditions["frequency_hz"] == pytest.approx(0.3, abs=0.01)
-    rows = {row.channel: row for row in compare(recording)}
+    measured, simulated = compare(recording)
     spread = (
         "motor_current_a",
         "proximal_torque_n_m",
@@ -30,11 +30,10 @@ def test_a_simulated_run_looks_like_the_measured_one(measured_data: Path) -> Non
         "jaw_angle_rad",
     )
     for name in spread:
-        assert rows[name].simulated.span == pytest.approx(rows[name].measured.span, rel=0.3), name
+        assert simulated[name].span == pytest.approx(measured[name].span, rel=0.3), name
     for name in ("motor_current_a", "proximal_torque_n_m", "distal_torque_n_m", "jaw_angle_rad"):
-        assert rows[name].simulated.high == pytest.approx(rows[name].measured.high, rel=0.3), name
-    twist = rows["gear_twist_rad"]
-    assert twist.simulated.span == pytest.approx(twist.measured.span, rel=0.4)
-    distal = rows["distal_torque_n_m"]
-    assert distal.simulated.middle == pytest.approx(distal.measured.middle, rel=0.3)
-    assert rows["tracking_error_rad"].simulated.span < rows["tracking_error_rad"].measured.span
+        assert simulated[name].high == pytest.approx(measured[name].high, rel=0.3), name
+    twist, distal, error = "gear_twist_rad", "distal_torque_n_m", "tracking_error_rad"
+    assert simulated[twist].span == pytest.approx(measured[twist].span, rel=0.4)
+    assert simulated[distal].middle == pytest.approx(measured[distal].middle, rel=0.3)
+    assert simulated[error].span < measured[error].span

@@ -33,17 +33,17 @@ def test_the_papers_cubic_is_recovered_with_its_degree():
     result = fit_fsr(presses())
     assert len(result.curve.coefficients) == 4
     error = np.array(result.curve.coefficients) - COEFFICIENTS
-    deviation = np.sqrt(np.diag(result.curve.covariance))
+    deviation = np.sqrt(np.diag(result.curve.fit.covariance))
     assert (np.abs(error) < 5 * deviation).all()
     assert (np.abs(error) < 0.1).all()
     assert result.held_out_rmse_n[3] < result.held_out_rmse_n[2]
-    assert result.curve.residual_rms_n == pytest.approx(0.005, rel=0.1)
+    assert result.curve.fit.residual_rms == pytest.approx(0.005, rel=0.1)
 
 
 def test_the_force_at_zero_can_be_held():
     curve = fit_fsr(presses(), degree=3, force_at_zero_n=0.105).curve
     assert curve.coefficients[0] == 0.105
-    assert np.array(curve.covariance)[0].tolist() == [0, 0, 0, 0]
+    assert np.array(curve.fit.covariance)[0].tolist() == [0, 0, 0, 0]
     low, high = curve.interval_n(0.5)
     assert low < ZHANG_2022.force_n(0.5) < high
 

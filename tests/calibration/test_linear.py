@@ -1,4 +1,4 @@
-"""Linear calibrations: counts to SI, immutable content hash, clear refusals."""
+"""Counts to SI: lines, the hash of their set, zeros at rest and their drift, clear refusals."""
 
 import numpy as np
 import pytest
@@ -12,28 +12,34 @@ from calibration.linear import (
     load_calibration_set,
     shipped_calibration_set,
 )
+from calibration.zero import drift_verdicts, measure_zeros
 
-COUNTS = np.dtype([("proximal", "<i2"), ("distal", "<i2")])
+COUNTS = np.dtype([("distal", "<i2"), ("motor", "<i4")])
+TORQUE, MOTOR = "distal_torque_n_m", "motor_angle_rad"
+SET = CalibrationSet(
+    "test",
+    {
+        TORQUE: LinearCalibration(TORQUE, "distal", -1e-3, 10.0, tared=True),
+        MOTOR: LinearCalibration(MOTOR, "motor", 1e-3),
+    },
+)
 finite = st.floats(-1e6, 1e6, allow_nan=False).filter(lambda x: abs(x) > 1e-9)
 
 
+def rest(mean: float, count: int = 500) -> np.ndarray:
+    counts = np.zeros(count, COUNTS)
+    counts["distal"] = np.round(mean + np.random.default_rng(0).normal(0, 2, count))
+    return counts
+
+
 @given(finite, st.floats(-1e4, 1e4), st.lists(st.integers(-32768, 32767), min_size=1))
-def test_the_line_is_applied(slope, zero, values):
+def test_the_line_is_applied_with_its_own_zero_or_a_measured_one(slope, zero, values):
     counts = np.zeros(len(values), COUNTS)
-    counts["proximal"] = values
-    line = LinearCalibration("proximal_torque_n_m", "proximal", slope, zero)
-    columns = CalibrationSet("test", {line.channel: line}).apply(counts)
-    np.testing.assert_allclose(
-        columns["proximal_torque_n_m"], (np.array(values, float) - zero) * slope
-    )
-
-
-def test_a_measured_zero_takes_the_place_of_the_lines_own():
-    counts = np.zeros(3, COUNTS)
-    counts["proximal"] = 110
-    line = LinearCalibration("proximal_torque_n_m", "proximal", 0.5, 10.0)
-    columns = CalibrationSet("t", {line.channel: line}).apply(counts, {line.channel: 100.0})
-    np.testing.assert_allclose(columns["proximal_torque_n_m"], 5.0)
+    counts["distal"] = values
+    lines = CalibrationSet("test", {TORQUE: LinearCalibration(TORQUE, "distal", slope, zero)})
+    for zeros, expected in (({}, zero), ({TORQUE: 100.0}, 100.0)):
+        columns = lines.apply(counts, zeros)
+        np.testing.assert_allclose(columns[TORQUE], (np.array(values, float) - expected) * slope)
 
 
 def test_the_hash_is_of_the_content_and_survives_a_round_trip():
@@ -74,3 +80,27 @@ def test_a_file_with_a_wrong_key_is_refused(tmp_path):
         load_calibration_set(path)
     with pytest.raises(CalibrationError, match="cannot be read"):
         load_calibration_set(tmp_path / "absent.toml")
+
+
+@pytest.mark.parametrize(("after", "passes"), [(41.0, True), (60.0, False), (20.0, False)])
+def test_the_zero_of_a_tared_channel_may_drift_up_to_its_limit(after, passes):
+    before, last = measure_zeros(rest(40.0), SET), measure_zeros(rest(after), SET)
+    assert set(before) == {TORQUE}
+    assert before[TORQUE].mean_counts == pytest.approx(40.0, abs=0.5)
+    assert before[TORQUE].std_counts == pytest.approx(2.0, rel=0.2)
+    (verdict,) = drift_verdicts(before, last, SET, {TORQUE: 5e-3})
+    assert verdict.passes is passes
+    assert verdict.after - verdict.before == pytest.approx(-(after - 40.0) * 1e-3, abs=1e-9)
+    assert verdict.unit == "N m"
+
+
+def test_what_is_no_zero_is_refused():
+    with pytest.raises(CalibrationError, match="too few"):
+        measure_zeros(rest(0.0, 99), SET)
+    dead = rest(0.0)
+    dead["distal"] = 40  # a dead input reads one number for ever; its mean would pass for a zero
+    with pytest.raises(CalibrationError, match="500 times the same"):
+        measure_zeros(dead, SET)
+    zeros = measure_zeros(rest(0.0), SET)
+    with pytest.raises(CalibrationError, match="has a drift limit but no zero"):
+        drift_verdicts(zeros, zeros, SET, {MOTOR: 1.0})

@@ -6,13 +6,12 @@ import pytest
 from calibration.fsr import Creep, FsrRun
 from calibration.fsr_curve import FsrCurve
 from calibration.fsr_memory import FsrMemory, fit_memory
-from calibration.ft import at_point, fit_tool
 from calibration.linear import shipped_calibration_set
 from calibration.procedure import AbortedError, Measurement, carry_out
 from calibration.quality import BadDataError
 from calibration.regression import is_better, regress
 from calibration.sessions.encoder import EncoderSession
-from calibration.sessions.ft import FtSession
+from calibration.sessions.ft import AXES, FtSession, at_point, fit_tool
 from calibration.sessions.gearbox import GearboxSession
 from calibration.sessions.torque import TorqueSession
 from estimation.recording import Flag, Recording
@@ -134,10 +133,11 @@ def poses(mass=0.2, noise=1e-3, seed=0):
 
 
 def test_poses_give_bias_mass_and_centre_of_mass():
-    tool = fit_tool(*poses())
-    deviation = np.sqrt(np.diag(tool.covariance))
-    found = np.concatenate([tool.bias, [tool.mass_kg], tool.centre_m])
-    assert (np.abs(found - [*BIAS, 0.2, *CENTRE]) < 5 * deviation).all()
+    fit = fit_tool(*poses()).fit
+    truth = {f"bias_{axis}": value for axis, value in zip(AXES, BIAS, strict=True)}
+    truth |= {f"centre_{k}_m": value for k, value in zip("xyz", CENTRE, strict=True)}
+    error = [value - (truth | {"mass_kg": 0.2})[name] for name, value in fit.parameters.items()]
+    assert (np.abs(error) < 5 * np.sqrt(np.diag(fit.covariance))).all()
     down, wrench = poses(noise=0.0)
     np.testing.assert_allclose(fit_tool(down, wrench).contact(wrench, down), 0, atol=1e-9)
 
@@ -174,8 +174,8 @@ def test_a_regression_takes_runs_as_evidence():
     # the offsets differ from run to run by ten times the noise: 0.1 / sqrt(12), not 0.01 / 60
     assert np.sqrt(fit.covariance[1, 1]) == pytest.approx(0.1 / np.sqrt(12), rel=0.5)
     useless = [(np.column_stack([x, rng.normal(size=300)]), y) for x, y in runs]
-    assert not is_better(regress(useless), fit)
-    assert is_better(fit, regress([(x[:, 1:], y) for x, y in runs]))
+    assert not is_better(regress(useless).held_out, fit.held_out)
+    assert is_better(fit.held_out, regress([(x[:, 1:], y) for x, y in runs]).held_out)
 
 
 def pressed(k, gap=0.0, creep=0.0, memory_noise=0.002):

@@ -1,6 +1,5 @@
 """The calibration store: nothing is overwritten, damage is noticed, rules warn and refuse."""
 
-import json
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
@@ -10,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calibration.errors import CalibrationError
+from calibration.history import changes, deviation, earlier_ones
 from calibration.linear import LinearCalibration, shipped_calibration_set
 from calibration.record import CalibrationRecord, Fit, RawFile, Validity, record_of_line
 from calibration.rules import UnfitCalibrationError, judge, judge_range, judge_raw, refuse_errors
@@ -181,21 +181,57 @@ def test_raw_files_that_changed_are_noticed(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("make", "message"),
     [
-        {"operator": " "},
-        {"made_at": "2026-03-01T12:00:00"},
-        {"made_at": "yesterday"},
-        {"kind": "../etc"},
+        (lambda: line_record(operator=" "), "who made it"),
+        (lambda: line_record(made_at="2026-03-01T12:00:00"), "offset from UTC"),
+        (lambda: line_record(made_at="yesterday"), "not a date"),
+        (lambda: line_record(kind="../etc"), "file name"),
+        (lambda: CalibrationRecord.from_json('{"kind": "torque"}'), "not a calibration record"),
+        (lambda: Fit("line", {"slope": 1.0, "zero": 0.0}, ((1.0,),)), "2 x 2"),
     ],
 )
-def test_a_record_that_cannot_stand_is_refused(change):
-    with pytest.raises(CalibrationError):
-        line_record(**change)
+def test_a_record_that_cannot_stand_is_refused(make, message):
+    with pytest.raises(CalibrationError, match=message):
+        make()
 
 
-def test_a_text_that_is_no_record_is_refused():
-    with pytest.raises(CalibrationError, match="not a calibration record"):
-        CalibrationRecord.from_json(json.dumps({"kind": "torque"}))
-    with pytest.raises(CalibrationError, match="2 x 2"):
-        Fit("line", {"slope": 1.0, "zero": 0.0}, ((1.0,),))
+def on_day(day: int, slope: float = 1.0, **other) -> CalibrationRecord:
+    fit = Fit("line", {"slope": slope, "zero": 100.0 * day}, ((1e-4, 0.0), (0.0, 1.0)))
+    return line_record(made_at=f"2026-01-{day:02d}T00:00:00+00:00", **{"fit": fit, **other})
+
+
+def test_the_latest_five_of_the_same_sensor_are_compared():
+    stored = [on_day(day) for day in range(1, 9)]
+    names = ({"channel": "distal_torque_n_m"}, {"instrument": "0042"}, {"kind": "torque"})
+    others = [*(on_day(3, **name) for name in names), on_day(20)]
+    found = earlier_ones(stored[-1], [*stored, *others])
+    assert [one.made.day for one in found] == [7, 6, 5, 4, 3]
+
+
+@pytest.mark.parametrize(("slope", "drifted"), [(1.0, False), (1.02, False), (1.05, True)])
+def test_a_change_beyond_both_uncertainties_is_a_drift(slope, drifted):
+    (change,) = changes(on_day(1), on_day(2, slope))
+    assert change.parameter == "slope"
+    assert change.drifted is drifted
+    assert change.uncertainty == pytest.approx(2 * 0.01 * 2**0.5)
+
+
+def test_the_zero_counts_where_it_is_not_measured_again():
+    names = [c.parameter for c in changes(on_day(1, tared=False), on_day(2, tared=False))]
+    assert names == ["slope", "zero"]
+
+
+def test_without_an_uncertainty_nothing_is_called_a_drift():
+    (change,) = changes(on_day(1, fit=Fit("line", {"slope": 5.0, "zero": 0.0})), on_day(2))
+    assert change.normalised_error is None
+    assert not change.drifted
+
+
+def test_a_stored_record_keeps_the_uncertainty_of_each_parameter(store):
+    fit = Fit("current", {"slope": 1.0, "friction": 2.0}, ((0.25, 0.1), (0.1, 4.0)))
+    kept = store.get(store.add(on_day(1, fit=fit)))
+    assert {name: deviation(kept, name) for name in fit.parameters} == {
+        "slope": 0.5,
+        "friction": 2.0,
+    }

@@ -60,11 +60,11 @@ class RawHost:
         return Result(ack.result), ack.status
 
     def hello(self) -> protocol.Identity:
-        (answer,) = self.send(protocol.encode_command(Kind.HELLO, self.next_number()))
+        (answer,) = self.send(protocol.encode(Kind.HELLO, self.next_number()))
         return protocol.decode_identity(self.profile.decode(answer)[2])
 
     def command(self, kind: Kind) -> Result:
-        return self.ack(protocol.encode_command(kind, self.next_number()))[0]
+        return self.ack(protocol.encode(kind, self.next_number()))[0]
 
     def arm_payload(self, limits: ArmLimits | None = None, session: int | None = None) -> bytes:
         if session is None:
@@ -87,13 +87,13 @@ class RawHost:
     def ping(self, session: int | None = None) -> None:
         session = self.session if session is None else session
         number = self.next_number()
-        self.send(protocol.encode_ping(number, number, session))
+        self.send(protocol.encode(Kind.PING, number, session, number))
 
     def clear(self, code: int) -> Result:
-        return self.ack(protocol.encode_clear(self.next_number(), code))[0]
+        return self.ack(protocol.encode(Kind.CLEAR, self.next_number(), code))[0]
 
     def trip(self) -> TripReport:
-        (answer,) = self.send(protocol.encode_command(Kind.TRIP, self.next_number()))
+        (answer,) = self.send(protocol.encode(Kind.TRIP, self.next_number()))
         return self.profile.decode_trip_report(self.profile.decode(answer)[2])
 
     def _take(self) -> list[bytes]:

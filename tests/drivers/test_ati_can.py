@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from drivers.ati_can import protocol
 from drivers.ati_can.driver import AtiCan, open_ati_can
 from drivers.ati_can.fake import MATRIX, AtiCanFake
-from drivers.ati_can.wrench import moved_wrench
-from drivers.device import SampleFlag
+from drivers.device import AXES, SampleFlag, moved_wrench
 from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
 from drivers.transport.can_bus import CanFrame
 from drivers.transport.simulated_can import SimulatedCanBus
@@ -51,7 +50,7 @@ def test_the_conversation_of_the_manual() -> None:
         assert (identity.serial, identity.firmware) == ("FT123456", "3.8.17")
         device.start()
         batch = device.read(0.1)
-    assert [batch.columns[name][0] for name in protocol.AXES] == pytest.approx(
+    assert [batch.columns[name][0] for name in AXES] == pytest.approx(
         [0.001, 0.002, 0.003, -0.0005, 0.0025, -16.3835]
     )
     assert batch.flags[0] == 0
@@ -166,10 +165,10 @@ def test_the_bias_is_taken_off() -> None:
     device.start()
     before = device.read(0.1)
     expected = MATRIX @ load / 1e6
-    assert [before.columns[name][0] for name in protocol.AXES] == pytest.approx(expected.tolist())
+    assert [before.columns[name][0] for name in AXES] == pytest.approx(expected.tolist())
     device.set_bias()
     after = device.read(0.1)
-    assert [after.columns[name][0] for name in protocol.AXES] == pytest.approx([0.0] * 6)
+    assert [after.columns[name][0] for name in AXES] == pytest.approx([0.0] * 6)
     device.close()
 
 

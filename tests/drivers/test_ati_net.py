@@ -11,9 +11,8 @@ from drivers.ati_net import protocol
 from drivers.ati_net.driver import AtiNet
 from drivers.ati_net.fake import CalibrationFake, RdtFake, fake_calibration
 from drivers.ati_net.protocol import Calibration
-from drivers.ati_net.sequence import RESTART_STEP, RecordSequence
+from drivers.ati_net.stream import RESTART_STEP, RecordSequence
 from drivers.counters import DeviceCounters
-from drivers.device import SampleFlag
 from drivers.errors import DriverError, FrameError, LinkError, LinkLostError, LinkTimeoutError
 from drivers.transport import open_transport
 from drivers.transport.simulated import SimulatedTransport
@@ -277,11 +276,3 @@ def test_over_a_real_socket_on_the_loopback_interface() -> None:
 def test_an_address_has_a_host_and_a_port(url: str) -> None:
     with pytest.raises(LinkError, match="udp:HOST:PORT"):
         open_transport(url)
-
-
-def test_a_saturated_sensor_flags_its_samples() -> None:
-    fake = RdtFake()
-    device = device_of(fake)
-    device.start()
-    fake.status = 0x80020000
-    assert set(device.read(0.1).flags) == {SampleFlag.SATURATED | SampleFlag.SUSPECT}

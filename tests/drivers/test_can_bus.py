@@ -18,8 +18,7 @@ from drivers.errors import (
     UnknownSchemeError,
 )
 from drivers.transport.can_bus import CanFrame
-from drivers.transport.faulty import Fault, Faults
-from drivers.transport.faulty_can import FaultyCanBus
+from drivers.transport.faulty import Fault, Faults, FaultyCanBus
 from drivers.transport.python_can import PythonCanBus, open_can
 from drivers.transport.simulated_can import SimulatedCanBus
 

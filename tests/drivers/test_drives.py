@@ -9,7 +9,7 @@ import pytest
 
 from drivers.dynamixel.driver import Dynamixel
 from drivers.dynamixel.fake import DynamixelFake
-from drivers.errors import DisarmUnconfirmedError, DriverError
+from drivers.errors import DisarmUnconfirmedError, DriverError, LinkTimeoutError
 from drivers.moteus.driver import Moteus
 from drivers.moteus.fake import MoteusFake
 from drivers.transport.faulty import FaultyTransport
@@ -37,6 +37,16 @@ KINDS = {
         *(lambda fake: fake.torque_n_m, "timed out"),
     ),
 }
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_drive_that_is_not_started_or_not_there_is_refused(kind: str) -> None:
+    device = KINDS[kind].driver(SimulatedTransport(KINDS[kind].fake()))
+    with pytest.raises(DriverError, match="Call start"):
+        device.arm()
+    absent = type(device)(SimulatedTransport(KINDS[kind].fake()), device_id=9)
+    with pytest.raises(LinkTimeoutError, match="identifier 9"):
+        absent.identify()
 
 
 @pytest.fixture(params=KINDS)

@@ -14,7 +14,14 @@ from tests.drivers.bench_physics import PlainBench, ScriptedBench
 from tests.drivers.raw_host import GAINS, RawHost
 
 WIDEST = Limits()
-TIGHT = Limits(1500, 900, 5800, 30000, -4000, 4000)
+TIGHT = Limits(
+    max_current=1500,
+    max_load_ma=900,
+    max_proximal=5800,
+    max_distal=30000,
+    min_spindle=-4000,
+    max_spindle=4000,
+)
 
 
 EDGES = {
@@ -245,7 +252,7 @@ def test_a_board_that_was_just_started_takes_its_motors_for_hot(library: Path) -
     board = FirmwareBoard(ScriptedBench(inputs), BoardStart(simulated=False), library)
     host = RawHost(board)
     host.run(150)
-    assert host.ack(protocol.encode_reference(7, (0, 0, 0)))[0] is Result.OK
+    assert host.ack(protocol.encode(Kind.REFERENCE, 7, 0, 0, 0, False))[0] is Result.OK
     assert host.arm(limits) is Result.TOO_HOT
     host.run(150)
     assert host.arm(limits) is Result.OK
@@ -358,7 +365,7 @@ def test_refusals(library: Path) -> None:
         assert host.setpoints([k] * 100, [0] * 100) is Result.OK
     assert host.setpoints([0] * 100, [0] * 100) is Result.QUEUE_FULL
     assert host.setpoints([0] * 99, [0] * 99) is Result.OK
-    header = protocol.encode_command(Kind.HELLO, 7)
+    header = protocol.encode(Kind.HELLO, 7)
     for payload, reason in (
         (b"\x02" + header[1:], Result.WRONG_VERSION),
         (b"\x01\x63\x00\x00", Result.UNKNOWN_KIND),

@@ -35,7 +35,7 @@ def test_the_text_names_every_kind() -> None:
 
 
 def test_an_unknown_trip_is_refused() -> None:
-    fields = REFERENCE.decode(protocol.encode_trip_report(1, 99, 255, (0, 0, 0, 0)))[2]
+    fields = REFERENCE.decode(protocol.encode(Kind.TRIP_REPORT, 1, 99, 255, 0, 0, 0, 0))[2]
     with pytest.raises(FrameError, match="99"):
         REFERENCE.decode_trip_report(fields)
 
@@ -47,9 +47,9 @@ def test_an_unknown_trip_is_refused() -> None:
         b"\x02\x10\x00\x00",
         b"\x01\x63\x00\x00",
         b"\x01\x10\x00\x00\x00",
-        protocol.encode_command(Kind.SETPOINTS, 1),
-        protocol.encode_command(Kind.SETPOINTS, 1) + bytes(5),
-        protocol.encode_command(Kind.SETPOINTS, 1) + bytes(606),
+        protocol.encode(Kind.SETPOINTS, 1, 0),
+        protocol.encode(Kind.SETPOINTS, 1, 0) + bytes(5),
+        protocol.encode(Kind.SETPOINTS, 1, 0) + bytes(606),
         bytes([1, Kind.SAMPLE]) + bytes(40),
     ],
     ids=["short", "version", "kind", "long", "none", "part", "many", "sample"],

@@ -46,14 +46,14 @@ NO_SIGN_OF_LIFE: dict[str, Callable[[RawHost], bytes]] = {
     "another version": lambda h: bytes([9, Kind.PING, 0, 0]) + bytes(12),
     "an unknown kind": lambda h: bytes([protocol.VERSION, 99, 0, 0]),
     "its own samples": own_samples,
-    "a ping without the session": lambda h: protocol.encode_ping(h.next_number(), 1, 0),
-    "a ping of the next session": lambda h: protocol.encode_ping(
-        h.next_number(), 1, h.hello().offer
+    "a ping without the session": lambda h: protocol.encode(Kind.PING, h.next_number(), 0, 1),
+    "a ping of the next session": lambda h: protocol.encode(
+        Kind.PING, h.next_number(), h.hello().offer, 1
     ),
-    "an old ping": lambda h: protocol.encode_ping(1, 1, h.session),
-    "a hello": lambda h: protocol.encode_command(Kind.HELLO, h.next_number()),
-    "the question for its trip": lambda h: protocol.encode_command(Kind.TRIP, h.next_number()),
-    "a start": lambda h: protocol.encode_command(Kind.START, h.next_number()),
+    "an old ping": lambda h: protocol.encode(Kind.PING, 1, h.session, 1),
+    "a hello": lambda h: protocol.encode(Kind.HELLO, h.next_number()),
+    "the question for its trip": lambda h: protocol.encode(Kind.TRIP, h.next_number()),
+    "a start": lambda h: protocol.encode(Kind.START, h.next_number()),
     "setpoints of another session": lambda h: h.profile.encode_setpoints(
         h.next_number(), (np.array([HERE]), np.array([0])), h.session ^ 1
     ),

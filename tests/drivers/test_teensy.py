@@ -296,8 +296,8 @@ def test_disarm_is_not_believed_when_the_board_reports_that_it_is_armed() -> Non
     logger.arm(GAINS, WIDEST)
 
     def still_armed(data: bytes) -> bytes:
-        ack = protocol.Ack(3, protocol.Kind.DISARM, Result.OK, protocol.STATUS_ARMED, 0)
-        return encode_frame(protocol.encode_ack(ack)) if data else data
+        fields = (protocol.Kind.DISARM, Result.OK, protocol.STATUS_ARMED, 0)
+        return encode_frame(protocol.encode(protocol.Kind.ACK, 3, *fields)) if data else data
 
     cable.incoming = still_armed
     with pytest.raises(DisarmUnconfirmedError, match="still armed"):

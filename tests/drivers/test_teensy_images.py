@@ -85,7 +85,7 @@ def say(image: TeensyImage, *payloads: bytes) -> int:
 def offered(image: TeensyImage) -> int:
     """Say hello and return the session the board offers."""
     image.sent.clear()
-    say(image, protocol.encode_command(Kind.HELLO, 1))
+    say(image, protocol.encode(Kind.HELLO, 1))
     replies: list[bytes] = []
     while not replies:  # behind the samples that wait
         image.call("loop")
@@ -129,7 +129,7 @@ def set_in_motion(name: str, image: TeensyImage) -> int:
     """
     for _ in range(110):  # it stands still, and is referenced where it stands
         image.tick()
-    longest = say(image, protocol.encode_reference(1, [0, 0, 0]))
+    longest = say(image, protocol.encode(Kind.REFERENCE, 1, 0, 0, 0, False))
     longest = max(longest, say(image, *arming(name, offered(image))))
     for _ in range(3):
         image.tick()
@@ -142,7 +142,7 @@ def set_in_motion(name: str, image: TeensyImage) -> int:
 def test_a_frame_from_the_host_keeps_no_edge_waiting(images: Images, name: str, mhz: int) -> None:
     """At one instruction a cycle; the longest set-point frame, its acknowledgement, and samples."""
     image = images(name)
-    say(image, protocol.encode_command(Kind.START, 9))
+    say(image, protocol.encode(Kind.START, 9))
     longest = set_in_motion(name, image)
     assert 0 < longest <= 20 * mhz
 

@@ -23,7 +23,6 @@ from estimation.networks.network import Network
 from estimation.plant_models import declared
 from estimation.predicted import predicted_of, with_prediction
 from estimation.recording import Recording
-from tests.estimation.synthetic import campaign
 from tests.estimation.test_plant import SLIDE, slide
 
 TARGET = "proximal_torque_n_m"
@@ -60,11 +59,6 @@ def compiled(estimator, run: Recording, folder) -> np.ndarray:
         [folder / "main"], input=samples.tobytes(), capture_output=True, check=True
     )
     return np.frombuffer(done.stdout, np.float32).reshape(-1, 3)
-
-
-@pytest.fixture(scope="module")
-def runs() -> list[Recording]:
-    return list(campaign())
 
 
 @pytest.fixture(scope="module")

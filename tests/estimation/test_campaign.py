@@ -1,4 +1,4 @@
-"""Campaigns: lazy runs, one clock, splits by run."""
+"""Campaigns: lazy runs, their common time, splits by run."""
 
 import numpy as np
 import pytest
@@ -8,40 +8,14 @@ from hypothesis import strategies as st
 from estimation.campaign import Campaign, CampaignError, Run
 from estimation.recording import Flag, Recording, Stretch
 
-SECOND_NS = 1_000_000_000
 
-
-def run(name: str, start_s: float | None = None, load_a: float = 0.1, count: int = 1000):
+def run(name: str, load_a: float = 0.1, count: int = 1000):
     return Recording(
         name,
         np.arange(count) * 1e-3,
         {"motor_current_a": np.full(count, load_a)},
         conditions={"load_command_a": load_a},
-        started_at_ns=None if start_s is None else int(start_s * SECOND_NS),
     )
-
-
-def test_runs_without_a_start_follow_back_to_back_with_unknown_gaps():
-    clock = Campaign.of([run("a"), run("b"), run("c")]).clock()
-    np.testing.assert_allclose(clock.start_s, [0.0, 1.0, 2.0])
-    assert not clock.gap_known.any()
-
-
-def test_recorded_starts_are_kept():
-    clock = Campaign.of([run("a", 100.0), run("b", 110.0), run("c", 111.5)]).clock()
-    np.testing.assert_allclose(clock.start_s, [0.0, 10.0, 11.5])
-    assert clock.gap_known.all()
-
-
-def test_a_mixture_states_which_gaps_are_known():
-    clock = Campaign.of([run("a"), run("b", 100.0), run("c", 105.0), run("d")]).clock()
-    np.testing.assert_allclose(clock.start_s, [0.0, 1.0, 6.0, 7.0])
-    assert clock.gap_known.tolist() == [False, False, True, False]
-
-
-def test_overlapping_starts_are_refused():
-    with pytest.raises(CampaignError, match="before its predecessor"):
-        Campaign.of([run("a", 100.0), run("b", 100.5)]).clock()
 
 
 def test_a_campaign_is_walked_run_by_run():

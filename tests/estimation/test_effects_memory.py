@@ -12,45 +12,17 @@ from estimation.campaign import Campaign
 from estimation.causes.verdict import diagnose
 from estimation.derived import zero_phase_channels
 from estimation.diagnosis.split import split
-from estimation.effects import effect
+from estimation.effects import catalogue, effect
+from estimation.estimators.model import Stream
 from estimation.fitting import fit
 from estimation.model import Model, Term, predict
 from estimation.recording import Recording
-from estimation.stream import Stream
 from tests.estimation import synthetic
+from tests.estimation.test_effects import typical
 
 pytestmark = pytest.mark.integration
 
-TRUE = {
-    "change.step": ((7.0, 2.0), [0.02]),
-    "change.step.campaign": ((100.0, 2.0), [0.02]),
-    "change.step.offset": ((7.0,), [0.02]),
-    "coupling.kinematic": ((), [0.3]),
-    "coupling.torque": ((), [0.2]),
-    "friction.capstan": ((0.5, 2.0), [0.3]),
-    "friction.capstan.wrist": ((0.3, 2.0), [0.3]),
-    "friction.dwell": ((1.0, 1.5, 1.0), [0.02]),
-    "friction.position": ((2.0,), [0.02, -0.03, 0.01]),
-    "friction.warmup": ((4.0, 2.0), [0.02]),
-    "friction.warmup.campaign": ((120.0, 2.0), [-0.02]),
-    "hysteresis.bouc_wen": ((0.15, 2.0), [0.02]),
-    "hysteresis.bouc_wen.twist": ((0.03, 1.5, 0.4), [0.004]),
-    "hysteresis.presliding": ((0.1,), [0.02]),
-    "hysteresis.presliding.lugre": ((0.05, 0.8, 4.0), [0.02]),
-    "hysteresis.presliding.maxwell": ((0.02,), [0.01, 0.004, 0.02]),
-    "spring.end_stop": ((0.95,), [0.1]),
-    "spring.end_stop.opening": ((0.3,), [0.1]),
-    "transmission.backlash": ((0.01, 0.02), [0.006]),
-    "transmission.backlash.play": ((0.06,), [0.05]),
-    "transmission.relaxation": ((0.8, 0.4), [0.2]),
-    "transmission.relaxation.prony": ((0.15, 0.4), [0.2, 0.1]),
-    "transmission.stiffening": ((0.05,), [0.1]),
-    "transmission.stiffening.asymmetric": ((), [0.05]),
-    "transmission.stiffening.cubic": ((), [2.0]),
-}
-"""Shape and amplitudes put in."""
-
-EVERY = pytest.mark.parametrize("name", TRUE)
+REMEMBERING = [n for n, kind in catalogue().items() if kind.start() and "sticking" not in n]
 
 
 def slow_motion(k: int, rate_hz: float = 1000.0, seconds: float = 12.0) -> dict[str, np.ndarray]:
@@ -69,7 +41,6 @@ def slow_motion(k: int, rate_hz: float = 1000.0, seconds: float = 12.0) -> dict[
         "wrist_pitch_rad": 0.6 * np.sin(2 * np.pi * 0.05 * t + k),
         "proximal_torque_n_m": 0.1 * np.sin(2 * np.pi * 0.33 * t + 2 * k) + 0.03 * k,
         "distal_torque_n_m": 0.1 * np.sin(2 * np.pi * 0.29 * t + k) + 0.02 * k,
-        "joint_1_torque_n_m": 0.3 * np.sin(2 * np.pi * 0.4 * t + k),
     }
 
 
@@ -87,13 +58,14 @@ def inputs_of(kind, channels) -> dict[str, np.ndarray]:
     channels = dict(channels)
     step_s = channels["time_s"][1] - channels["time_s"][0]
     channels["motor_velocity_rad_s"] = np.gradient(channels["motor_angle_rad"], step_s)
-    return {role: channels[name] for role, name in kind.roles.items()}
+    other = 0.1 * np.sin(2.5 * channels["time_s"])
+    return {role: channels.get(name, other) for role, name in kind.roles.items()}
 
 
-@EVERY
+@pytest.mark.parametrize("name", REMEMBERING)
 def test_columns_do_not_depend_on_the_rate_of_the_samples(name):
     kind = effect(name)
-    shape, _ = TRUE[name]
+    shape = typical(kind)
     fast = inputs_of(kind, slow_motion(2))
     thinned = {role: values[::10] for role, values in fast.items()}
     expected = kind.columns(fast, shape)[::10]
@@ -102,17 +74,16 @@ def test_columns_do_not_depend_on_the_rate_of_the_samples(name):
 
 
 @pytest.mark.parametrize(
-    "name", [n for n in TRUE if n.startswith("hysteresis") and n != "hysteresis.bouc_wen.twist"]
+    "name", [n for n in REMEMBERING if n.startswith("hysteresis") and not n.endswith("twist")]
 )
 def test_friction_with_memory_takes_work_out_of_a_closed_path(name):
     kind = effect(name)
-    shape, amplitudes = TRUE[name]
     inputs = inputs_of(kind, slow_motion(0))
     t = np.arange(4000) * 1e-3
     inputs["travel"] = 0.3 * np.sin(2 * np.pi * t)
     if "speed" in inputs:
         inputs["speed"] = 35 * 0.3 * 2 * np.pi * np.cos(2 * np.pi * t)
-    torque = kind.columns(inputs, shape) @ np.array(amplitudes)
+    torque = kind.columns(inputs, typical(kind)).sum(axis=1)
     assert np.sum(torque[1000:-1] * np.diff(inputs["travel"])[1000:]) > 0
 
 
@@ -128,11 +99,10 @@ def test_friction_with_memory_takes_work_out_of_a_closed_path(name):
 )
 def test_a_loop_of_deflection_against_load_takes_work_too(name, balance, side):
     kind = effect(name)
-    shape, amplitudes = TRUE[name]
     t = np.arange(4000) * 1e-3
     load = 0.1 * np.sin(2 * np.pi * t)
     inputs = dict.fromkeys(kind.roles, load) | ({"clock": t} if "clock" in kind.roles else {})
-    deflection = side * kind.balances[balance] * (kind.columns(inputs, shape) @ amplitudes)
+    deflection = side * kind.balances[balance] * kind.columns(inputs, typical(kind)).sum(axis=1)
     assert np.sum(load[1000:-1] * np.diff(deflection)[1000:]) > 0
 
 

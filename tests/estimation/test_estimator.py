@@ -19,7 +19,6 @@ from estimation.model_file import read
 from estimation.networks.network import NetworkError
 from estimation.networks.training import Settings, has_torch
 from estimation.recording import MissingChannelError, Recording
-from tests.estimation.synthetic import campaign
 
 pytestmark = pytest.mark.integration
 
@@ -46,13 +45,8 @@ KINDS = [
 
 
 @pytest.fixture(scope="module")
-def runs() -> list[Recording]:
-    return list(campaign())
-
-
-@pytest.fixture(scope="module")
-def fitted(runs):
-    known: dict[str, Estimator] = {}
+def fitted(runs, states):
+    known: dict[str, Estimator] = {"bank": states}
 
     def fit(kind: str) -> Estimator:
         if kind not in known:
@@ -132,13 +126,3 @@ def test_what_does_not_fit_together_is_refused(fitted, runs, tmp_path):
     del arrays["low_pass"]
     with pytest.raises(NetworkError, match="filter"):
         NetworkEstimator.from_arrays(arrays)
-
-
-@torch_only
-def test_samples_outside_the_training_range_are_flagged(fitted, runs):
-    network = fitted("network")
-    assert isinstance(network, NetworkEstimator)
-    closing = processed(runs[1], [])["spindle_velocity_rad_s"] > 0.3
-    assert network.inside(runs[1])[closing].mean() > 0.9
-    far = runs[1].with_columns(motor_current_a=runs[1]["motor_current_a"] + 5)
-    assert not network.inside(far).any()

@@ -1,5 +1,6 @@
 """Outputs replace files of their own kind, and nothing else."""
 
+import io
 import json
 from pathlib import Path
 
@@ -27,40 +28,34 @@ TEXTS = {
 }
 
 
-@pytest.mark.parametrize("new", TEXTS)
-@pytest.mark.parametrize("old", TEXTS)
+def arrays(**content: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=False, **content)
+    return file.getvalue()
+
+
+CONTENTS = {name: text.encode() for name, text in TEXTS.items()} | {
+    "recording": b"\x89MCAP0\r\n...",
+    "picture": b"\x89PNG\r\n",
+    "unknown": b"\x00\xff",
+    "damaged": b"PK\x03\x04",
+    "arrays": arrays(time_s=np.zeros(3)),
+    "estimator": arrays(schema=np.array("rig.estimator/1")),
+}
+
+
+@pytest.mark.parametrize("new", CONTENTS)
+@pytest.mark.parametrize("old", CONTENTS)
 def test_a_file_is_replaced_by_its_own_kind_only(tmp_path: Path, old: str, new: str) -> None:
     path = tmp_path / "file"
-    write_text_atomic(path, TEXTS[old])
+    write_bytes_atomic(path, CONTENTS[old])
     if old == new:
-        write_text_atomic(path, TEXTS[new] + "\n")
-        assert path.read_text() == TEXTS[new] + "\n"
+        write_bytes_atomic(path, CONTENTS[new])
         return
-    with pytest.raises(OutputError, match="not replaced"):
-        write_text_atomic(path, TEXTS[new])
-    assert path.read_text() == TEXTS[old]
+    with pytest.raises(OutputError, match=r"file is .*not replaced"):
+        write_bytes_atomic(path, CONTENTS[new])
+    assert path.read_bytes() == CONTENTS[old]
     assert list(tmp_path.iterdir()) == [path]
-
-
-BINARY = [b"\x89MCAP0\r\n...", b"\x89PNG\r\n", b"\x00\xff", b"PK\x03\x04"]
-
-
-@pytest.mark.parametrize("content", BINARY)
-def test_no_text_replaces_a_binary_file(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "run.mcap"
-    path.write_bytes(content)
-    with pytest.raises(OutputError, match=r"run\.mcap is .*not replaced"):
-        write_text_atomic(path, MODEL_TEXT)
-    assert path.read_bytes() == content
-
-
-def test_arrays_of_data_are_not_replaced_by_an_estimator(tmp_path: Path) -> None:
-    data, estimator = tmp_path / "data.npz", tmp_path / "estimator.npz"
-    np.savez(data, time_s=np.zeros(3))
-    np.savez(estimator, schema=np.array("rig.estimator/1"))
-    with pytest.raises(OutputError):
-        write_bytes_atomic(data, estimator.read_bytes())
-    write_bytes_atomic(estimator, estimator.read_bytes())
 
 
 def test_a_ledger_grows_from_its_first_line(tmp_path: Path) -> None:

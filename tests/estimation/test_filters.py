@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from estimation.derived import zero_phase_channels
 from estimation.filters import (
-    CausalFilter,
     FilterError,
     LowPass,
     filter_recording,
@@ -77,16 +76,6 @@ def test_filter_names_what_it_cannot_do():
         zero_phase(np.zeros(10), RATE_HZ)
     with pytest.raises(FilterError, match="half the sample rate"):
         zero_phase(np.zeros(100), 80.0)
-
-
-def test_causal_filter_starts_settled_and_looks_only_back():
-    rows = np.full((50, 1), 7.0)
-    assert CausalFilter(RATE_HZ).step(rows) == pytest.approx(rows)
-    changed = rows.copy()
-    changed[30:] = 9.0
-    assert np.array_equal(
-        CausalFilter(RATE_HZ).step(changed)[:30], CausalFilter(RATE_HZ).step(rows)[:30]
-    )
 
 
 def run_of(n: int = 3000, keep: np.ndarray | None = None, **flags: object) -> Recording:

@@ -5,24 +5,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from estimation.campaign import Campaign
 from estimation.effects import effect
+from estimation.estimators.model import Stream
 from estimation.fit_problem import FitError
 from estimation.fitting import fit
 from estimation.model import Model, NotFittedError, Term, predict
 from estimation.model_file import read
-from estimation.recording import Flag, MissingChannelError, Stretch
+from estimation.recording import Flag, MissingChannelError, Recording, Stretch
 from estimation.shape_search import descended
-from estimation.stream import Stream
+from estimation.within_bounds import solve_within
+from tests.estimation import campaigns
 from tests.estimation.synthetic import TRUE, campaign, run
-
-
-@pytest.fixture(scope="module")
-def motor() -> Model:
-    return fit(read(Path("motor")), campaign())
 
 
 def numbers(model: Model) -> dict[str, float]:
@@ -114,20 +109,6 @@ def test_prediction_needs_no_target_and_finds_the_torque(motor):
     assert np.abs(lagging)[100:].max() < 2e-2
 
 
-@settings(deadline=None, max_examples=15)
-@given(cuts=st.lists(st.integers(0, 400), max_size=8))
-def test_live_is_offline_to_rounding_however_the_batches_are_cut(motor, cuts):
-    recording = run("live", 0.4, 0.1, seed=5, seconds=0.4)
-    offline = predict(motor, recording, causal=True)
-    stream = Stream(motor, recording.sample_rate_hz)
-    pieces = [
-        stream.step(part_time, {name: recording[name][part] for name in stream.channels})
-        for part in np.split(np.arange(400), sorted(cuts))
-        for part_time in [recording.time_s[part]]
-    ]
-    assert np.concatenate(pieces) == pytest.approx(offline, rel=1e-12, abs=1e-15)
-
-
 def test_live_takes_single_samples_and_gives_nan_where_an_input_is_lost(motor):
     recording = run("live", 0.4, 0.1, seed=5, seconds=0.1)
     current = recording["motor_current_a"].copy()
@@ -150,3 +131,42 @@ def test_a_search_ends_where_the_error_changes_by_less_than_its_rounding(seed: i
 
     (found,) = descended(error, [0.5], [1e-8], [(0.0, 1.0)])
     assert abs(found - 0.5) < 1e-6
+
+
+def test_where_a_bound_is_active_the_others_are_the_best() -> None:
+    random = np.random.default_rng(3)
+    columns = random.normal(size=(400, 3))
+    target = columns @ [1.0, -2.0, 3.0] + 0.5 * columns[:, 0]
+    low, high = np.array([-9.0, 0.0, -9.0]), np.array([9.0, 9.0, 2.0])
+    found = solve_within(columns.T @ columns, columns.T @ target, low, high)
+    assert np.all((found >= low) & (found <= high))
+    assert (found[1], found[2]) == (0.0, 2.0)
+    left = target - columns[:, 1:] @ found[1:]
+    assert found[0] == pytest.approx(columns[:, 0] @ left / (columns[:, 0] @ columns[:, 0]))
+
+
+def negative_friction() -> list[Recording]:
+    """Runs whose drive seems to push by itself: no friction of an allowed sign describes them."""
+    return [
+        r.with_columns(
+            proximal_torque_n_m=r["proximal_torque_n_m"]
+            + (0.05 + 0.01 * k) * np.sign(np.gradient(r["motor_angle_rad"]))
+        )
+        for k, r in enumerate(campaigns.runs(count=8, seconds=2.0))
+    ]
+
+
+def outside(model: Model) -> list[str]:
+    """Parameters whose value or interval is beyond a bound, or whose interval lacks the value."""
+    return [
+        f"{term.effect.id}.{p.name}: {estimate}"
+        for term in model.terms
+        for p in term.parameters
+        if (estimate := term.values[p.name]).ci95 is not None
+        and not p.lower <= estimate.ci95[0] <= estimate.value <= estimate.ci95[1] <= p.upper
+    ]
+
+
+@pytest.mark.parametrize("recordings", [negative_friction(), campaigns.runs(count=3, seconds=2.0)])
+def test_every_interval_of_a_fit_holds_its_value(recordings) -> None:
+    assert outside(fit(read(Path("motor")), Campaign.of(recordings))) == []

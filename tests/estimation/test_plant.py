@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.derived import measured_channels, zero_phase_channels
+from estimation.estimators.model import Stream
 from estimation.fitting import fit
 from estimation.noise import white_noise
 from estimation.plant import (
@@ -27,7 +28,6 @@ from estimation.plant_file import PlantFileError, parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from estimation.recording import Recording
 from estimation.signals import Combination, Direction, Share
-from estimation.stream import Stream
 
 REFERENCE = to_toml(shipped_plant("reference"))
 

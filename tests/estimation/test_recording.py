@@ -36,26 +36,20 @@ def test_columns_cannot_be_written_to():
         recording.flags[0] = 1
 
 
-def test_a_missing_channel_names_the_nearest_one():
-    with pytest.raises(MissingChannelError, match="Did you mean 'motor_current_a'"):
-        make()["motor_curent_a"]
-
-
-@pytest.mark.parametrize("name", ["current", "jaw", "torque_mnm"])
-def test_a_name_without_a_unit_is_refused(name):
-    with pytest.raises(UnknownUnitError):
-        make(columns={name: np.zeros(100)})
-
-
-@pytest.mark.parametrize("times", [[0.0, 0.0, 1.0], [0.0, 2.0, 1.0], [0.0, np.nan, 1.0]])
-def test_time_must_increase(times):
-    with pytest.raises(RecordingError, match="time does not increase"):
-        make(time_s=np.array(times), columns={})
-
-
-def test_columns_must_have_the_length_of_time():
-    with pytest.raises(RecordingError, match="jaw_angle_rad has shape"):
-        make(columns={"jaw_angle_rad": np.zeros(7)})
+@pytest.mark.parametrize(
+    ("changes", "error", "match"),
+    [
+        ({"columns": {"torque_mnm": np.zeros(100)}}, UnknownUnitError, "carries no unit"),
+        ({"columns": {"current": np.zeros(100)}}, UnknownUnitError, "carries no unit"),
+        ({"columns": {"jaw_angle_rad": np.zeros(7)}}, RecordingError, "jaw_angle_rad has shape"),
+        ({"time_s": np.array([0.0, 0.0]), "columns": {}}, RecordingError, "does not increase"),
+        ({"time_s": np.array([0.0, 2.0, 1.0]), "columns": {}}, RecordingError, "does not increase"),
+        ({"time_s": np.array([0.0, np.nan]), "columns": {}}, RecordingError, "does not increase"),
+    ],
+)
+def test_what_is_no_recording_is_refused(changes, error, match):
+    with pytest.raises(error, match=match):
+        make(**changes)
 
 
 @given(st.floats(-0.05, 0.15), st.floats(-0.05, 0.15))
@@ -80,6 +74,8 @@ def test_rate_and_duration():
     assert make().duration_s == pytest.approx(0.099)
     with pytest.raises(RecordingError, match="no sample rate"):
         _ = make(1).sample_rate_hz
+    with pytest.raises(MissingChannelError, match="Did you mean 'motor_current_a'"):
+        make()["motor_curent_a"]
 
 
 def test_a_compliance_has_the_unit_of_an_angle_by_a_torque():

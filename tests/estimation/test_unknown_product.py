@@ -8,10 +8,8 @@ import pytest
 
 from estimation.effects import UnknownEffectError, catalogue, effect
 from estimation.effects.unknown_product import FORMS
-from estimation.estimators.model import ModelEstimator
-from estimation.model import Estimate, Model, Term, predict
+from estimation.model import Estimate, Model, Term
 from estimation.model_file import parse, to_toml
-from tests.estimation import synthetic
 
 EVERY = [*((f,) for f in FORMS), *pairs(FORMS, FORMS)]
 CHANNELS = {"first": "spindle_angle_rad", "second": "motor_velocity_rad_s"}
@@ -50,21 +48,6 @@ def test_a_model_file_holds_it_with_units(forms):
     assert again == model
     assert pickle.loads(pickle.dumps(term)) == term  # noqa: S301 - made here
     assert term.unit(term.effect.amplitudes[0], model.target).startswith("N m")
-
-
-def test_a_formula_runs_live_as_offline():
-    terms = (term_of("sign", "bump"), term_of("play"), term_of("cube", "sign"))
-    model = Model("made", "motor", "proximal_torque_n_m", terms)
-    run = synthetic.run("one", 0.4, 0.1, seed=1, seconds=2.0)
-    offline = predict(model, run, causal=True)
-    stepper = ModelEstimator(model).stepper(run.sample_rate_hz)
-    live = np.concatenate(
-        [
-            stepper.step(run.time_s[k : k + 7], {c: v[k : k + 7] for c, v in run.columns.items()})
-            for k in range(0, len(run), 7)
-        ]
-    )
-    assert live == pytest.approx(offline, rel=1e-12, abs=1e-15)
 
 
 def test_play_is_crossed_after_each_reversal():

@@ -2,17 +2,12 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from estimation import model_file
 from estimation.recording import Recording
-from rig.protocols.motion import motion_of
 from rig.protocols.protocol import Protocol
-from rig.simulation.bench import SimulatedBench
+from rig.simulation.campaign import bench_at, simulated_run
 from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import HiddenEffect
-from rig.simulation.play import play
-from rig.simulation.sensors import spindle_count_of
 
 MOTOR = model_file.read(Path("motor"))
 
@@ -43,21 +38,8 @@ PROTOCOL = Protocol.model_validate(
 def record(*effects: HiddenEffect) -> list[Recording]:
     """Play the small protocol on a rig that the declared equations describe, but for effects."""
     made = []
-    for k, plan in enumerate(PROTOCOL.plans()):
-        start = float(plan.target_angle_rad[0])
-        bench = SimulatedBench(DECLARED_PLANT, None, effects, k, 0)
-        bench = SimulatedBench(
-            DECLARED_PLANT, None, effects, k, spindle_count_of(start, bench.sensors)
-        )
-        motion = motion_of(plan, start)
-        columns = play(bench, motion.target_angle_rad, motion.load_command_a)
-        part = slice(motion.first, motion.last)
-        made.append(
-            Recording(
-                plan.name,
-                np.arange(motion.last - motion.first) * 1e-3,
-                {name: values[part] for name, values in columns.items()},
-                conditions=plan.conditions,
-            )
-        )
+    for seed, plan in enumerate(PROTOCOL.plans()):
+        start_rad = float(plan.target_angle_rad[0])
+        bench = bench_at(start_rad, DECLARED_PLANT, effects=effects, seed=seed)
+        made.append(simulated_run(bench, plan, "simulated"))
     return made

@@ -6,8 +6,8 @@ import pytest
 
 from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.transport.simulated import SimulatedTransport
-from rig.bench.board_start import BoardResetError
 from rig.bench.session import Session
+from rig.bench.trips import BoardResetError
 from rig.simulation.bench import SimulatedBench
 from tests.rig.simulated import simulated
 

@@ -101,16 +101,6 @@ def test_stop_without_a_rig_has_stopped_nothing_and_reports_it(capsys):
     assert "disarmed" not in out
 
 
-def test_a_simulated_calibration_stays_out_of_the_real_store(home, capsys):
-    words = ["calibrate", "gearbox", "--operator", "Ada", "--yes", "--sim"]
-    assert main([*words, "-o", "raw"]) == 0
-    assert not (home / "calibrations").exists()
-    assert (home / "calibrations-simulated").is_dir()
-    lines = capsys.readouterr().out.splitlines()
-    (hint,) = [line for line in lines if line.startswith("Use it:")]
-    assert main(hint.partition("rig ")[2].split()) == 0
-
-
 @pytest.mark.parametrize("words", ["torque", "fsr", "ft"])
 def test_a_force_sensor_that_would_be_ignored_is_refused(words, capsys):
     how = ["--operator", "Ada", "--yes", "--sim", "--force-sensor", "ati-net=udp:127.0.0.1:49152"]

@@ -2,12 +2,18 @@
 
 import json
 import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from calibration.record import Validity
 from calibration.store import CalibrationStore
+from rig.bench.session import Session
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED, load_config
+from rig.recording.campaign import open_campaign_folder, record_campaign
+from tests.rig.simulated import short_protocol, simulated, transport
 
 pytestmark = pytest.mark.integration
 
@@ -90,25 +96,17 @@ def test_diff_names_what_changed(rig, tmp_path, capsys):
     assert "slope 40 uN m a count" in capsys.readouterr().out
 
 
-def test_a_record_is_shown_with_units_and_spread(rig, tmp_path, capsys):
-    folders = ["--out", str(tmp_path / "raw"), "--store", str(tmp_path / "store")]
-    assert main(["calibrate", "current", "--sim", "--yes", "--operator", "Ada", *folders]) == 0
-    (digest,) = (r.content_hash for r in CalibrationStore(tmp_path / "store").records()
-                 if r.channel == "spindle_torque_n_m")  # fmt: skip
-    capsys.readouterr()
-    assert main(["cal", "show", digest]) == 0
-    said = capsys.readouterr().out
-    assert re.search(r"torque_constant_n_m_a: 8\d\d\.\d mN m/A \+- ", said)
-    assert "covariance" not in said
-
-
 def test_records_of_the_simulated_rig_are_listed_by_their_gains_and_found(
     monkeypatch, tmp_path, capsys
 ):
     monkeypatch.setenv("RIG_CALIBRATIONS", str(tmp_path / "store"))
     monkeypatch.chdir(tmp_path)
-    assert main(["calibrate", "current", "--sim", "--yes", "--operator", "Ada", "--use"]) == 0
-    said = " ".join(capsys.readouterr().out.split())
+    assert main(["calibrate", "current", "--sim", "--yes", "--operator", "Ada"]) == 0
+    out = capsys.readouterr().out
+    hints = [line for line in out.splitlines() if line.startswith("Use it:")]
+    assert [main(hint.partition("rig ")[2].split()) for hint in hints] == [0, 0]
+    said = " ".join(out.split())
+    capsys.readouterr()
     assert f'calibration_store = "{tmp_path / "store-simulated"}"' in said
     assert main(["cal", "list"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -117,19 +115,14 @@ def test_records_of_the_simulated_rig_are_listed_by_their_gains_and_found(
     assert re.search(r"SIM-TOOL-1: torque_constant_n_m_a 8\d\d\.\d mN m/A", constant)
     assert re.search(r": gain_a 2\.\d+ A", gain)
     assert main(["cal", "show", constant.split()[1]]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"torque_constant_n_m_a: 8\d\d\.\d mN m/A \+- ", said)
+    assert "covariance" not in said
     assert main(["cal", "use", constant.split()[1], "--by", "Ada"]) == 0
     assert not (tmp_path / "store").exists()
 
 
 def test_a_log_beyond_the_calibrated_range_is_reported(rig, tmp_path):
-    from dataclasses import replace
-
-    from calibration.record import Validity
-    from calibration.store import CalibrationStore
-    from rig.bench.session import Session
-    from rig.recording.campaign import open_campaign_folder, record_campaign
-    from tests.rig.simulated import short_protocol, simulated, transport
-
     config = simulated()
     plans = open_campaign_folder(tmp_path / "runs", short_protocol(1), config, resume=False)
     with Session(config, transport(config)) as session:
@@ -146,8 +139,6 @@ def test_a_log_beyond_the_calibrated_range_is_reported(rig, tmp_path):
 
 def test_a_log_is_exported_with_another_record(rig, tmp_path):
     """Twice the slope is twice the torque; the zero that was measured before the run stays."""
-    import numpy as np
-
     short = tmp_path / "short.toml"
     short.write_text(
         'name = "short"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2]\n'

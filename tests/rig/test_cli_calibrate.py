@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from calibration.fsr_curve import ZHANG_2022
+from calibration.sessions.current import CurrentSession
 from calibration.store import CalibrationStore
 from rig.calibrate.hands import SimulatedHands
+from rig.calibrate.shown import announced
 from rig.cli.main import main
 from rig.configuration.config import SIMULATED
 from rig.importers.registry import open_campaign
@@ -196,8 +198,6 @@ def test_a_refused_or_unattended_session_leaves_nothing(calibrate, tmp_path):
 
 
 def test_ctrl_c_leaves_nothing(calibrate, tmp_path, monkeypatch):
-    from rig.calibrate.hands import SimulatedHands
-
     prepare, seen = SimulatedHands.prepare, []
 
     def interrupted(self, step):
@@ -231,6 +231,8 @@ def test_a_person_sees_each_reading_and_can_go_back(typed):
     answers = ["", "", "banana", "", "b", *[""] * 5]
     code, out, err = typed(answers, "--out", "raw")
     assert code == 0
+    first = err.index("Calibration of torque: 7 steps with the logger, 7 of them set up by hand")
+    assert first < err.index("The rig does not move by itself.") < err.index("1/7")
     assert err.count("3/7") == 2  # the third step was measured again
     assert "counts, +0." in err or "counts, -0." in err
     assert "of the range off the line so far" in err
@@ -288,14 +290,6 @@ def test_a_zero_that_moves_within_a_run_is_an_alarm(tmp_path, capsys):
     assert "good: zero of distal_torque_n_m" in said
 
 
-def test_before_it_starts_a_session_states_what_it_needs_and_what_moves(
-    tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    shared = ["--operator", "Ada", "--yes", "--store", "store"]
-    assert main(["calibrate", "torque", "--masses-g", "50,100,150", *shared, "-o", "a"]) == 0
-    said = capsys.readouterr().err
-    first = said.index("Calibration of torque: 7 steps with the logger, 7 of them set up by hand")
-    assert first < said.index("The rig does not move by itself.") < said.index("1/7")
-    assert main(["calibrate", "current", *shared, "-o", "b"]) == 0
-    assert "The rig moves by itself: the spindle turns between" in capsys.readouterr().err
+def test_a_session_that_moves_the_rig_states_how_far():
+    _, moving, *_ = announced(CurrentSession())
+    assert moving.startswith("The rig moves by itself: the spindle turns between")

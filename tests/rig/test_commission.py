@@ -56,7 +56,7 @@ def results(
     bench: MiswiredBench, monkeypatch: pytest.MonkeyPatch, config: Config | None = None
 ) -> dict[str, bool]:
     link = SimulatedTransport(FirmwareBoard(bench), step_s=0.02)
-    monkeypatch.setattr("rig.doctor.commission.open_logger", lambda _: link)
+    monkeypatch.setattr("rig.bench.logger.open_logger", lambda _: link)
     return {check.name: check.passed for check in commission(config or simulated())}
 
 
@@ -90,7 +90,7 @@ def test_a_wrong_wire_is_named_and_the_shaft_hardly_turns(
 def test_a_board_without_zeros_does_not_move(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = MiswiredBench({})
     link = SimulatedTransport(FirmwareBoard(bench, BoardStart(simulated=False)), step_s=0.02)
-    monkeypatch.setattr("rig.doctor.commission.open_logger", lambda _: link)
+    monkeypatch.setattr("rig.bench.logger.open_logger", lambda _: link)
     *_, last = commission(simulated())
     assert not last.passed
     assert "rig reference" in last.detail

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
-from estimation.diagnosis.paths import path_of, split_paths
+from estimation.diagnosis.split import cut_and_split, path_of
 from estimation.recording import Recording
 from rig.arm.simulated import RATE_HZ, draw_arm, excitation, recorded, simulate
 from rig.cli.main import main
 from rig.diagnosis import subject
-from rig.diagnosis.noise import repeats
+from rig.diagnosis.run import repeats
 from rig.diagnosis.schema import DiagnosisSchema
 
 pytestmark = pytest.mark.long
@@ -62,7 +62,7 @@ def test_whole_periods_of_one_path_are_repeats() -> None:
     paths = [
         Recording(n, time_s, {"joint_1_angle_rad": a}) for n, a in zip("ab", angles, strict=True)
     ]
-    pieces, _ = split_paths(paths)
+    pieces, _ = cut_and_split(paths)
     lengths = {piece.name: len(piece) for piece in pieces}
     pairs = repeats(pieces)
     assert {path_of(name) for pair in pairs for name in pair} == {"a", "b"}

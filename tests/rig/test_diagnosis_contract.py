@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,18 +20,7 @@ from estimation.diagnosis.result import (
 )
 from estimation.diagnosis.split import Sealed
 from estimation.effects import families
-from rig.diagnosis.schema import DiagnosisSchema, json_schema
-
-FIELDS = {
-    "schema", "verdict", "findings", "rmse_before", "rmse_after", "rmse_with_means_before",
-    "rmse_with_means_after", "unit", "noise_floor", "runs", "next_experiment",
-    "declared_parameters_moved", "exploratory", "seed", "seconds",
-}  # fmt: skip
-OF_FINDING = {
-    "balance", "also_in", "place", "family", "verdict", "alternatives", "probabilities",
-    "depends_on", "confidence", "parameters", "rmse_before", "rmse_after", "runs_improved",
-    "runs_total", "runs_affected",
-}  # fmt: skip
+from rig.diagnosis.schema import FILE, DiagnosisSchema, json_schema
 
 BALANCES = st.sampled_from(["motor", "gearbox", "cable", "stretch", "joint.3", "calibration.force"])
 NUMBERS = st.floats() | st.sampled_from([float("nan"), float("inf")])
@@ -65,7 +55,7 @@ def findings(draw: st.DrawFn) -> Finding:
 
 @st.composite
 def diagnoses(draw: st.DrawFn) -> Diagnosis:
-    told = tuple(draw(st.lists(findings(), max_size=3)))
+    found = tuple(draw(st.lists(findings(), max_size=3)))
     error = st.builds(
         Error, NUMBERS, NUMBERS, NUMBERS, NUMBERS, st.tuples(NUMBERS, NUMBERS), st.just({}),
         st.just({}),
@@ -73,7 +63,7 @@ def diagnoses(draw: st.DrawFn) -> Diagnosis:
     names = draw(st.lists(BALANCES, unique=True, max_size=3))
     moved = {"friction.coulomb.friction": {"before": draw(NUMBERS), "after": draw(NUMBERS)}}
     return Diagnosis(
-        findings=told,
+        findings=found,
         errors={name: draw(error) for name in names},
         unit=dict.fromkeys(names, "N m"),
         noise_floor={name: draw(st.none() | NUMBERS) for name in names},
@@ -89,26 +79,21 @@ def diagnoses(draw: st.DrawFn) -> Diagnosis:
 def test_every_field_is_there_and_no_number_is_undefined(diagnosis: Diagnosis) -> None:
     text = json.dumps(diagnosis.to_json(), allow_nan=False)
     found: dict[str, Any] = json.loads(text)
-    assert found.keys() >= FIELDS
-    assert found["schema"] == SCHEMA
-    assert (found["findings"] == []) == (found["verdict"] == "nothing_missing")
-    assert [f["family"] for f in found["findings"]] == [f.family for f in diagnosis.findings]
-    for finding in found["findings"]:
-        assert finding.keys() == OF_FINDING
-        assert finding["family"] not in finding["alternatives"]
-        assert VERDICTS.index(found["verdict"]) >= VERDICTS.index(finding["verdict"])
-        for known in finding["parameters"].values():
-            assert known.keys() == {"value", "unit", "ci95"}
-    assert found["runs"].keys() == {"discover", "confirm"}
     DiagnosisSchema.model_validate(found)
+    assert found["schema"] == SCHEMA
+    weakest = max((f["verdict"] for f in found["findings"]), key=VERDICTS.index, default="")
+    assert found["verdict"] == (weakest or "nothing_missing")
+    assert [f["family"] for f in found["findings"]] == [f.family for f in diagnosis.findings]
 
 
-def test_the_published_schema_requires_every_field_and_lists_every_family() -> None:
-    schema = json.loads(json_schema())
-    assert set(schema["required"]) == FIELDS
-    assert set(schema["$defs"]["Finding"]["required"]) == OF_FINDING
-    assert schema["$defs"]["Finding"]["additionalProperties"] is False
-    assert set(schema["$defs"]["Finding"]["properties"]["family"]["enum"]) == set(families())
+def test_the_published_schema_is_the_one_that_checks_and_nothing_is_optional() -> None:
+    schema = json.loads((Path(__file__).parents[2] / FILE).read_text())
+    assert json_schema() == json.dumps(schema, indent=2) + "\n"
+    finding = schema["$defs"]["Finding"]
+    assert set(schema["required"]) == set(schema["properties"])
+    assert set(finding["required"]) == set(finding["properties"])
+    assert finding["additionalProperties"] is False
+    assert set(finding["properties"]["family"]["enum"]) == set(families())
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,9 @@ from rig.configuration.config import load_config
 from rig.diagnosis import loop as looping
 from rig.diagnosis.loop import NO_RIVALS, NOTHING, SPENT, UNIQUE, Budget, run_loop
 from rig.errors import UsageError
-from rig.protocols.protocol import load_protocol
+from rig.protocols.protocol import load_protocol, protocol_toml
 from rig.simulation.hidden import NAMES, UnknownHiddenEffectError, chosen
+from tests.rig.rippled import PROTOCOL
 from tests.rig.simulated import short_protocol, simulated
 
 pytestmark = pytest.mark.long
@@ -31,7 +32,7 @@ NEXT = {
 
 
 def answer(verdict: str, proposed=None) -> Diagnosis:
-    finding = Finding("motor", "friction.load", verdict, 1.0, 0.5, 1, 1)
+    finding = Finding(balance="motor", family="friction.load", verdict=verdict)
     return Diagnosis(
         (finding,), {}, {}, {}, {}, Sealed((), (), 0, "", ""), next_experiment=proposed
     )
@@ -44,10 +45,9 @@ def diagnosed(monkeypatch):
 
     def stand_in(campaign, models, ledger, **_):
         told.seen.append(campaign.names)
-        return SimpleNamespace(diagnosis=told.answers[len(told.seen) - 1])
+        return SimpleNamespace(diagnosis=told.answers[len(told.seen) - 1]), {}
 
     monkeypatch.setattr(looping, "run_diagnosis", stand_in)
-    monkeypatch.setattr(looping, "remember", lambda *_: None)
     return told
 
 
@@ -93,12 +93,12 @@ def test_a_loop_ends_with_its_budget(tmp_path, diagnosed):
 def test_a_real_rig_a_full_folder_and_an_empty_budget_are_refused(tmp_path, capsys):
     real = load_config().changed(logger={"url": "socket://nowhere:1"})
     with pytest.raises(UsageError, match="real rig"):
-        list(run_loop(tmp_path, real, [], Budget()))
+        list(run_loop(tmp_path, real, [], Budget(3, 20.0)))
     (tmp_path / "there").write_text("")
     with pytest.raises(UsageError, match="not empty"):
-        list(run_loop(tmp_path, simulated(), [], Budget()))
+        list(run_loop(tmp_path, simulated(), [], Budget(3, 20.0)))
     with pytest.raises(UsageError, match="allows nothing"):
-        Budget(0)
+        Budget(0, 20.0)
     assert main(["loop"]) == 2
     assert "--sim" in capsys.readouterr().err
 
@@ -116,11 +116,7 @@ def test_what_is_hidden_is_chosen_by_name_by_seed_or_not_at_all():
 
 
 def test_the_whole_loop_names_what_is_hidden(tmp_path, capsys):
-    from tests.rig.rippled import PROTOCOL
-
     protocol = tmp_path / "first.toml"
-    from rig.protocols.protocol import protocol_toml
-
     protocol.write_text(protocol_toml(PROTOCOL))
     words = ["loop", "--sim", "--hide", "motor_ripple=1.0", "--equation", "motor", "--quick"]
     words += ["--protocol", str(protocol), "--out", str(tmp_path / "loop"), "--seed", "1"]

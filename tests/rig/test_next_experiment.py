@@ -1,8 +1,14 @@
-"""Noise floor and next experiment from logs of the simulated rig."""
+"""Noise floor and next experiment from logs of the simulated rig, here and on a cluster."""
 
 import json
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,16 +17,17 @@ from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
 from rig.configuration.config import load_config
-from rig.diagnosis.menu import menu, room_of, within
-from rig.diagnosis.noise import noise_floors, repeats
-from rig.diagnosis.propose import propose, write_protocol
-from rig.diagnosis.simulated import simulated_rig
+from rig.diagnosis.propose import menu, propose, simulated_rig, within, write_protocol
+from rig.diagnosis.run import noise_floors, repeats
+from rig.diagnosis.work import engine
+from rig.errors import UsageError
 from rig.protocols.protocol import load_protocol, protocol_toml
 from rig.simulation.hidden import HiddenEffect
-from rig.simulation.twin import Twin
 from tests.rig.rippled import MOTOR, record
 
 pytestmark = pytest.mark.long
+
+PATIENCE_S = 120.0
 
 
 @pytest.fixture(scope="module")
@@ -42,27 +49,25 @@ def doubtful(answered: Answer) -> Answer:
 
 
 @pytest.fixture(scope="module")
-def rig(answered: Answer, rippled: list[Recording]) -> Twin:
-    fitted = [e.model for e in answered.layout.equations.values()]
-    made = simulated_rig(fitted, rippled)
-    assert made is not None
-    return made
+def proposed(doubtful: Answer, rippled: list[Recording]) -> dict[str, Any]:
+    found = propose(doubtful, rippled)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def bare(rippled: list[Recording]) -> list[Recording]:
+    """The runs without a channel that the simulated rig needs."""
+    return [
+        replace(r, columns={n: v for n, v in r.columns.items() if n != "load_command_a"})
+        for r in rippled
+    ]
 
 
 def test_a_sure_name_needs_no_experiment(answered: Answer, rippled: list[Recording]) -> None:
     assert answered.diagnosis.findings[0].family == "ripple.motor"
     assert answered.diagnosis.verdict == "identified"
     assert propose(answered, rippled) is None
-
-
-def test_runs_without_the_rigs_channels_cannot_be_simulated(
-    answered: Answer, rippled: list[Recording]
-) -> None:
-    bare = [
-        replace(r, columns={n: v for n, v in r.columns.items() if n != "load_command_a"})
-        for r in rippled
-    ]
-    assert simulated_rig([e.model for e in answered.layout.equations.values()], bare) is None
 
 
 def test_repeats_are_found_by_what_was_asked(rippled: list[Recording]) -> None:
@@ -84,10 +89,12 @@ def test_the_noise_floor_is_below_the_error_that_remains(
 
 
 def test_every_experiment_of_the_menu_is_a_protocol_within_the_limits(
-    rippled: list[Recording], rig: Twin, tmp_path
+    answered: Answer, rippled: list[Recording], tmp_path
 ) -> None:
+    rig = simulated_rig([e.model for e in answered.layout.equations.values()], rippled)
+    assert rig is not None
     limits = load_config().limits
-    offered = menu(room_of(rippled, limits))
+    offered = menu(rippled, limits)
     assert len({protocol.name for protocol in offered}) == len(offered) >= 8
     for protocol in offered:
         path = tmp_path / f"{protocol.name}.toml"
@@ -97,18 +104,13 @@ def test_every_experiment_of_the_menu_is_a_protocol_within_the_limits(
         assert len(protocol.plans()) >= 3  # some train, one tests
         first = rig.play(protocol.plans()[0], 1)
         assert within([first], limits), protocol.name
-
-
-def test_a_limit_keeps_an_experiment_away(rippled: list[Recording]) -> None:
-    tight = load_config().limits.model_copy(update={"motor_current_a": 1e-3})
+    tight = limits.model_copy(update={"motor_current_a": 1e-3})
     assert not within(rippled[:1], tight)
 
 
 def test_a_set_gets_an_experiment_that_record_can_run(
-    rippled: list[Recording], doubtful: Answer, tmp_path
+    proposed: dict[str, Any], doubtful: Answer, tmp_path
 ) -> None:
-    proposed = propose(doubtful, rippled)
-    assert proposed is not None
     assert proposed["between"][0] == "ripple.motor"
     assert len(set(proposed["between"])) == len(proposed["between"]) >= 2
     assert proposed["discrimination"] > max(0.0, *proposed["others"].values()) - 0.1
@@ -120,12 +122,9 @@ def test_a_set_gets_an_experiment_that_record_can_run(
 
 
 def test_without_a_simulated_rig_the_experiment_is_described(
-    rippled: list[Recording], doubtful: Answer, tmp_path
+    bare: list[Recording], doubtful: Answer, tmp_path
 ) -> None:
-    bare = [
-        replace(r, columns={n: v for n, v in r.columns.items() if n != "load_command_a"})
-        for r in rippled
-    ]
+    assert simulated_rig([e.model for e in doubtful.layout.equations.values()], bare) is None
     by_hand = propose(doubtful, bare)
     assert by_hand is not None
     assert by_hand["protocol"] is None
@@ -136,7 +135,93 @@ def test_without_a_simulated_rig_the_experiment_is_described(
 
 
 def test_processes_propose_the_experiment_of_one(
-    rippled: list[Recording], doubtful: Answer
+    proposed: dict[str, Any], rippled: list[Recording], doubtful: Answer
 ) -> None:
     with ProcessPoolExecutor(2) as executor:
-        assert propose(doubtful, rippled, executor) == propose(doubtful, rippled)
+        assert propose(doubtful, rippled, executor) == proposed
+
+
+@dataclass
+class Cluster:
+    """A scheduler and its workers, each a process of this test."""
+
+    address: str
+    workers: list[subprocess.Popen[bytes]] = field(default_factory=list)
+
+
+def start(module: str, *words: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-W", "ignore", "-m", f"distributed.cli.{module}", *words]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    pytest.importorskip("distributed")
+    known = tmp_path / "scheduler.json"
+    local = ("--host", "127.0.0.1", "--no-dashboard")
+    processes = [start("dask_scheduler", *local, "--port", "0", "--scheduler-file", str(known))]
+    try:
+        deadline = time.monotonic() + PATIENCE_S
+        while not known.exists() or not known.read_text().strip():
+            assert time.monotonic() < deadline, "the scheduler did not start"
+            time.sleep(0.05)
+        made = Cluster(json.loads(known.read_text())["address"])
+        for k in range(2):
+            folder = str(tmp_path / f"worker{k}")
+            words = (*local, "--nthreads", "1", "--no-nanny", "--local-directory", folder)
+            made.workers.append(start("dask_worker", made.address, *words))
+        processes += made.workers
+        yield made
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+class Losing:
+    """An executor that loses one worker when work has been given to both."""
+
+    def __init__(self, executor: Executor, victim: subprocess.Popen[bytes]) -> None:
+        self.executor, self.victim, self.maps = executor, victim, 0
+
+    def map(self, *arguments):
+        self.maps += 1
+        results = self.executor.map(*arguments)
+        self.victim.kill()
+        self.victim.wait()
+        return results
+
+
+@pytest.mark.filterwarnings("ignore")  # the cluster's own, about sizes and versions
+def test_a_cluster_that_loses_a_worker_gives_the_same_experiment(
+    cluster: Cluster, proposed: dict[str, Any], rippled: list[Recording], doubtful: Answer
+) -> None:
+    import distributed
+
+    with engine(scheduler=cluster.address) as executor:
+        client = distributed.get_client(cluster.address)
+        client.wait_for_workers(2, timeout=PATIENCE_S)
+        losing = Losing(executor, cluster.workers[0])
+        there = propose(doubtful, rippled, losing)
+        assert losing.maps == 1
+        assert len(client.scheduler_info()["workers"]) == 1
+    assert there == proposed
+
+
+def test_without_workers_the_work_is_done_here() -> None:
+    with engine() as executor:
+        assert executor is None
+    with engine(2) as executor:
+        future: Future[int] = executor.submit(abs, -3)
+        assert future.result() == 3
+
+
+def test_no_workers_and_no_scheduler_are_usage_errors() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(UsageError, match="1 or more"), engine(0):
+        pass
+    with (
+        pytest.raises(UsageError, match="No scheduler answers"),
+        engine(scheduler="tcp://127.0.0.1:1", connect_s=0.2),
+    ):
+        pass

@@ -12,7 +12,6 @@ from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.protocol import STATUS_REFERENCED, Kind, Result
 from drivers.teensy.reference import Limits
 from drivers.transport.simulated import SimulatedTransport
-from rig.bench import hard_stop, referencing
 from rig.bench.session import Session
 from rig.cli.main import main
 from rig.simulation.bench import SimulatedBench
@@ -20,6 +19,7 @@ from rig.simulation.places import JAW_ANGLE, SPINDLE_ANGLE
 from tests.drivers.raw_host import RawHost
 from tests.rig.simulated import simulated
 
+OPENS = "rig.bench.logger.open_logger"
 STILL = (np.full(50, 0.3), np.zeros(50))
 
 
@@ -27,9 +27,7 @@ STILL = (np.full(50, 0.3), np.zeros(50))
 def restarted(library: Path, monkeypatch: pytest.MonkeyPatch) -> FirmwareBoard:
     """A board without zeros; every link that the command opens goes to it."""
     board = FirmwareBoard(SimulatedBench(), BoardStart(boot=9, simulated=False), library)
-    monkeypatch.setattr(
-        referencing, "open_logger", lambda config: SimulatedTransport(board, "sim://")
-    )
+    monkeypatch.setattr(OPENS, lambda config: SimulatedTransport(board, "sim://"))
     return board
 
 
@@ -84,11 +82,8 @@ def test_the_index_stands_for_the_mark(
     assert played(restarted) < 0.02
 
 
-def driven(restarted: FirmwareBoard, monkeypatch: pytest.MonkeyPatch, *words: str) -> int:
+def driven(*words: str) -> int:
     """Run the command with a hard stop against the board."""
-    monkeypatch.setattr(
-        hard_stop, "open_logger", lambda config: SimulatedTransport(restarted, "sim://")
-    )
     return main(["reference", "--sim", "--yes", *words])
 
 
@@ -100,10 +95,8 @@ def test_a_gentle_drive_finds_the_same_stop_from_two_places(
     for start_count in (900, 300):
         bench = SimulatedBench(start_count=start_count)
         board = FirmwareBoard(bench, BoardStart(boot=9, simulated=False), library)
-        monkeypatch.setattr(
-            referencing, "open_logger", lambda config, b=board: SimulatedTransport(b, "sim://")
-        )
-        assert driven(board, monkeypatch, "--hard-stop", stop, "--at", "0") == 0
+        monkeypatch.setattr(OPENS, lambda config, b=board: SimulatedTransport(b, "sim://"))
+        assert driven("--hard-stop", stop, "--at", "0") == 0
         found_rad.append(bench.state[SPINDLE_ANGLE])
         assert not board.in_force
     assert abs(found_rad[0] - found_rad[1]) < 0.02
@@ -112,10 +105,10 @@ def test_a_gentle_drive_finds_the_same_stop_from_two_places(
 
 
 def test_a_shaft_that_does_not_turn_is_no_stop(
-    restarted: FirmwareBoard, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    restarted: FirmwareBoard, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert driven(restarted, monkeypatch, "--hard-stop", "closed") == 0
-    assert driven(restarted, monkeypatch, "--hard-stop", "closed") == 2
+    assert driven("--hard-stop", "closed") == 0
+    assert driven("--hard-stop", "closed") == 2
     assert "did not turn" in capsys.readouterr().err
 
 

@@ -52,7 +52,7 @@ def failing(config: Config, monkeypatch: pytest.MonkeyPatch, change: object) -> 
         link = transport(config)
         return SimulatedTransport(Wrapped(link.board, lambda data: change(link.board, data)))  # type: ignore[operator]
 
-    monkeypatch.setattr("rig.doctor.selftest.open_logger", opened)
+    monkeypatch.setattr("rig.bench.logger.open_logger", opened)
     monkeypatch.setattr("rig.bench.devices.open_logger", opened)
     return [check.name for check in selftest(config) if not check.passed]
 

@@ -74,8 +74,9 @@ def test_two_encoders_that_lose_counts_alike_let_the_spindle_hardly_beyond(libra
 def counts_of(seed: int, plan: RunPlan) -> np.ndarray:
     """Counts of a run of a drawn rig that nothing watches."""
     motion = motion_of(plan, float(plan.target_angle_rad[0]))
-    target = np.round(motion.target_angle_rad * PER_RAD[SPINDLE]).astype(np.int32)
-    load_ma = np.round(1e3 * motion.load_command_a).astype(np.int32)
+    angle_rad, load_a = motion.setpoints
+    target = np.round(angle_rad * PER_RAD[SPINDLE]).astype(np.int32)
+    load_ma = np.round(1e3 * load_a).astype(np.int32)
     plant = vary(PlantParameters(), seed, 0.15)
     bench = SimulatedBench(plant, effects=[draw(seed)], seed=seed, start_count=int(target[0]))
     return bench.advance(target.size, target, load_ma, Drive.armed(REFERENCE_GAINS))

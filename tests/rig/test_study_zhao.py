@@ -10,8 +10,7 @@ from estimation.filters import CausalFilter, LowPass
 from estimation.model import Estimate, Term
 from estimation.model_file import parse, to_toml
 from rig.cli.main import main
-from rig.grasper.angle_led import angle_led
-from rig.grasper.current_force import CurrentForce
+from rig.grasper.current_force import CurrentForce, angle_led
 from rig.grasper.hidden import FAMILIES, OWN, with_family
 from rig.grasper.inputs import end_of_hold, hold
 from rig.grasper.plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis

@@ -17,12 +17,15 @@ folder of them is given by path.
   current, 6 % of which are the first two harmonics of the angle.
 """
 
+import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from benchmarks.diagnosis.case import (
     MACHINE,
@@ -32,7 +35,7 @@ from benchmarks.diagnosis.case import (
     Report,
     write_recordings,
 )
-from benchmarks.diagnosis.machines.errors import errors
+from estimation.diagnosis.split import path_of
 from estimation.recording import Recording
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import read_runs
@@ -159,9 +162,7 @@ def read(folder: Path, hand_over: HandOver) -> list[Recording]:
 
 def judge(runs: Sequence[Recording], hand_over: HandOver, report: Report) -> Judgement:
     """Judge an answer: a known effect is named, or in the set, and nothing else is surely."""
-    note = "; ".join(
-        part for part in (errors(runs, hand_over.target, report).percent(), hand_over.note) if part
-    )
+    note = "; ".join(filter(None, (_errors(runs, hand_over.target, report), hand_over.note)))
     if not hand_over.known:
         return Judgement(None, note=note)
     findings = report["findings"]
@@ -174,3 +175,15 @@ def judge(runs: Sequence[Recording], hand_over: HandOver, report: Report) -> Jud
     wrong = [confidence for confidence in others if confidence > WRONG]
     sure = any(confidence >= SURE for confidence in wrong)
     return Judgement(named and not wrong, sure, len(others), note=note)
+
+
+def _errors(runs: Sequence[Recording], target: str, report: Report) -> str:
+    """Return the errors of the test runs that an answer states, in percent of the target there."""
+    names = {path_of(name) for name in report["runs"]["confirm"]}  # of parts, the whole recordings
+    test = [run[target] for run in runs if run.name in names]
+    size = math.sqrt(float(np.mean(np.concatenate(test) ** 2)))
+    stated = [report[f"rmse_with_means_{when}"].get("motor") for when in ("before", "after")]
+    if None in stated:
+        return "no error stated"
+    before, after = (100 * error / size for error in stated)
+    return f"{before:.2f} -> {after:.2f} %"

@@ -3,7 +3,7 @@
 import io
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from rig.errors import DataError, MissingExtraError
 from rig.importers.matlab import read_variables
 from rig.importers.table.data import Layout
-from rig.importers.table.raw import Raw, Values
+from rig.importers.table.raw import Raw, Values, nested
 
 
 def read_parquet(path: Path, layout: Layout) -> Raw:
@@ -75,15 +75,8 @@ def read_mat(path: Path, layout: Layout) -> Raw:
         DataError: It is damaged, or of version 7.3.
     """
     del layout
-    return _of_arrays(path, dict(_flat(read_variables(path))))
-
-
-def _flat(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{above}{name}.")
-        elif isinstance(value, np.ndarray | str):
-            yield above + name, value
+    values = nested(read_variables(path))
+    return _of_arrays(path, {n: v for n, v in values if isinstance(v, np.ndarray | str)})
 
 
 def _of_arrays(path: Path, values: Mapping[str, Any]) -> Raw:

@@ -6,10 +6,9 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from estimation.channels import UnknownUnitError, unit_of
+from estimation.channels import UnknownUnitError, unit_of, unit_or_none
 from estimation.recording import FloatArray
 from rig.errors import DataError
-from rig.importers.matlab import carries_unit
 from rig.importers.table.data import DATE, TIME, Source
 from rig.importers.table.delimited import bad_cell
 from rig.importers.table.formula import FormulaError, evaluate, names_in
@@ -67,7 +66,7 @@ def to_samples(raw: Raw, mapping: Mapping) -> Samples:
             raw.listing(),
             "Map one, --column time_s=COLUMN:ms, or state --rate HZ.",
         )
-    for name, formula in _in_order(mapping, {*channels, *conditions, TIME}):
+    for name, formula in _in_order(mapping):
         known = {**conditions, **channels, TIME: time_s}
         try:
             values = np.asarray(evaluate(formula, known), dtype=np.float64)
@@ -109,7 +108,7 @@ def find(raw: Raw, mapping: Mapping, path: Sequence[str], name: str) -> Values |
 def _by_name(raw: Raw, mapping: Mapping) -> dict[str, Source]:
     """Return the columns that are named as channels, where no column is mapped at all."""
     found = {
-        name: Source(column=name) for name in raw.columns if carries_unit(name) and name.islower()
+        name: Source(column=name) for name in raw.columns if unit_or_none(name) and name.islower()
     }
     used = {one for formula in mapping.data.formulas.values() for one in names_in(formula)}
     if not set(found) - {TIME} and not used:
@@ -176,7 +175,7 @@ def _condition(raw: Raw, mapping: Mapping, name: str, source: Source) -> float |
     path = ("conditions", name)
     found = find(raw, mapping, path, source.column)
     many = found if isinstance(found, np.ndarray) else np.array([found])
-    if many.dtype.kind in "US" and carries_unit(name):
+    if many.dtype.kind in "US" and unit_or_none(name):
         try:
             many = many.astype(np.float64)
         except ValueError as error:
@@ -210,7 +209,7 @@ def _dates(raw: Raw, mapping: Mapping, source: Source) -> tuple[FloatArray, int]
     return np.array(since), round(at[0].timestamp() * 1e6) * 1000
 
 
-def _in_order(mapping: Mapping, known: set[str]) -> list[tuple[str, str]]:
+def _in_order(mapping: Mapping) -> list[tuple[str, str]]:
     """Return the formulas so that each comes after those that it reads."""
     left = dict(mapping.data.formulas)
     ordered: list[tuple[str, str]] = []
@@ -222,15 +221,8 @@ def _in_order(mapping: Mapping, known: set[str]) -> list[tuple[str, str]]:
                 f" circle: {', '.join(left)}."
             )
         ordered += [(name, left.pop(name)) for name in ready]
-    for name, text in ordered:
+    for name, _ in ordered:
         _check_unit(mapping, name)
-        missing = set(names_in(text)) - known - {n for n, _ in ordered}
-        if missing:
-            raise DataError(
-                f"{mapping.where('formulas', name)}: no channel or condition is called"
-                f" {sorted(missing)[0]!r}.",
-                f"There are {', '.join(sorted(known))}.",
-            )
     return ordered
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from rig.errors import DataError
 from rig.importers.table.data import Layout
-from rig.importers.table.raw import Raw, Values, numbers_or_text
+from rig.importers.table.raw import Raw, Values, nested, numbers_or_text
 
 
 def read_json(path: Path, layout: Layout) -> Raw:
@@ -38,7 +38,7 @@ def read_json(path: Path, layout: Layout) -> Raw:
         return _of_rows(path, whole, {})
     if not isinstance(whole, dict):
         raise DataError(f"{path} holds no samples.", "Objects with one key a column are expected.")
-    lists = {k: v for k, v in _nested(whole) if isinstance(v, list) and v}
+    lists = {k: v for k, v in nested(whole) if isinstance(v, list) and v}
     key = layout.rows or _only(path, lists)
     if key not in lists:
         raise DataError(
@@ -46,7 +46,7 @@ def read_json(path: Path, layout: Layout) -> Raw:
         )
     fields = {
         k: v if isinstance(v, str) else float(v)
-        for k, v in _nested(whole)
+        for k, v in nested(whole)
         if isinstance(v, int | float | str)
     }
     if isinstance(lists[key][0], dict):
@@ -100,17 +100,9 @@ def _text(cell: Any) -> str:
     return "" if cell is None else str(cell)
 
 
-def _nested(value: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    for name, inner in value.items():
-        if isinstance(inner, Mapping):
-            yield from _nested(inner, f"{above}{name}.")
-        else:
-            yield above + str(name), inner
-
-
 def _spread(row: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the values of a sample; a list becomes `q.1`, `q.2` and so on."""
-    for name, value in _nested(row):
+    for name, value in nested(row):
         if isinstance(value, list):
             yield from ((f"{name}.{k + 1}", one) for k, one in enumerate(value))
         else:

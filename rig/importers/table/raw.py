@@ -1,8 +1,10 @@
 """The content of one file of a table, as it is there: columns of samples and single values."""
 
 import difflib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +76,15 @@ def checked(raw: Raw) -> Raw:
             "Save the samples of one run as columns of the same length.",
         )
     return raw
+
+
+def nested(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values of a tree of tables; one inside another is called `outer.inner`."""
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from nested(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value
 
 
 def to_number(text: str) -> float:

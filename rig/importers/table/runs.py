@@ -125,16 +125,16 @@ def _run(
 
 
 def _check_clock(samples: Samples, part: slice, time_s: FloatArray) -> None:
-    steps = np.diff(time_s)
-    if np.isfinite(time_s).all() and (steps > 0).all():
-        return
-    place = int(np.argmin(np.isfinite(time_s))) if not np.isfinite(time_s).all() else -1
-    where = part.start or 0
-    if place >= 0:
+    where, is_there = part.start or 0, np.isfinite(time_s)
+    if not is_there.all():
         raise DataError(
-            f"{samples.raw.path}, {samples.raw.row(where + place)}: the time is empty.",
+            f"{samples.raw.path}, {samples.raw.row(where + int(np.argmin(is_there)))}: the time is"
+            " empty.",
             fix="Correct the file, or state a sample rate in place of the time column.",
         )
+    steps = np.diff(time_s)
+    if (steps > 0).all():
+        return
     back = int(np.argmax(steps <= 0)) + 1
     before, after = float(time_s[back - 1]), float(time_s[back])
     raise DataError(

@@ -4,24 +4,24 @@ import inspect
 import math
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.diagnosis.result import Diagnosis, Finding
+from estimation.causes.verdict import Answer
+from estimation.diagnosis.result import Finding
 from estimation.effects import catalogue
 from estimation.errors import EstimationError
 from estimation.model import Model
 from estimation.plant_models import declared
-from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import run_diagnosis
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
-from rig.machines.moving import with_motion
+from rig.machines.recordings import with_motion
 from rig.machines.shipped import place_of, read_machine
 from rig.output.provenance import Provenance
 from rig.reports.diagnosis_words import sentences
@@ -133,20 +133,16 @@ def _rows(case: Case, campaign: Campaign, seed: int) -> list[Row]:
     models = [model for model in models if case.equation in ("", model.balance)]
     campaign = with_motion(campaign, models)
     with tempfile.TemporaryDirectory(prefix="study-") as place:
-        done = run_diagnosis(
+        answer, _ = run_diagnosis(
             campaign, models, Ledger(Path(place) / "looks.jsonl"), seed=seed, quick=True
         )
-    found = done.diagnosis
-    return [_row(case, model, found, done.recordings) for model in models if _is_in(model, found)]
+    return [_row(case, model, answer) for model in models if model.balance in answer.refits.of]
 
 
-def _is_in(model: Model, found: Diagnosis) -> bool:
-    return model.balance in found.errors
-
-
-def _row(case: Case, model: Model, found: Diagnosis, recordings: Sequence[Recording]) -> Row:
-    name = model.balance
-    held_out = [r[model.target][r.valid] for r in recordings if r.name in set(found.sealed.confirm)]
+def _row(case: Case, model: Model, answer: Answer) -> Row:
+    name, found = model.balance, answer.diagnosis
+    runs = [answer.refits.of[name].recordings[run] for run in found.sealed.confirm]
+    held_out = [run[model.target][run.valid] for run in runs]
     size = math.sqrt(float(np.mean(np.concatenate(held_out) ** 2)))
     error = found.errors[name]
     before, after = (

@@ -18,8 +18,7 @@ from estimation.filters import LowPass
 from estimation.fitting import fit
 from estimation.model import Model, Term, predict
 from estimation.recording import FloatArray, Recording
-from rig.grasper.angle_led import angle_led
-from rig.grasper.current_force import CurrentForce
+from rig.grasper.current_force import CurrentForce, angle_led
 from rig.grasper.hidden import OWN, with_family
 from rig.grasper.inputs import end_of_hold, hold, periodic
 from rig.grasper.plant import RATE_HZ, AxisParameters, Prototype, play_axis, vary

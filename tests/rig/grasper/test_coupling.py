@@ -1,4 +1,4 @@
-"""Every grasper behind one interface: inverse, power, decoupling, residual coupling, limits."""
+"""Graspers: inverse, power, decoupling, the wrist's path lengths, the choice among 27 designs."""
 
 import math
 from dataclasses import replace
@@ -9,16 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from rig.grasper.coupling import Coupling, GrasperError, Limits
-from rig.grasper.dvrk import TOOLS, dvrk_coupling
-from rig.grasper.three_dof import Drive, planetary_grasper
-from rig.grasper.wrist import CablePath, Planetary
+from rig.grasper.coupling import Coupling, GrasperError
+from rig.grasper.dvrk import dvrk_coupling, dvrk_couplings
+from rig.grasper.wrist import CablePath, Planetary, designs, most_compact, planetary_grasper
 
 PATH = CablePath(0.004, 0.004, 0.005, 0.01, 0.006, 0.008)
 GRASPERS = [
     planetary_grasper(PATH),
     planetary_grasper(replace(PATH, d2_m=0.003)),
-    *(dvrk_coupling(model) for tool in TOOLS for model in tool.models),
+    *dvrk_couplings().values(),
 ]
 graspers = st.sampled_from(GRASPERS)
 
@@ -32,7 +31,6 @@ def test_inverse_of_forward_is_identity(grasper, data):
     values = data.draw(vectors(len(grasper.joints)))
     for there, back in [
         (grasper.joint_position, grasper.actuator_position),
-        (grasper.joint_velocity, grasper.actuator_velocity),
         (grasper.joint_torque, grasper.actuator_torque),
     ]:
         np.testing.assert_allclose(back(there(values)), values, atol=1e-9)
@@ -42,7 +40,7 @@ def test_inverse_of_forward_is_identity(grasper, data):
 def test_power_is_conserved(grasper, data):
     velocity = data.draw(vectors(len(grasper.joints)))
     torque = data.draw(vectors(len(grasper.joints)))
-    at_joints = np.sum(torque * grasper.joint_velocity(velocity), axis=-1)
+    at_joints = np.sum(torque * grasper.joint_position(velocity), axis=-1)
     at_actuators = np.sum(grasper.actuator_torque(torque) * velocity, axis=-1)
     np.testing.assert_allclose(at_joints, at_actuators, rtol=1e-9, atol=1e-8)
 
@@ -64,7 +62,7 @@ def test_decoupled_motion_stays_decoupled(gear_ratio, sun, yaw_motor, jaw_motor)
 
 
 def test_the_papers_grasper():
-    grasper = planetary_grasper(PATH, drive=Drive(66.0, 0.01))
+    grasper = planetary_grasper(replace(PATH, d3_m=0.004))
     turn = 2 * math.pi * 66
     # carrier one turn: yaw two; drum twice the jaw's pulley: jaw two turns
     assert grasper.joint_position([turn, 0, 0]) == pytest.approx([4 * math.pi, 0, 0])
@@ -88,22 +86,65 @@ def test_the_cadiere_forceps_torques_and_the_printed_equation_4():
     np.testing.assert_allclose(to_joints, printed, atol=1e-4)
 
 
-def test_a_wrist_whose_cables_would_leave_their_pulleys_is_refused():
-    wide = Limits.degrees((-170, 170), (-60, 60), (-60, 60))
-    with pytest.raises(GrasperError, match="lifts off pulley"):
-        planetary_grasper(PATH, limits=wide)
-    modest = Limits.degrees((-60, 60), (-60, 60), (-60, 60))
-    assert planetary_grasper(PATH, limits=modest).limits is modest
-
-
 def test_what_makes_no_grasper_is_refused():
     with pytest.raises(GrasperError, match="cannot be inverted"):
-        Coupling("flat", ("a", "b"), ("x", "y"), np.ones((2, 2)))
+        Coupling("flat", ("a", "b"), np.ones((2, 2)))
     with pytest.raises(GrasperError, match="overlap"):
         planetary_grasper(replace(PATH, l3_m=0.004))
     with pytest.raises(GrasperError, match="last axis"):
         GRASPERS[0].joint_position([1.0, 2.0])
     with pytest.raises(GrasperError, match="no coupling"):
         dvrk_coupling("1")
-    with pytest.raises(GrasperError, match="greater than zero"):
-        Drive(drum_m=0.0)
+
+
+def test_the_path_length_is_that_of_its_straight_lines_and_arcs():
+    # two equal pulleys that just touch: the cable crosses between them with no straight length
+    d = 0.004
+    path = CablePath(d, d, d, 0.0, d, d)
+    assert path.tangent_angles_rad() == (0.0, 0.0)
+    assert path.length_m() == pytest.approx(math.pi * d)  # a quarter, a half and a quarter turn
+
+
+@given(st.floats(-0.7, 0.7), st.floats(-0.7, 0.7), st.floats(0.3, 3.0))
+def test_equation_5_is_the_difference_of_equations_1_and_4(alpha, beta, ratio):
+    d1, d2, d3 = 0.004, 0.004 * ratio, 0.005
+    path = CablePath(d1, d2, d3, 0.01, 0.51 * (d1 + d2), 0.51 * (d2 + d3))
+    change = path.length_m() - path.length_m(alpha, beta)
+    assert path.shortening_m(alpha, beta) == pytest.approx(change, abs=1e-15)
+
+
+def test_the_papers_wrist_turns_twice_its_input():
+    assert Planetary(1.0).yaw_over_carrier == 2.0
+    assert Planetary(1.0).decoupling_pulley_ratio == 1.0  # equation 11
+    assert Planetary(1.0, -1.0).decoupling_pulley_ratio == 0.5  # equation 10
+
+
+def test_overlapping_pulleys_are_refused():
+    path = CablePath(0.004, 0.004, 0.005, 0.01, 0.0039, 0.008)
+    assert len(path.interference()) == 1
+    with pytest.raises(GrasperError, match=r"pulleys 1 and 2 overlap by 0\.0001 m"):
+        path.length_m()
+    assert PATH.interference() == []
+
+
+def test_a_cable_that_lifts_off_its_pulley_is_refused():
+    with pytest.raises(GrasperError, match="lifts off pulley 1"):
+        PATH.length_m(-1.5, 0.0)
+    with pytest.raises(GrasperError, match="lifts off pulley 2"):
+        PATH.length_m(0.0, 3.0)
+
+
+@pytest.mark.parametrize("gear_ratios", [(1.0, 2.0, 3.0), (1.0, 1 / 2, 1 / 3)])
+def test_of_27_designs_the_papers_is_the_most_compact(gear_ratios):
+    found = designs(gear_ratios)
+    assert len({(d.planetary, d.drive) for d in found}) == 27
+    best = most_compact(found)
+    assert (best.planetary, best.drive) == (Planetary(1.0, 0.0), "carrier")
+    rivals = [d for d in found if d is not best and not d.obstacle]
+    assert all((d.area, d.extra_stages) > (best.area, best.extra_stages) for d in rivals)
+
+
+@pytest.mark.parametrize(("ratio", "sun"), [(0.0, 0.0), (math.nan, 0.0), (1.0, 1.0)])
+def test_gears_that_cannot_be_are_refused(ratio, sun):
+    with pytest.raises(GrasperError):
+        Planetary(ratio, sun)

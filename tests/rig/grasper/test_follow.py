@@ -15,19 +15,20 @@ from drivers.transport.faulty import Faults
 from rig.bench.firmware import source_hash
 from rig.bench.logger import open_logger
 from rig.cli.main import main
-from rig.configuration.config import load_config
+from rig.configuration.config import SHIPPED, load_config
 from rig.errors import ExitCode, UsageError
-from rig.grasper import following
+from rig.grasper import follow
 from rig.grasper.coupling import GrasperError
 from rig.grasper.follow import setpoints
 from rig.grasper.machine import axes_of_joints
-from rig.grasper.master import master_of
+from rig.grasper.settings import master_section
 from rig.log.reader import read_log
 from tests.rig.simulated import is_armed
 
 pytestmark = pytest.mark.integration
 
-CHIEF = master_of(load_config(Path("grasper")))
+GRASPER_CONFIG = load_config(Path("grasper"))
+CHIEF = master_section(GRASPER_CONFIG)
 HERE = (0.1, 0.0, -0.05)
 
 
@@ -42,8 +43,8 @@ def potentiometers():
 @pytest.fixture
 def link(monkeypatch, library):
     """The simulated grasper's link, to look at its board afterwards."""
-    link = open_logger(load_config(Path("grasper")))
-    monkeypatch.setattr(following, "open_logger", lambda config: link)
+    link = open_logger(GRASPER_CONFIG)
+    monkeypatch.setattr(follow, "open_logger", lambda config: link)
     return link
 
 
@@ -121,11 +122,9 @@ def test_a_broken_wire_disarms_the_motors(link, monkeypatch, tmp_path):
         return batch
 
     device.read = broken
-    monkeypatch.setattr(following, "open_section", lambda section: device)
+    monkeypatch.setattr(follow, "open_section", lambda section: device)
     with pytest.raises(GrasperError, match="rail"):
-        following.follow_master(
-            load_config(Path("grasper")), None, 5.0, 0.2, tmp_path, followed.append
-        )
+        follow.follow_master(GRASPER_CONFIG, None, 5.0, 0.2, tmp_path, followed.append)
     assert followed[-1] > 0.1
     assert not is_armed(link.board, GRASPER)
 
@@ -140,7 +139,7 @@ def test_ctrl_c_quits_with_disarmed_motors(link, monkeypatch, capsys):
                 os.kill(os.getpid(), signal.SIGINT)
             yield piece
 
-    monkeypatch.setattr(following, "setpoints", asked)
+    monkeypatch.setattr(follow, "setpoints", asked)
     assert main(["grasper", "follow", "--sim"]) == ExitCode.INTERRUPTED
     assert len(pieces) == 20
     assert not is_armed(link.board, GRASPER)
@@ -156,13 +155,45 @@ def test_ctrl_c_quits_with_disarmed_motors(link, monkeypatch, capsys):
     ],
 )
 def test_what_cannot_be_followed_is_refused(config, url, said, library, tmp_path):
-    bench = load_config(Path("grasper")).changed(logger={"url": "usb:16c0:0483"})
+    bench = GRASPER_CONFIG.changed(logger={"url": "usb:16c0:0483"})
     chosen = bench if config == "bench" else load_config(Path(config))
     with pytest.raises(UsageError, match=said):
-        following.follow_master(chosen, url, 1.0, 0.2, tmp_path)
+        follow.follow_master(chosen, url, 1.0, 0.2, tmp_path)
 
 
 def test_a_silent_master_is_reported(potentiometers):
     potentiometers.stop()
     with pytest.raises(LinkTimeoutError, match="sent nothing"):
         next(setpoints(potentiometers, CHIEF, HERE, 1.0))
+
+
+def configured(**master):
+    return GRASPER_CONFIG.changed(machine={"master": master})
+
+
+def test_zero_and_turn_of_each_potentiometer_are_the_configurations():
+    chief = master_section(
+        configured(zero_counts=(2000, 2048, 2100), rad_per_count=(1e-3, -1e-3, 2e-3))
+    )
+    np.testing.assert_allclose(chief.joint_rad([2100, 2148, 2000]), [0.1, -0.1, -0.2])
+
+
+def test_a_turn_of_300_degrees_is_the_default():
+    assert np.degrees(master_section(configured()).joint_rad([4094, 2048, 1])).tolist() == (
+        pytest.approx([149.89, 0.0, -149.96], abs=0.01)
+    )
+
+
+@pytest.mark.parametrize("counts", [[0, 2048, 2048], [2048, 4095, 2048], [2048, 2048, np.nan]])
+def test_a_potentiometer_at_its_rail_commands_nothing(counts):
+    with pytest.raises(GrasperError, match="rail"):
+        master_section(configured()).joint_rad(counts)
+
+
+@pytest.mark.parametrize("turn", ["0", "nan", "1.0"])
+def test_a_potentiometer_that_shows_nothing_is_refused(turn, tmp_path):
+    path = tmp_path / "rig.toml"
+    shipped = (SHIPPED / "grasper.toml").read_text()
+    path.write_text(f"{shipped}\n[machine.master]\nrad_per_count = [1e-3, {turn}, 1e-3]\n")
+    with pytest.raises(UsageError, match="rad_per_count"):
+        load_config(path)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from rig.importers.mrdlab import IMPORTER
+
 COLUMN_LINE = (
     "%Back-end Time [ms], Back-end CUI Encoder [counts], Back-end Futek Torque [counts], "
     "Measured Current [Amps], Front-end Maxon Encoder [counts], Front-end Futek Torque [counts], "
@@ -84,3 +86,18 @@ class Log:
 def make_log() -> type[Log]:
     """The builder of synthetic logs."""
     return Log
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Write one log into a folder, import it and return its recording."""
+
+    def _load(folder="Tool_4_Maryland_L_4", spindle="left", stem="00", **options):
+        log = Log(**options)
+        log.header = [line.replace("left spindle", f"{spindle} spindle") for line in log.header]
+        path = tmp_path / folder / f"{stem}.TXT"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(log.text())
+        return IMPORTER.open(path).runs[0].recording()
+
+    return _load

@@ -1,7 +1,5 @@
 """A channel and its derivative must agree: rate, sign and time are checked in every format."""
 
-import lzma
-
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -34,15 +32,6 @@ def noisy(values, share, seed=1):
     return values + share * values.std() * np.random.default_rng(seed).normal(size=values.size)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3])
-def test_a_true_pair_is_read(tmp_path, share):
-    angle, velocity = motion(TIME)
-    recording = imported(
-        tmp_path, drive_angle_rad=angle, drive_velocity_rad_s=noisy(velocity, share)
-    )
-    assert len(recording) == TIME.size
-
-
 @pytest.mark.parametrize(
     ("names", "factor", "message"),
     [
@@ -68,17 +57,13 @@ def test_a_shift_is_refused_and_measured(tmp_path, shift_samples):
         imported(tmp_path, drive_angle_rad=angle, drive_velocity_rad_s=noisy(velocity, 0.05))
 
 
-def test_a_wrong_time_column_is_refused(tmp_path):
-    angle, velocity = motion(TIME)
-    with pytest.raises(DataError, match=r"2\.00 times.*sample rate"):
-        imported(tmp_path, TIME / 2, drive_angle_rad=angle, drive_velocity_rad_s=velocity)
-
-
-def test_what_stands_still_or_belongs_to_something_else_is_not_compared(tmp_path):
+def test_a_true_pair_and_what_stands_still_or_belongs_to_something_else_are_read(tmp_path):
     angle, velocity = motion(TIME)
     rng = np.random.default_rng(3)
     recording = imported(
         tmp_path,
+        drive_angle_rad=angle,
+        drive_velocity_rad_s=noisy(velocity, 0.3),
         still_angle_rad=1e-4 * rng.normal(size=TIME.size),
         still_velocity_rad_s=1e-2 * rng.normal(size=TIME.size),
         motor_angle_rad=angle,
@@ -131,14 +116,3 @@ def test_joints_of_different_rates_are_refused(tmp_path):
         (tmp_path / "run.csv").write_text(arm_text(200.0, edit))
         with pytest.raises(DataError, match=message):
             list(open_campaign(tmp_path / "run.csv"))
-
-
-@pytest.mark.measured
-def test_every_second_sample_of_a_measured_path_reads_at_half_the_rate(measured_data, tmp_path):
-    (full,) = open_campaign(measured_data / "psm" / "one18.csv.xz")
-    with lzma.open(measured_data / "psm" / "one18.csv.xz", "rt") as file:
-        (tmp_path / "half.csv").write_text("".join(file.readlines()[::2]))
-    (half,) = open_campaign(tmp_path / "half.csv")
-    assert full.sample_rate_hz == pytest.approx(200)
-    assert half.sample_rate_hz == pytest.approx(100)
-    np.testing.assert_allclose(half.time_s, full.time_s[::2])

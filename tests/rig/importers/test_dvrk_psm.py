@@ -67,6 +67,9 @@ def test_packed_and_windows_files_read_the_same(path, tmp_path):
     one, two = campaign
     for name in one.columns:
         np.testing.assert_array_equal(one[name], two[name])
+    packed.write_bytes(packed.read_bytes()[:-9])
+    with pytest.raises(DataError, match=r"two18\.csv\.xz"):
+        read(packed)
 
 
 @pytest.mark.parametrize(
@@ -84,15 +87,6 @@ def test_damage_is_named_by_line(path, edit, message):
     path.write_text(edit(text()))
     with pytest.raises(DataError, match=r"one18\.csv, " + message):
         read(path)
-
-
-@pytest.mark.parametrize("keep", [0.0, 0.5, 0.99])
-def test_a_truncated_archive_is_refused(tmp_path, keep):
-    packed = tmp_path / "one18.csv.xz"
-    content = lzma.compress(text().encode())
-    packed.write_bytes(content[: round(keep * len(content))])
-    with pytest.raises(DataError, match=r"one18\.csv\.xz"):
-        read(packed)
 
 
 def test_other_text_is_not_recognised(tmp_path):

@@ -35,7 +35,7 @@ def test_vectors_are_channels_scalars_conditions_text_notes(save, compressed, as
         {
             "time_s": TIME,
             "motor_current_a": CURRENT,
-            "finger_force_n": 2 * CURRENT,  # not registered, but it carries a unit
+            "finger_force_n": np.arange(N, dtype=np.int16),  # not registered, but it has a unit
             "load_command_a": 0.4,
             "notes": "a quiet morning",
             "grasper": "Maryland",
@@ -47,14 +47,10 @@ def test_vectors_are_channels_scalars_conditions_text_notes(save, compressed, as
     assert recording.name == "run"
     np.testing.assert_array_equal(recording.time_s, TIME)
     np.testing.assert_array_equal(recording["motor_current_a"], CURRENT)
+    assert recording["finger_force_n"].dtype == np.float64
     assert set(recording.columns) == {"motor_current_a", "finger_force_n"}
     assert dict(recording.conditions) == {"load_command_a": 0.4, "grasper": "Maryland"}
     assert recording.notes == "a quiet morning"
-
-
-def test_integers_become_floats(save):
-    path = save({"time_s": TIME, "motor_current_a": np.arange(N, dtype=np.int16)})
-    assert IMPORTER.open(path).runs[0].recording()["motor_current_a"].dtype == np.float64
 
 
 def test_each_struct_is_a_run(save):

@@ -3,24 +3,11 @@
 import numpy as np
 import pytest
 
-from estimation.recording import Flag
+from estimation.recording import Flag, Instrument
 from rig.errors import DataError
 from rig.importers.mrdlab import IMPORTER
 
 COUNT_RAD = 2 * np.pi / 8192
-
-
-@pytest.fixture
-def load(tmp_path, make_log):
-    """Write one log into a folder, import it and return its recording."""
-
-    def _load(folder="Tool_4_Maryland_L_4", stem="00", **options):
-        path = tmp_path / folder / f"{stem}.TXT"
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(make_log(**options).text())
-        return IMPORTER.open(path).runs[0].recording()
-
-    return _load
 
 
 def test_columns_become_si_and_closing_positive(load, make_log):
@@ -136,26 +123,28 @@ def test_a_wrist_the_folder_does_not_state_is_no_condition(load):
     assert "Roll_9 is not one of" in recording.notes
 
 
-def test_instrument_from_folder_and_header(load):
-    instrument = load().instrument
-    assert (instrument.model, instrument.serial, instrument.side) == ("Maryland", "tool 4", "left")
-    assert instrument.lot == "N10150901 729"
+LOT = "N10150901 729"
 
 
-def test_the_folder_wins_over_the_header(load):
-    recording = load(folder="Tool_5_Maryland_R_2", mirrored=True)
-    assert (recording.instrument.serial, recording.instrument.side) == ("tool 5", "right")
-    assert recording.instrument.mounting == "2"
-    assert load(folder="Tool_4_Maryland_L_Roll_1").instrument.mounting is None
-    assert recording.instrument.lot is None
-    assert "names tool 4, lot N10150901 729; the folder names tool 5 and wins" in recording.notes
-
-
-def test_a_folder_without_a_known_name_is_reported_as_one(load):
-    recording = load(folder="bench")
-    assert recording.instrument.serial == "tool 4"
-    assert recording.instrument.side == "left"  # from the header
-    assert "'bench' does not follow" in recording.notes
+@pytest.mark.parametrize(
+    ("folder", "instrument", "note"),
+    [
+        ("Tool_4_Maryland_L_4", Instrument("Maryland", "tool 4", LOT, "left", mounting="4"), ""),
+        ("Tool_4_Maryland_L_Roll_1", Instrument("Maryland", "tool 4", LOT, "left"), ""),
+        (
+            "Tool_5_Maryland_R_2",
+            Instrument("Maryland", "tool 5", None, "right", mounting="2"),
+            f"names tool 4, lot {LOT}; the folder names tool 5 and wins",
+        ),
+        ("bench", Instrument(None, "tool 4", LOT, "left"), "'bench' does not follow"),
+    ],
+)
+def test_the_instrument_is_that_of_the_folder_and_else_of_the_header(
+    load, folder, instrument, note
+):
+    recording = load(folder=folder, mirrored=instrument.side == "right")
+    assert recording.instrument == instrument
+    assert note in recording.notes
 
 
 @pytest.mark.parametrize(("decimals", "quantum"), [(2, 0.01), (4, 1e-4)])

@@ -146,12 +146,11 @@ def test_a_mutated_log_gives_its_values_or_a_data_error(path, lines, mutations):
     )
 )
 def test_values_are_rounded_as_python_rounds_them(values):
-    from rig.importers.decimal_text import parse_decimals
+    from rig.importers.mrdlab_text import parse_decimals
 
     values = values[: len(values) // 3 * 3]
     rows = [values[i : i + 3] for i in range(0, len(values), 3)]
     text = "".join(",".join(row) + "\n" for row in rows).encode()
     columns = np.empty((3, len(rows)))
-    fault, row, _, _ = parse_decimals(np.frombuffer(text, np.uint8), columns)
-    assert (fault, row) == (0, len(rows))
+    assert parse_decimals(np.frombuffer(text, np.uint8), columns) == (len(rows), len(text))
     assert columns.T.tolist() == [[float(value) for value in row] for row in rows]

@@ -4,40 +4,8 @@ import numpy as np
 import pytest
 
 from rig.errors import DataError
-from rig.importers.archive import unpack_text
-from rig.importers.mrdlab import IMPORTER
 
 LEFT, RIGHT = "Tool_4_Maryland_L_4", "Tool_4_Maryland_R_4"
-MEASURED = (1, 2, 3, 4, 5, 7, 8, 9)
-"""Columns of the text whose sign depends on the side."""
-
-
-@pytest.fixture
-def load(tmp_path, make_log):
-    """Write one log into a folder, import it and return its recording."""
-
-    def _load(folder=LEFT, spindle="left", **options):
-        log = make_log(**options)
-        log.header = [line.replace("left spindle", f"{spindle} spindle") for line in log.header]
-        path = tmp_path / folder / "00.TXT"
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(log.text())
-        return IMPORTER.open(path).runs[0].recording()
-
-    return _load
-
-
-def mirrored(text):
-    """Return a log's text as a right jaw would have written it."""
-    lines = []
-    for line in text.splitlines():
-        fields = line.split(",")
-        if not line.startswith("%"):
-            for column in MEASURED:
-                field = fields[column].strip()
-                fields[column] = field[1:] if field.startswith("-") else f"-{field}"
-        lines.append(",".join(fields))
-    return "\n".join(lines).replace("left spindle", "right spindle") + "\n"
 
 
 @pytest.mark.parametrize(
@@ -126,23 +94,3 @@ def test_an_encoder_geared_to_the_spindle_takes_its_sign(load, column, name):
     turned, plain = load(edit=turn), load("bench")
     np.testing.assert_array_equal(turned[name], plain[name])
     assert f"{name} was logged with the opposite sign" in turned.notes
-
-
-@pytest.mark.measured
-@pytest.mark.parametrize(
-    ("folder", "stem"), [("Tool_4_Maryland_L_4", "01"), ("Tool_5_Maryland_L_2", "00")]
-)
-def test_a_measured_log_mirrored_reads_the_same(measured_data, tmp_path, folder, stem):
-    archive = unpack_text(measured_data / f"mrdlab-{folder}.tar.xz")
-    (log,) = archive.rglob(f"{folder}/{stem}.TXT")
-    right = tmp_path / folder.replace("_L_", "_R_") / log.name
-    right.parent.mkdir()
-    right.write_text(mirrored(log.read_text("latin-1")), "latin-1")
-    (left,), (turned,) = IMPORTER.open(log), IMPORTER.open(right)
-    assert (left.instrument.side, turned.instrument.side) == ("left", "right")
-    for name in left.columns:
-        np.testing.assert_array_equal(turned[name], left[name], err_msg=name)
-    assert turned.stretches == left.stretches
-    right.write_text(log.read_text("latin-1"), "latin-1")
-    with pytest.raises(DataError, match="signs are those of a left jaw"):
-        IMPORTER.open(right).runs[0].recording()

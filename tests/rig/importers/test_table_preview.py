@@ -87,7 +87,8 @@ def test_import_writes_recordings_that_open(tmp_path, capsys):
 def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, capsys):
     table = csv(tmp_path / "bench.csv", t=1e3 * TIME, q=np.degrees(WAVE), i=0 * TIME)
     words = ["--column", "time_s=t:ms", "--column", "motor_angle_rad=q:deg"]
-    words += ["--column", "motor_current_a=i:mA", "--preview", "--json"]
+    page = tmp_path / "p.html"
+    words += ["--column", "motor_current_a=i:mA", "--preview", "--json", "--plots", str(page)]
     assert main(["import", str(table), *words]) == 0
     answer = capsys.readouterr()
     shown = json.loads(answer.out)["preview"]
@@ -96,11 +97,5 @@ def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, capsys):
     assert angle["greatest"] == pytest.approx(1.0, abs=1e-3)
     assert current["wrong"]
     assert "motor_current_a: it is constant" in answer.err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.csv"]
-
-
-def test_plots_are_a_page(tmp_path):
-    table = csv(tmp_path / "bench.csv", time_s=TIME, motor_angle_rad=WAVE)
-    page = tmp_path / "p.html"
-    assert main(["import", str(table), "--preview", "--plots", str(page)]) == 0
     assert "motor angle" in page.read_text()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.csv", "p.html"]

@@ -64,8 +64,8 @@ def write_log(
         for rows, raw, log_time_ns in blocks(samples, drop):
             writer.write(SAMPLE, rows, log_time_ns)
             writer.write(COUNTS, raw, log_time_ns)
-        writer.mark(Mark(0.1, "finger on the jaw"))
-        writer.stretch(Stretch(0.2, 0.3, Flag.SUSPECT, "re-index", "spindle_angle_rad"))
+        writer.add(Mark(0.1, "finger on the jaw"))
+        writer.add(Stretch(0.2, 0.3, Flag.SUSPECT, "re-index", "spindle_angle_rad"))
         end = RunEnd(
             expected_samples={SAMPLE: samples},
             counters={"crc_errors": 2},

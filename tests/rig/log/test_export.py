@@ -69,22 +69,20 @@ def test_flags_and_missing_values_are_exported(tmp_path, kind):
     np.testing.assert_array_equal(columns["flags"], [0, 4, 0])
 
 
-def test_all_topics_go_to_a_folder(log, tmp_path):
-    written = export_log(log, ExportFormat.NPZ, tmp_path / "new" / "folder")
-    assert {item.parent for item in written} == {tmp_path / "new" / "folder"}
-    (tmp_path / "file").write_text("")
+def test_topics_go_to_a_folder_and_what_is_there_is_kept_unless_forced(log, tmp_path):
+    folder = tmp_path / "new" / "folder"
+    written = export_log(log, ExportFormat.CSV, folder)
+    assert {item.parent for item in written} == {folder}
     with pytest.raises(UsageError, match="2 topics"):
-        export_log(log, ExportFormat.NPZ, tmp_path / "file")
-
-
-def test_a_file_that_is_there_is_kept_unless_forced(log, tmp_path):
-    target = tmp_path / "run.rig-counts.csv"
+        export_log(log, ExportFormat.CSV, written[0])
+    first, target = written
+    first.unlink()
     target.write_text("precious,row\n1,2\n")
     with pytest.raises(ExportExistsError, match="--force"):
-        export_log(log, ExportFormat.CSV)
+        export_log(log, ExportFormat.CSV, folder)
     assert target.read_text() == "precious,row\n1,2\n"
-    assert not (tmp_path / "run.rig-sample.csv").exists()
-    export_log(log, ExportFormat.CSV, force=True)
+    assert not first.exists()
+    export_log(log, ExportFormat.CSV, folder, force=True)
     assert target.read_text().startswith("log_time_ns,motor,spindle")
 
 

@@ -110,35 +110,18 @@ def test_times_before_1970_or_beyond_reach_are_refused(tmp_path, start_s, starte
         assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_opens_as_a_campaign_in_the_order_of_the_starts(tmp_path):
-    for name, start_ns in (("b", 10**18), ("a", 3 * 10**18), ("c", 2 * 10**18)):
-        write_recording(tmp_path / f"{name}.mcap", simple(name, start_ns))
-    (tmp_path / "notes.txt").write_text("not a log")
-    assert IMPORTER.recognises(tmp_path)
-    campaign = IMPORTER.open(tmp_path)
-    assert campaign.names == ("b", "c", "a")
-    assert [len(recording) for recording in campaign] == [50, 50, 50]
-    assert campaign.clock().gap_known.all()
-
-
-def test_a_folder_of_campaigns_opens_as_one_with_names_of_both(tmp_path):
+def test_a_folder_of_campaigns_opens_as_one_in_the_order_of_the_starts(tmp_path):
     for place in ("first", "second"):
         (tmp_path / place).mkdir()
+        (tmp_path / place / "notes.txt").write_text("not a log")
         for name in ("a", "b"):
-            start_ns = 10**18 * (1 + (name == "b") + 4 * (place == "second"))
+            start_ns = 10**18 * (1 + (name == "a") + 4 * (place == "second"))
             write_recording(tmp_path / place / f"{name}.mcap", simple(name, start_ns))
     assert IMPORTER.recognises(tmp_path)
     campaign = IMPORTER.open(tmp_path)
-    assert campaign.names == ("first/a", "first/b", "second/a", "second/b")
+    assert campaign.names == ("first/b", "first/a", "second/b", "second/a")
+    assert campaign.clock().gap_known.all()
     assert [recording.name for recording in campaign] == list(campaign.names)
-
-
-def test_a_single_log_opens_as_a_campaign_of_one(log):
-    assert IMPORTER.recognises(log)
-    (recording,) = IMPORTER.open(log)
-    assert recording.conditions["load_command_a"] == 0.3
-    assert recording.marks[0].text == "finger on the jaw"
-    assert "proximal_torque_n_m" in recording
 
 
 def kill(path):
@@ -167,18 +150,6 @@ def test_an_unclosed_log_is_opened_but_is_no_evidence_until_repaired(tmp_path, m
     assert "did not end as planned: repaired" in killed.notes
 
 
-def test_the_attempt_that_ended_as_planned_stands_for_the_run(tmp_path, make_log):
-    first = kill(make_log(tmp_path / "sine.mcap"))
-    first = first.rename(tmp_path / "sine.aborted-1.mcap.part")
-    make_log(tmp_path / "sine.mcap")
-    (run,) = IMPORTER.open(tmp_path).runs
-    assert run.source == tmp_path / "sine.mcap"
-    repair_log(first)
-    (run,) = IMPORTER.open(tmp_path).runs
-    assert run.source == tmp_path / "sine.mcap"
-    assert run.excluded is None
-
-
 def test_a_run_recorded_again_stands_before_the_repair_of_its_first_half(tmp_path, make_log):
     first = kill(make_log(tmp_path / "sine.mcap", samples=300))
     repair_log(first)
@@ -186,6 +157,7 @@ def test_a_run_recorded_again_stands_before_the_repair_of_its_first_half(tmp_pat
     make_log(tmp_path / "sine.mcap", samples=600)
     (run,) = IMPORTER.open(tmp_path).runs
     assert run.source == tmp_path / "sine.mcap"
+    assert run.excluded is None
     assert len(run.recording()) == 600
 
 

@@ -29,18 +29,6 @@ def test_a_stream_survives_its_ros2_definition(stream):
     assert Stream.from_definition("/a/topic", "some_msgs/msg/Kind", text, stream.rate_hz) == stream
 
 
-@given(streams())
-def test_fields_lie_at_their_natural_alignment_without_padding(stream):
-    offsets = {name: offset for name, (_, offset, *_) in stream.dtype.fields.items()}
-    position = 0
-    for field in stream.fields:
-        size = np.dtype(NUMPY_TYPES[field.dtype]).itemsize
-        assert offsets[field.name] == position
-        assert position % size == 0
-        position += size
-    assert stream.dtype.itemsize == position
-
-
 def test_a_plain_ros2_definition_with_comments_is_understood():
     text = "# a sample\n\nfloat64 x   # where it is\nuint32 sequence\n"
     stream = Stream.from_definition("/t", "p/msg/P", text)

@@ -1,0 +1,173 @@
+"""What comes before a search: clocks, the split, and pieces that stand for runs."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation.diagnosis.audit import audit, steady
+from estimation.diagnosis.split import (
+    SplitError,
+    claim,
+    cut_and_split,
+    data_hash,
+    path_of,
+    period_samples,
+    periods,
+    split,
+)
+from estimation.recording import Recording
+from rig.importers.registry import open_campaign
+from tests.estimation.campaigns import runs
+
+
+def moving(seed: int = 0, **more: np.ndarray) -> Recording:
+    time_s = np.arange(20000) * 1e-3
+    angle = {"motor_angle_rad": np.sin(time_s), "spindle_angle_rad": np.sin(time_s) / 35}
+    return Recording(f"run{seed}", time_s, {**angle, **more})
+
+
+def test_skips_and_held_channels_are_reported():
+    whole = [
+        moving(k, load_command_a=np.full(20000, 0.1 * k), motor_current_a=np.zeros(20000))
+        for k in range(4)
+    ]
+    time_s = whole[2].time_s.copy()
+    time_s[7000:] += 0.25
+    said = audit([*whole[:2], replace(whole[2], time_s=time_s), whole[3]])
+    (skip,) = [s for s in said if "skips" in s]
+    assert "run2 skips 1 times, the longest by 0.251 s at 7 s" in skip
+    assert any(s.startswith("load_command_a is held within each run") for s in said)
+    assert any(s.startswith("motor_current_a never varies") for s in said)
+    assert not any("skips" in s for s in audit(whole))
+
+
+def test_a_run_that_jumps_is_left_out_and_one_that_skips_or_is_flagged_is_kept():
+    whole = moving()
+    time_s = whole.time_s.copy()
+    time_s[7000:] += 0.25
+    jumps = replace(whole, name="jumps", time_s=time_s)
+    flags = np.zeros(len(whole), np.uint8)
+    flags[6999:7001] = 1
+    flagged = replace(jumps, name="flagged", flags=flags)
+    skipping = replace(whole, name="skips", time_s=np.where(time_s > 7.1, time_s - 0.24, time_s))
+    kept, lost = steady([whole, jumps, flagged, skipping])
+    assert [r.name for r in kept] == ["run0", "flagged", "skips"]
+    assert "Run jumps is left out: its clock jumps by 0.251 s at 6.999 s" in lost[0]
+    assert [s.split()[4] for s in audit(kept) if "skips" in s] == ["flagged", "skips"]
+
+
+def test_the_split_is_stratified_repeatable_and_sealed():
+    recordings = runs(count=12, seconds=1.0)
+    first, again, other = (split(recordings, seed) for seed in (1, 1, 2))
+    assert first == again
+    assert first.seal != other.seal
+    assert set(first.discover) | set(first.confirm) == {r.name for r in recordings}
+    assert len(first.confirm) == 4
+    # every frequency confirms, since the strata are cut along the conditions
+    assert {r.conditions["frequency_hz"] for r in recordings if r.name in first.confirm} == {
+        r.conditions["frequency_hz"] for r in recordings
+    }
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_ends_of_every_condition_discover(seed):
+    recordings = runs(count=12, seconds=1.0)
+    kept = [r for r in recordings if r.name in split(recordings, seed).discover]
+    for name in ("frequency_hz", "load_command_a"):
+        values = [[r.conditions[name] for r in some] for some in (kept, recordings)]
+        assert [min(values[0]), max(values[0])] == [min(values[1]), max(values[1])]
+
+
+def test_the_data_hash_follows_the_samples():
+    one = runs(count=3, seconds=1.0)
+    changed = [one[0].with_columns(motor_current_a=one[0]["motor_current_a"] + 1e-12), *one[1:]]
+    assert data_hash(one) == data_hash(list(reversed(one)))
+    assert data_hash(one) != data_hash(changed)
+
+
+def path(name: str, period_s: float = 2.5, seconds: float = 18.0, seed: int = 0) -> Recording:
+    random = np.random.default_rng(seed)
+    time_s = np.arange(round(seconds * 200)) / 200
+    w = 2 * np.pi / period_s
+    waves = random.normal(size=(2, 4))
+    angle = sum(a * np.sin(k * w * time_s + b) for k, (a, b) in enumerate(waves.T, start=1))
+    noise = 1e-3 * random.normal(size=len(time_s))
+    return Recording(
+        name, time_s, {"joint_1_angle_rad": angle + noise, "joint_1_torque_n_m": noise}
+    )
+
+
+@pytest.mark.parametrize("period_s", [1.5, 2.5, 4.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_period_is_found_and_cut_whole(period_s: float, seed: int) -> None:
+    one = path("one", period_s, seed=seed)
+    assert period_samples(one) == pytest.approx(200 * period_s, abs=2)
+    pieces = periods(one)
+    length = period_samples(one)
+    assert {len(piece) for piece in pieces[:-1]} == {length}
+    assert length // 2 <= len(pieces[-1]) <= length
+    assert len(one) - sum(map(len, pieces)) <= length // 2
+    assert pieces[1].time_s[0] > pieces[0].time_s[-1]
+
+
+def test_one_path_discovers_and_the_other_confirms() -> None:
+    both = [path("one", seed=1), path("two", 3.0, seed=2)]
+    pieces, sealed = cut_and_split(both, 0)
+    assert {p.name for p in pieces} == {*sealed.discover, *sealed.confirm}
+    assert len({path_of(n) for n in sealed.discover}) == 1
+    assert {path_of(n) for n in (*sealed.discover, *sealed.confirm)} == {"one", "two"}
+    assert cut_and_split(both, 0)[1] == sealed
+    # the one that nobody has seen confirms, whatever the seed
+    for seed in range(4):
+        assert path_of(cut_and_split(both, seed, {"two"})[1].confirm[0]) == "one"
+    said = claim(sealed)
+    assert f"{len(sealed.discover)} periods" in said
+    assert "these two paths" in said
+
+
+def test_a_path_that_does_not_repeat_itself_is_refused() -> None:
+    drift = path("one")
+    aimless = np.cumsum(np.random.default_rng(0).normal(size=len(drift)))
+    with pytest.raises(SplitError, match="does not repeat"):
+        cut_and_split([drift.with_columns(joint_1_angle_rad=aimless), path("two")])
+    still = path("two").with_columns(joint_1_angle_rad=np.zeros(len(drift)))
+    with pytest.raises(SplitError, match="does not repeat"):
+        cut_and_split([drift, still])
+    with pytest.raises(SplitError, match="2 rigs"):
+        cut_and_split([drift, replace(path("two"), rig="another")])
+
+
+@pytest.mark.measured
+def test_the_measured_paths_of_the_arm_repeat_themselves() -> None:
+    data = Path(os.environ.get("RIG_DATA", Path(__file__).parents[3] / "shared" / "data")) / "psm"
+    if not data.exists():
+        pytest.skip(f"no measured data in {data}")
+    for run in open_campaign(data):
+        assert period_samples(run) / run.sample_rate_hz == pytest.approx(6.48, rel=0.01)
+        assert len(periods(run)) == 5
+
+
+@pytest.mark.parametrize("number", [1, 3, 4, 6])
+def test_few_recordings_are_cut_into_parts_that_stand_for_runs(number: int) -> None:
+    few = [path(f"run {k}", seed=k, seconds=25.0) for k in range(number)]
+    pieces, sealed = cut_and_split(few)
+    assert sum(map(len, pieces)) == sum(map(len, few))
+    assert {path_of(piece.name) for piece in pieces} == {r.name for r in few}
+    assert len(sealed.discover) >= 6
+    assert sealed.confirm
+    assert f"{number} recording" in (claim(sealed) or "")
+
+
+def test_enough_or_too_short_recordings_stay_whole() -> None:
+    for recordings in (
+        [path(f"run {k}", seed=k) for k in range(8)],
+        [path(f"run {k}", seed=k, seconds=6.0) for k in range(3)],
+    ):
+        whole, sealed = cut_and_split(recordings)
+        assert [r.name for r in whole] == [r.name for r in recordings]
+        assert claim(sealed) is None
+    with pytest.raises(SplitError, match="too few"):
+        cut_and_split([path("one", seconds=9.0)])
