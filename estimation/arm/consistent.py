@@ -13,11 +13,10 @@ import numpy as np
 from scipy import sparse
 
 from estimation.arm.base import base_of
-from estimation.arm.kinematics import ArmError
+from estimation.arm.kinematics import ArmError, optional
 from estimation.arm.recursion import LINK
 from estimation.arm.regressor import names
 from estimation.arm.tables import Arm
-from estimation.errors import MissingExtraError
 from estimation.recording import FloatArray
 
 PULL = 1e-6
@@ -42,21 +41,6 @@ class Consistent:
     base: FloatArray
 
 
-def solver() -> Any:
-    """Return the Clarabel module; imported when first needed, since it is optional.
-
-    Raises:
-        MissingExtraError: It is not installed.
-    """
-    try:
-        import clarabel
-    except ImportError as error:
-        raise MissingExtraError(
-            "A physically consistent fit needs Clarabel, which is not installed.", "", "arm"
-        ) from error
-    return clarabel
-
-
 def consistent_fit(
     arm: Arm, base_columns: FloatArray, torque: FloatArray, weights: FloatArray
 ) -> Consistent:
@@ -69,9 +53,10 @@ def consistent_fit(
         weights: Weight of each joint, shape (joints,).
 
     Raises:
-        ArmError: Clarabel is not installed, or finds no solution.
+        MissingExtraError: Clarabel is not installed.
+        ArmError: It finds no solution.
     """
-    clarabel = solver()
+    clarabel = optional("clarabel", "A physically consistent fit needs Clarabel")
     mapping = base_of(arm).mapping
     table = (base_columns * weights[:, None]).reshape(-1, base_columns.shape[2])
     aim = (torque * weights).ravel()

@@ -1,13 +1,17 @@
 """Finite Fourier series that excite an arm's parameters, with bounds valid at every instant.
 
 Equation 2.14 of G. A. Piqué's thesis, five harmonics of 0.1 Hz; the condition number of the
-regressor with columns of unit length (equation 2.15) is the criterion; the searches are in
-`estimation.arm.design`.
+regressor with columns of unit length (equation 2.15) is the criterion. The thesis (section 2.4)
+minimises it by an active-set method (sequential quadratic programming) with the limits as
+constraints at sampled instants; between those nothing holds them. Ours goes on from there: every
+trial is scaled into bounds that hold at every instant before it is judged, so the search needs no
+constraints.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import LinearConstraint, minimize
 
 from estimation.arm.base import base_of
 from estimation.arm.motion import Motion
@@ -22,6 +26,9 @@ GRID = 2000
 
 JUDGED = 80
 """Instants at which the regressor is computed; with more, its condition number barely changes."""
+
+SAMPLED = 20
+"""Instants of a period at which the limits are constraints."""
 
 ACCELERATION_PER_SPEED = 4.0
 """Limit of acceleration, as a multiple of the speed limit, 1/s; assumed, the thesis states none."""
@@ -136,3 +143,70 @@ def start(arm: Arm, seed: int) -> FloatArray:
     shape = (HARMONICS, len(arm.joints))
     parts = [weight * rng.normal(size=shape), weight * rng.normal(size=shape)]
     return np.concatenate([*parts, 0.3 * rng.normal(size=(1, shape[1]))]).ravel()
+
+
+def by_active_set(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
+    """Improve an excitation under limits at sampled instants.
+
+    Args:
+        arm: The arm.
+        first: The start, within the limits.
+        evaluations: Condition numbers it may take, gradients by differences included.
+    """
+    lower, upper, speed = arm.limits
+    half = (upper - lower) / 2
+    sizes = np.stack([half, speed, ACCELERATION_PER_SPEED * speed])
+    time = np.arange(SAMPLED) / (SAMPLED * FUNDAMENTAL_HZ)
+
+    def excitation(flat: FloatArray) -> Excitation:
+        table = flat.reshape(2 * HARMONICS + 1, -1) * half
+        return Excitation(table[-1], table[:HARMONICS], table[HARMONICS:-1])
+
+    def room(flat: FloatArray) -> FloatArray:
+        """Return the margin to each limit, relative to it; not negative within the limits."""
+        motion = excitation(flat).motion(time)
+        middle = (lower + upper) / 2
+        moved = np.stack([motion.position - middle, motion.velocity, motion.acceleration])
+        share = moved / sizes[:, None]
+        return np.concatenate([(1 - share).ravel(), (1 + share).ravel()])
+
+    begin = np.concatenate([first.sine, first.cosine, first.middle[None]]) / half
+    nothing = room(np.zeros(begin.size))
+    # the limits are linear in the coefficients
+    linear = np.stack([room(unit) - nothing for unit in np.eye(begin.size)], axis=1)
+
+    def logarithm(flat: FloatArray) -> float:
+        return float(np.log(condition(arm, excitation(flat))))
+
+    found = minimize(
+        logarithm,
+        begin.ravel(),
+        method="SLSQP",
+        tol=1e-6,
+        constraints=LinearConstraint(linear, -nothing, np.inf),
+        options={"maxiter": max(1, evaluations // (begin.size + 2))},
+    )
+    return excitation(found.x)
+
+
+def improved(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
+    """Improve an excitation within limits at every instant.
+
+    Args:
+        arm: The arm.
+        first: The start, within the limits or not.
+        evaluations: Condition numbers it may take, gradients by differences included.
+    """
+    raw = numbers_of(arm, first)
+
+    def logarithm(trial: FloatArray) -> float:
+        return float(np.log(condition(arm, fitted(arm, trial))))
+
+    found = minimize(
+        logarithm,
+        raw,
+        method="SLSQP",
+        tol=1e-6,
+        options={"maxiter": max(1, evaluations // (raw.size + 2))},
+    )
+    return fitted(arm, found.x)

@@ -1,6 +1,7 @@
 """Kinematics of an arm by Pinocchio, from its table and without a URDF file."""
 
 from functools import lru_cache
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -16,19 +17,25 @@ class ArmError(EstimationError):
     """An arm's motion does not fit the arm, or does not identify its parameters."""
 
 
-def pinocchio() -> Any:
-    """Return the Pinocchio module; imported when first needed, since it is large and optional.
+def optional(module: str, need: str) -> Any:
+    """Return a module of the extra `arm`, imported when first needed.
+
+    Args:
+        module: Its name.
+        need: What needs it, in words.
 
     Raises:
         MissingExtraError: It is not installed.
     """
     try:
-        import pinocchio as module
+        return import_module(module)
     except ImportError as error:
-        raise MissingExtraError(
-            "Arm dynamics need Pinocchio, which is not installed.", "", "arm"
-        ) from error
-    return module
+        raise MissingExtraError(f"{need}, which is not installed.", "", "arm") from error
+
+
+def pinocchio() -> Any:
+    """Return the Pinocchio module, or raise MissingExtraError."""
+    return optional("pinocchio", "Arm dynamics need Pinocchio")
 
 
 @lru_cache(maxsize=8)

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from estimation.arm.design import by_active_set, improved
 from estimation.arm.excitation import (
     FUNDAMENTAL_HZ,
     Excitation,
+    by_active_set,
     condition,
     fitted,
+    improved,
     numbers_of,
     reached,
     start,

@@ -46,6 +46,20 @@ def ratios(
     return TextTable(title, header, rows, NOTE)
 
 
+def middle_and_ends(method: str, values: FloatArray) -> list[list[str]]:
+    """Return two rows of a table: a method's medians over arms, and its least and largest values.
+
+    Args:
+        method: Name of the method.
+        values: Shape (arms, columns).
+    """
+    ends = zip(values.min(axis=0), values.max(axis=0), strict=True)
+    return [
+        [f"{method}, median", *(f"{value:.2f}" for value in np.median(values, axis=0))],
+        [f"{method}, least to most", *(f"{low:.1f}-{high:.1f}" for low, high in ends)],
+    ]
+
+
 def verdict(found: Mapping[str, FloatArray]) -> str:
     """Return in how many cells ours is better, and which families are not in its favour."""
     drawn = {family: each for family, each in found.items() if family != OWN}

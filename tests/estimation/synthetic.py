@@ -79,3 +79,13 @@ def campaign(extra: Extra | None = None, noise_n_m: float = 1e-3) -> Campaign:
         for f in range(3)
         for t in range(3)
     )
+
+
+def campaign_with_jaw() -> Campaign:
+    """Return the campaign with a jaw whose angle differs from the spindle's by the grip."""
+    return Campaign.of(
+        run.with_columns(
+            jaw_angle_rad=1.2 + run["spindle_angle_rad"] - run["distal_torque_n_m"] / 2
+        )
+        for run in campaign()
+    )

@@ -5,18 +5,15 @@ import pytest
 from estimation.campaign import Campaign
 from rig.studies.instruments.intervals import TARGETS, run_intervals
 from rig.studies.instruments.intervals_page import page
-from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
-from tests.estimation.synthetic import campaign
+from rig.studies.oneill.paper import PROXIMAL
+from tests.estimation.synthetic import campaign_with_jaw
 
 pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
 def study():
-    runs = [
-        run.with_columns(**{JAW: 1.2 + run["spindle_angle_rad"] - run[DISTAL] / 2})
-        for run in campaign()
-    ]
+    runs = list(campaign_with_jaw())
     other = [run.with_columns(**{PROXIMAL: run[PROXIMAL] + 0.02}) for run in runs]
     both = {"own": Campaign.of(runs), "other": Campaign.of(other)}
     return run_intervals(both, ["own", "other"])

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.campaign import Campaign
 from rig.studies.oneill import states as oneill_states
 from rig.studies.oneill import states_page as shown
 from rig.studies.oneill.paper import DISTAL, JAW, PROXIMAL
 from rig.studies.oneill.state_rows import StateJob
 from rig.studies.oneill.states import run_states
-from tests.estimation.synthetic import campaign
+from tests.estimation.synthetic import campaign_with_jaw
 
 pytestmark = pytest.mark.long
 
@@ -20,10 +19,6 @@ EFFECT = "load of the last 0.5 s"
 
 @pytest.fixture(scope="module")
 def study():
-    runs = [
-        run.with_columns(**{JAW: 1.2 + run["spindle_angle_rad"] - run[DISTAL] / 2})
-        for run in campaign()
-    ]
     with pytest.MonkeyPatch.context() as patch:
         kinds = [StateJob("neutral", "current", PROXIMAL, protocol=p) for p in ("run-wise", "lofo")]
         kinds += [replace(kind, filters="live") for kind in kinds]
@@ -31,7 +26,9 @@ def study():
                   for e in ("", EFFECT) for t in (PROXIMAL, DISTAL, JAW)]  # fmt: skip
         patch.setattr(oneill_states, "jobs", lambda poses: kinds)
         done: list[tuple[int, int]] = []
-        found = run_states(Campaign.of(runs), None, on_row=lambda k, total: done.append((k, total)))
+        found = run_states(
+            campaign_with_jaw(), None, on_row=lambda k, total: done.append((k, total))
+        )
     assert done[-1] == (len(kinds), len(kinds))
     return found
 

@@ -15,11 +15,9 @@ from rig.studies.seeds import Keeper
 from rig.studies.zhang import free as zhang_free
 from rig.studies.zhang import networks as zhang_networks
 from rig.studies.zhang import physics as zhang_physics
-from rig.studies.zhang.psm import GRIPPER, simulate, with_instrument
-from rig.studies.zhang.psm_instruments import KINDS
+from rig.studies.zhang.psm import GRIPPER, KINDS, simulate, with_instrument
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
-from rig.studies.zhang.seed import one_arm
-from rig.studies.zhang.study import PAPER, run
+from rig.studies.zhang.study import PAPER, one_arm, run
 
 pytestmark = pytest.mark.long
 
@@ -83,7 +81,7 @@ def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path,
     monkeypatch.setattr(zhang_free, "OUR_OTHER_MINUTES", 0.5)
     monkeypatch.setattr(zhang_networks, "SETTINGS", Settings(nodes=4, iterations=8))
     monkeypatch.setattr(zhang_networks, "TRANSFER", Settings(nodes=4, iterations=5))
-    monkeypatch.setattr("rig.studies.seeds._done", here)
+    monkeypatch.setattr("rig.studies.seeds.in_processes", here)
     done = one_arm(0)
     monkeypatch.setattr("rig.studies.zhang.study.one_arm", lambda number: done)
     out, state = tmp_path / "zhang.md", tmp_path / "state"
@@ -109,7 +107,7 @@ def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path,
             assert after < before / 2
     assert "| M+C on M: paper | lost | lost | 6.11 | lost | lost | lost |" in out.read_text()
     assert (tmp_path / "zhang-grasp.svg").exists()
-    monkeypatch.setattr("rig.studies.seeds._done", nothing_left)
+    monkeypatch.setattr("rig.studies.seeds.in_processes", nothing_left)
     again = run(1, Keeper(state))
     assert {cell: list(numbers) for cell, numbers in again.outcomes[0].items()} == cells
     assert set(PAPER) <= {cell.rsplit(" | ", 1)[0] for cell in cells}

@@ -26,7 +26,7 @@ from rig.studies.delsol.study import (
     WITHIN,
     DelSolStudy,
 )
-from rig.studies.families import ratios, verdict
+from rig.studies.families import middle_and_ends, ratios, verdict
 
 TITLE = "External forces of a hydraulic arm: del Sol et al. 2014 on simulated arms"
 
@@ -112,11 +112,9 @@ def _tables(study: DelSolStudy) -> list[TextTable]:
     for method, every in study.outcomes.items():
         each = every[:: len(FAMILIES)]  # the simulation's own friction, which was matched
         rms = np.array([outcome.residual_n_m for outcome in each])
-        residual.append([f"{method}, median", *(f"{v:.2f}" for v in np.median(rms, axis=0))])
-        residual.append([f"{method}, least to most", *_ranges(rms)])
+        residual += middle_and_ends(method, rms)
         force = np.array([(o.impact_n, o.impact_percent, o.sliding_n) for o in each])
-        forces.append([f"{method}, median", *(f"{v:.2f}" for v in np.median(force, axis=0))])
-        forces.append([f"{method}, least to most", *_ranges(force)])
+        forces += middle_and_ends(method, force)
     stated = (TABLE_5_N[0], PEAK_PERCENT, TABLE_5_N[1])
     for method, word in ((PAPER, "within"), (DISCARDED, "with points discarded, within")):
         middle = np.median(_errors(study, method)[:: len(FAMILIES)], axis=0)
@@ -187,7 +185,3 @@ def _has_hoses(arm: Sequence[Named]) -> bool:
 
 def _near(found: FloatArray, paper: tuple[float, ...]) -> list[str]:
     return ["yes" if abs(f / p - 1) <= WITHIN else "no" for f, p in zip(found, paper, strict=True)]
-
-
-def _ranges(values: FloatArray) -> list[str]:
-    return [f"{low:.1f}-{high:.1f}" for low, high in zip(values.min(0), values.max(0), strict=True)]

@@ -13,7 +13,7 @@ from rig.output.figures import paired_bars
 from rig.output.page import Page
 from rig.output.table import TextTable
 from rig.studies.coverage import coverage
-from rig.studies.families import ratios, verdict
+from rig.studies.families import middle_and_ends, ratios, verdict
 from rig.studies.wrench.study import (
     BODY,
     CAUSAL,
@@ -143,20 +143,18 @@ def _body(study: WrenchStudy) -> TextTable:
 
 
 def _of_methods(study: WrenchStudy, table: str) -> list[list[str]]:
-    rows = []
-    for method in (THESIS, OURS, CAUSAL):
-        errors = study.errors(OWN, table, method)
-        rows.append([f"{method}, median", *(f"{value:.2f}" for value in np.median(errors, axis=0))])
-        ranges = zip(errors.min(0), errors.max(0), strict=True)
-        rows.append([f"{method}, least to most", *(f"{a:.1f}-{b:.1f}" for a, b in ranges)])
-    return rows
+    return [
+        row
+        for method in (THESIS, OURS, CAUSAL)
+        for row in middle_and_ends(method, study.errors(OWN, table, method))
+    ]
 
 
 def _effects(study: WrenchStudy) -> TextTable:
     """Return how often each kind of effect was found, whatever the joint, by family."""
     kinds: dict[str, Counter[str]] = {family: Counter() for family in FAMILIES}
     for arm in study.arms:
-        kinds[arm.family].update(dict.fromkeys(name.rsplit(" J", 1)[0] for name in arm.effects))
+        kinds[arm.family].update(sorted({name.rsplit(" J", 1)[0] for name in arm.effects}))
     rows = [
         [family, ", ".join(f"{kind} {count}" for kind, count in found.most_common())]
         for family, found in kinds.items()

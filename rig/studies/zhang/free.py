@@ -12,6 +12,7 @@ from rig.studies.zhang.networks import JointNetwork, trained, transferred
 from rig.studies.zhang.physics import Physics, find_effects, fitted
 from rig.studies.zhang.psm import (
     GRIPPER,
+    KINDS,
     RATE_HZ,
     Psm,
     PsmRun,
@@ -19,7 +20,6 @@ from rig.studies.zhang.psm import (
     simulate,
     with_instrument,
 )
-from rig.studies.zhang.psm_instruments import KINDS
 from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
 
 NETWORKS, BARE, OURS = "paper's networks", "physical model alone", "physical model and network"

@@ -23,8 +23,8 @@ from rig.studies.zhang.free import (
     OURS,
     SHORT,
 )
+from rig.studies.zhang.psm import KINDS
 from rig.studies.zhang.psm_grasp import CONFIGURATIONS_DEG
-from rig.studies.zhang.psm_instruments import KINDS
 from rig.studies.zhang.study import (
     PAPER,
     PAPER_FORCE_N,

@@ -9,12 +9,28 @@ from estimation.arm.kinematics import pinocchio
 from estimation.networks.training import require_torch
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, OWN
+from rig.arm.simulated import draw_arm
 from rig.output.provenance import Provenance
+from rig.studies.families import arm_of
 from rig.studies.seeds import Keeper, begin_learning, kept_outcomes
-from rig.studies.zhang.free import NETWORKS, Cells
-from rig.studies.zhang.seed import Outcome, one_arm
+from rig.studies.zhang.forces import Learnt, grasps, in_contact, turning
+from rig.studies.zhang.free import (
+    NETWORKS,
+    Cells,
+    figure_3,
+    fitted_physics,
+    free_runs,
+    of_family,
+    short_networks,
+    table_1,
+    table_2,
+)
+from rig.studies.zhang.psm import with_instrument
 
 SCHEMA = "rig.study.zhang/2"
+
+STREAM = 20220
+"""Of random numbers: other arms than those on which the simulation was chosen."""
 
 PAPER: dict[str, tuple[float | None, ...]] = {
     "I | C on C": (5.29, 5.73, 7.72, 3.50, 3.69, 3.69),
@@ -45,6 +61,21 @@ PAPER_FORCE_N, PAPER_MOMENT_N_M, PAPER_GRASP_N = 1.4, (0.04, 0.06), 0.1
 """Largest RMSE of an axis in contact; of the moment, the abstract's and section IV-D's."""
 
 WITHIN = 0.25
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Results of one arm.
+
+    Attributes:
+        cells: Its errors.
+        traces: Forces over time by `experiment | what`, N.
+        effects: Names of the effects found on the arm with the Cadiere Forceps, in order.
+    """
+
+    cells: Cells
+    traces: Cells
+    effects: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -102,6 +133,28 @@ class ZhangStudy:
 def worst_axes(contact: FloatArray) -> tuple[float, float, float]:
     """Return the largest force error, the largest moment error and the grasp's of a contact."""
     return float(contact[:3].max()), float(contact[3:6].max()), float(contact[6])
+
+
+def one_arm(number: int) -> Outcome:
+    """Do all experiments on one arm."""
+    seed, family = arm_of(number)
+    rng = np.random.default_rng([seed, STREAM])
+    forceps = of_family(with_instrument(rng, draw_arm(rng), "CF"), family, seed)
+    splits = {name: free_runs(forceps, rng, name == "M") for name in ("C", "M")}
+    networks, cells = table_1(splits, seed)
+    physics, ours = fitted_physics(forceps, splits)
+    cells |= ours | short_networks(splits, seed)
+    cells |= figure_3(forceps, rng)
+    gripper, other = table_2(forceps, rng, seed, family)
+    cells |= other
+    learnt = Learnt(forceps, networks, gripper, physics)
+    cells |= turning(learnt, rng)
+    traces: Cells = {}
+    for experiment in (grasps, in_contact):
+        errors, forces = experiment(learnt, rng)
+        cells |= errors
+        traces |= forces
+    return Outcome(cells, traces, tuple(effect.name for effect in physics.effects))
 
 
 def run(seeds: int, keeper: Keeper) -> ZhangStudy:
