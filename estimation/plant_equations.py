@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from estimation.channels import unit_of
-from estimation.derived import measured_channels
 from estimation.plant import (
     ACCELERATION,
     EFFORT,
@@ -297,6 +296,8 @@ def missing(plant: Plant) -> list[Missing]:
 
 def unused(plant: Plant) -> list[str]:
     """Return the channels that no equation reads."""
+    from estimation.derived import measured_channels  # loads numba, which help must not
+
     names = [
         name
         for equation in equations(plant)

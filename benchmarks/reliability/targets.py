@@ -60,7 +60,8 @@ class Target:
 
 def _commands() -> list[bytes]:
     gains, limits = np.array([20.0, 0.2, 4.0, 0.3, 2700.0]), Limits()
-    payloads = [teensy.encode(kind, 7) for kind in teensy.Kind if kind >= 16]
+    commands = [(teensy.VERSION, kind, 7) for kind in teensy.Kind if kind >= 16]
+    payloads = [np.array(one, teensy.HEADER_DTYPE).tobytes() for one in commands]
     payloads += [
         REFERENCE.encode_arm(8, gains, limits, 7),
         teensy.encode(teensy.Kind.PING, 9, 0, 10),

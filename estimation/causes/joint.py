@@ -355,8 +355,9 @@ class Joint:
         """Return the error that is missing because less of the readings' noise is in a residual.
 
         A cause that stands in for a noisy reading, or follows its noise, removes that noise. The
-        error that it removes so is put back. No residual has more noise than error, however noisy
-        a column is thought to be.
+        error that it removes so is put back: what counts is what is not noise in the residual, and
+        the larger one of the noise now and before. A residual that is smaller than its noise shows
+        that the noise was followed in a way that the noise model lacks.
 
         Args:
             part: Of the regression.
@@ -385,7 +386,7 @@ class Joint:
             itself = (amplitudes[:, :, None] @ laid.own_noise[name][runs])[:, :, 0]
             left = left + ((2.0 * follows + itself) * amplitudes).sum(axis=-1)
         before = ((noise @ usual) @ usual)[:, None]
-        return np.asarray(np.maximum(before - np.minimum(left, error), 0.0))
+        return np.asarray(np.maximum(before, left) - np.minimum(left, error))
 
     def whole(self, base: FloatArray) -> FloatArray:
         """Return amplitudes of the declared columns, with what was taken off those of causes.
