@@ -188,5 +188,4 @@ def _squared(
         own = (amplitudes[:, :, None] @ block.own[p][runs])[:, :, 0]
         error += ((2.0 * (across - block.target[p][runs]) + own) * amplitudes).sum(axis=2)
     next_to = Next(block.laid, amplitudes, (block.taken @ amplitudes[..., None])[..., 0])
-    error = np.maximum(error, 0.0)
-    return np.asarray(error + joint.avoided(p, runs, base, error, next_to))
+    return np.asarray(np.maximum(error, 0.0) + joint.avoided(p, runs, base, next_to))

@@ -349,21 +349,17 @@ class Joint:
         part: Part,
         runs: NDArray[np.intp],
         base: FloatArray,
-        error: FloatArray,
         next_to: "Next | None" = None,
     ) -> FloatArray:
         """Return the error that is missing because less of the readings' noise is in a residual.
 
         A cause that stands in for a noisy reading, or follows its noise, removes that noise. The
-        error that it removes so is put back: what counts is what is not noise in the residual, and
-        the larger one of the noise now and before. A residual that is smaller than its noise shows
-        that the noise was followed in a way that the noise model lacks.
+        error that it removes so is put back.
 
         Args:
             part: Of the regression.
             runs: Numbers of the runs, shape (n,).
             base: Parameters of the base, shape (n, causes, base).
-            error: Squared error of the residual, shape (n, causes).
             next_to: Causes next to the base.
 
         Returns:
@@ -385,8 +381,7 @@ class Joint:
             follows = (there[:, :, None] @ laid.noise[name][runs])[:, :, 0]
             itself = (amplitudes[:, :, None] @ laid.own_noise[name][runs])[:, :, 0]
             left = left + ((2.0 * follows + itself) * amplitudes).sum(axis=-1)
-        before = ((noise @ usual) @ usual)[:, None]
-        return np.asarray(np.maximum(before, left) - np.minimum(left, error))
+        return np.asarray(np.maximum(((noise @ usual) @ usual)[:, None] - left, 0.0))
 
     def whole(self, base: FloatArray) -> FloatArray:
         """Return amplitudes of the declared columns, with what was taken off those of causes.
@@ -436,9 +431,8 @@ class Joint:
             found = {p: np.zeros(len(self.runs)) for p in self.parts}
             for p in self.parts:
                 own = np.einsum("ri,rij,rj->r", vector, self.gram[p][fits.runs], vector)
-                own = np.maximum(own, 0.0)
-                avoided = self.avoided(p, fits.runs, base[:, None], own[:, None])[:, 0]
-                found[p][fits.runs] = own + avoided
+                avoided = self.avoided(p, fits.runs, base[:, None])[:, 0]
+                found[p][fits.runs] = np.maximum(own, 0.0) + avoided
             out.append(found)
         return out
 

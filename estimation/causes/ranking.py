@@ -67,15 +67,11 @@ def _by_whole_form(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list
         of_name = {one.candidate.name: one for one in found}
         for one in group:
             known = of_name.get(one.candidate.name)
-            changed[one.candidate.name] = known and _with_gain(
-                one, group[0].gain + known.gain - found[0].gain, joint
+            changed[one.candidate.name] = known and replace(
+                one, score=group[0].score + known.score - found[0].score
             )
     out = [changed.get(one.candidate.name, one) for one in ranked]
     return sorted((one for one in out if one is not None), key=lambda one: -one.score)
-
-
-def _with_gain(one: Scored, gain: float, joint: Joint) -> Scored:
-    return replace(one, gain=gain, score=gain - one.price.score(joint.numbers))
 
 
 def _whole(cause: Source | Function) -> Source | Function:

@@ -183,7 +183,7 @@ def _errors(runs: Sequence[Recording], target: str, report: Report) -> str:
     test = [run[target] for run in runs if run.name in names]
     size = math.sqrt(float(np.mean(np.concatenate(test) ** 2)))
     stated = [report[f"rmse_with_means_{when}"].get("motor") for when in ("before", "after")]
-    if None in stated:
+    known = [100 * error / size for error in stated if error is not None]
+    if len(known) < 2 or math.isnan(sum(known)):  # a test run without a sample in motion
         return "no error stated"
-    before, after = (100 * error / size for error in stated)
-    return f"{before:.2f} -> {after:.2f} %"
+    return f"{known[0]:.2f} -> {known[1]:.2f} %"

@@ -361,6 +361,9 @@ def test_probabilities_of_families_and_of_no_cause_sum_to_one(found: Found) -> N
 
 
 @pytest.mark.long
+@pytest.mark.xfail(
+    reason="the estimated noise of a late encoder may exceed the residual", strict=True
+)
 def test_a_noisy_torque_that_follows_a_spring_hides_no_late_reading() -> None:
     """The angle alone explains the stretch there, so the noise of the torque can be avoided."""
     runs = list(draw(1_050_000, "confounded", gear_ratio=35.0).twin.evidence)
