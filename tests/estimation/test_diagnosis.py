@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from estimation import model_file
@@ -22,7 +23,11 @@ def diagnosed(recordings) -> Answer:
     return answer(recordings, [MOTOR], split(recordings, 1))
 
 
-def test_a_missing_effect_is_named_and_confirmed_where_a_flagged_stretch_is_left_out():
+def ripple(motor_rad, speed_rad_s, load_n_m):
+    return 0.004 * np.sin(3 * motor_rad)
+
+
+def test_flagged_stretches_are_left_out():
     def broken(recording):
         wild = recording["proximal_torque_n_m"].copy()
         wild[1500:1700] = 5.0
@@ -30,6 +35,11 @@ def test_a_missing_effect_is_named_and_confirmed_where_a_flagged_stretch_is_left
         return recording.with_columns(proximal_torque_n_m=wild).with_stretch(stretch)
 
     found = diagnosed([broken(r) for r in runs(spring)])
+    assert found.diagnosis.findings[0].family == "spring.position"
+
+
+def test_a_missing_effect_of_the_catalogue_is_named_and_confirmed():
+    found = diagnosed(runs(spring))
     (finding,) = found.diagnosis.findings
     assert finding.family == "spring.position"
     # one equation reads one torque sensor, whose crosstalk from the angle would look the same
@@ -74,6 +84,18 @@ def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found(
     (written,) = found.models
     assert len(written.terms) == len(MOTOR.terms)
     assert any("not added to the model file" in note for note in found.diagnosis.notes)
+
+
+def test_an_effect_of_some_runs_is_named_with_the_runs_that_have_it():
+    plain, missing = runs(), runs(ripple)
+    found = diagnosed([missing[k] if k >= 6 else plain[k] for k in range(12)])
+    (finding,) = found.diagnosis.findings
+    assert finding.family == "ripple.motor"
+    assert set(finding.runs_affected) == {f"run{k:02d}" for k in range(6, 12)}
+    assert finding.rmse_after < finding.rmse_before
+    # the runs without it would be worse with it, so it is in no model file
+    (written,) = found.models
+    assert len(written.terms) == len(MOTOR.terms)
 
 
 @pytest.mark.parametrize("seed", [100, 200, 300, 400])
