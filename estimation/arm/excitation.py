@@ -27,6 +27,9 @@ GRID = 2000
 JUDGED = 80
 """Instants at which the regressor is computed; with more, its condition number barely changes."""
 
+LEAST_GAIN = 0.01
+"""Logarithm by which a search must lower the condition for another one to begin."""
+
 SAMPLED = 20
 """Instants of a period at which the limits are constraints."""
 
@@ -198,15 +201,20 @@ def improved(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
         evaluations: Condition numbers it may take, gradients by differences included.
     """
     raw = numbers_of(arm, first)
+    lowest, best = np.inf, raw
+    before, left = np.inf, evaluations // (raw.size + 2)
 
     def logarithm(trial: FloatArray) -> float:
-        return float(np.log(condition(arm, fitted(arm, trial))))
+        nonlocal lowest, best
+        value = float(np.log(condition(arm, fitted(arm, trial))))
+        if value < lowest:
+            lowest, best = value, trial.copy()
+        return value
 
-    found = minimize(
-        logarithm,
-        raw,
-        method="SLSQP",
-        tol=1e-6,
-        options={"maxiter": max(1, evaluations // (raw.size + 2))},
-    )
-    return fitted(arm, found.x)
+    # the criterion ignores scale, so a search may step far away and stop there: it begins again
+    # from the best trial while that helps
+    while left > 0 and (lowest == np.inf or lowest < before - LEAST_GAIN):
+        before, begin = lowest, numbers_of(arm, fitted(arm, best))
+        found = minimize(logarithm, begin, method="SLSQP", tol=1e-6, options={"maxiter": left})
+        left -= max(1, found.nit)
+    return fitted(arm, best)

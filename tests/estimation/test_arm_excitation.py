@@ -11,7 +11,11 @@ from typer.testing import CliRunner
 from estimation.arm.excitation import (
     ACCELERATION_PER_SPEED,
     FUNDAMENTAL_HZ,
+    by_active_set,
+    condition,
     fitted,
+    improved,
+    numbers_of,
     start,
 )
 from estimation.arm.tables import PSM
@@ -45,3 +49,11 @@ def test_the_command_writes_a_table_and_a_trajectory_within_limits(tmp_path):
     assert values.shape == (2000, 7)
     for k, joint in enumerate(PSM.joints):
         assert joint.lower <= values[:, k + 1].min() < values[:, k + 1].max() <= joint.upper
+
+
+@pytest.mark.long
+def test_a_search_is_never_worse_than_its_start():
+    """From this start the last trial of a search is eight times worse than the start."""
+    first = by_active_set(PSM, fitted(PSM, start(PSM, 1)), 3000)
+    scaled = fitted(PSM, numbers_of(PSM, first))
+    assert condition(PSM, improved(PSM, first, 3000)) <= condition(PSM, scaled)
