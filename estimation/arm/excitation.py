@@ -202,7 +202,7 @@ def improved(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
     """
     raw = numbers_of(arm, first)
     lowest, best = np.inf, raw
-    before, left = np.inf, evaluations // (raw.size + 2)
+    before, left = np.inf, max(1, evaluations // (raw.size + 2))
 
     def logarithm(trial: FloatArray) -> float:
         nonlocal lowest, best
