@@ -67,6 +67,7 @@ class CampaignFrictionStep(Pointwise):
     told_apart_by = "the first run repeated at the end"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         after = np.where(inputs["campaign_clock"] >= shape[0], 1.0, 0.0)
         return (after * np.tanh(inputs["speed"] / shape[1]),)
 

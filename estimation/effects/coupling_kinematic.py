@@ -51,5 +51,6 @@ class BowedCoupling(Pointwise):
     told_apart_by = "the other joint moved alone"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         angle = inputs["other_angle"]
         return angle, angle * angle

@@ -30,6 +30,7 @@ class EccentricLoad(Pointwise):
     told_apart_by = "the same sweep against two loads"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         phase = shape[0] * inputs["output_angle"]
         return inputs["load"] * np.sin(phase), inputs["load"] * np.cos(phase)
 
@@ -49,6 +50,7 @@ class EccentricHarmonics(EccentricLoad):
     amplitudes = harmonics_in("target / load")
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return [inputs["load"] * x for x in harmonics(shape[0] * inputs["output_angle"])]
 
 

@@ -32,6 +32,7 @@ class Capstan(Pointwise):
     told_apart_by = "the same motion at another wrap angle, such as another pose of the wrist"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (inputs["load"] * np.expm1(shape[0] * np.tanh(inputs["speed"] / shape[1])),)
 
 
@@ -60,5 +61,6 @@ class WristCapstan(Capstan):
     told_apart_by = "the same motion in several poses of the wrist"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         wrap = shape[0] * np.abs(inputs["other_angle"])
         return (inputs["load"] * np.expm1(wrap * np.tanh(inputs["speed"] / shape[1])),)

@@ -26,4 +26,5 @@ class CoulombAsymmetry(Pointwise):
     told_apart_by = "standstill periods, and slow motion in both directions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (np.abs(np.tanh(inputs["speed"] / shape[0])),)

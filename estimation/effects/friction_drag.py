@@ -24,4 +24,5 @@ class Drag(Pointwise):
     told_apart_by = "a staircase of constant speeds up to the highest"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (inputs["speed"] * np.abs(inputs["speed"]),)

@@ -40,6 +40,7 @@ class LoadFriction(Pointwise):
     told_apart_by = "the same motion against two stiffnesses, and free"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (np.abs(inputs["load"]) * np.tanh(inputs["speed"] / shape[0]),)
 
 
@@ -138,6 +139,7 @@ class PowerLoadFriction(LoadFriction):
     told_apart_by = "the same motion against three stiffnesses, and free"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         pressed = UNIT_LOAD * (np.abs(inputs["load"]) / UNIT_LOAD) ** shape[0]
         return (pressed * np.tanh(inputs["speed"] / shape[1]),)
 

@@ -26,6 +26,7 @@ class LoadViscousFriction(Pointwise):
     told_apart_by = "a staircase of speeds at two loads"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (np.abs(inputs["load"]) * inputs["speed"],)
 
 
@@ -45,5 +46,6 @@ class SaturatingLoadViscousFriction(LoadViscousFriction):
     shape = (Parameter("knee", "speed", "speed at which half remains", 0.1, 500.0, points=9),)
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         speed = inputs["speed"]
         return (np.abs(inputs["load"]) * speed / (1.0 + np.abs(speed) / shape[0]),)

@@ -35,6 +35,7 @@ class PositionFriction(Pointwise):
     told_apart_by = "a slow sweep without load, in both directions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         along = inputs["position"] * np.tanh(inputs["speed"] / shape[0])
         square = inputs["position"] * along
         return along, square, inputs["position"] * square

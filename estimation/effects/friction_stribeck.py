@@ -31,4 +31,5 @@ class Stribeck(Pointwise):
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (np.exp(-((inputs["speed"] / shape[0]) ** 2)) * np.tanh(inputs["speed"] / shape[1]),)

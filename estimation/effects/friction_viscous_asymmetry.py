@@ -27,4 +27,5 @@ class ViscousAsymmetry(Pointwise):
     told_apart_by = "a staircase of constant speeds in both directions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (np.abs(inputs["speed"]),)

@@ -70,5 +70,6 @@ class CampaignWarmup(Pointwise):
     told_apart_by = "the first run repeated at the end, and again after a night"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         fade = np.exp(-np.maximum(inputs["campaign_clock"], 0.0) / shape[0])
         return (fade * np.tanh(inputs["speed"] / shape[1]),)

@@ -28,6 +28,7 @@ class Payload(Pointwise):
     told_apart_by = "the same slow sweep with the rig tilted"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (
             np.sin(inputs["tilt"]),
             np.cos(inputs["tilt"]),

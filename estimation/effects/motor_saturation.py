@@ -29,6 +29,7 @@ class Saturation(Pointwise):
     told_apart_by = "stall at several currents of both signs"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (inputs["current"] - shape[0] * np.tanh(inputs["current"] / shape[0]),)
 
 
@@ -49,4 +50,5 @@ class CubicSaturation(Saturation):
     shape = ()
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (inputs["current"] ** 3,)

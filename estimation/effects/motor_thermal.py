@@ -71,6 +71,7 @@ class CampaignWarming(Pointwise):
     told_apart_by = "the first run once more at the end, and once more after the motor has cooled"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (-inputs["current"] * np.expm1(-np.maximum(inputs["campaign_clock"], 0) / shape[0]),)
 
 
@@ -104,6 +105,7 @@ class MeasuredThermalLoss(Pointwise):
     told_apart_by = "a run repeated immediately, and again after the motor has cooled"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (inputs["current"] * (inputs["temperature"] - REFERENCE_K),)
 
 

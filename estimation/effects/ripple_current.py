@@ -31,5 +31,6 @@ class CurrentRipple(Pointwise):
     told_apart_by = "the same slow sweep at two currents"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         phase = shape[0] * inputs["motor_angle"]
         return inputs["current"] * np.sin(phase), inputs["current"] * np.cos(phase)

@@ -30,5 +30,6 @@ class MotorRipple(Pointwise):
     told_apart_by = "a sweep at a slow constant speed, and coasting without current"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         phase = shape[0] * inputs["motor_angle"]
         return np.sin(phase), np.cos(phase)

@@ -57,6 +57,7 @@ class OutputRipple(Pointwise):
     told_apart_by = "a sweep at a slow constant speed over several turns, and under another load"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         phase = shape[0] * inputs["output_angle"]
         return np.sin(phase), np.cos(phase)
 
@@ -79,4 +80,5 @@ class OutputHarmonics(OutputRipple):
     shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=31),)
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return harmonics(shape[0] * inputs["output_angle"])

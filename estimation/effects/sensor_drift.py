@@ -52,6 +52,7 @@ class CampaignDrift(Pointwise):
     told_apart_by = "the unloaded sensor at rest before, during and after a campaign"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (-np.expm1(-np.maximum(inputs["campaign_clock"], 0.0) / shape[0]),)
 
 

@@ -40,6 +40,7 @@ class EncoderNonlinearity(Pointwise):
     )
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         phase = shape[0] * inputs["encoder"]
         return np.sin(phase), np.cos(phase)
 
@@ -61,4 +62,5 @@ class EncoderHarmonics(EncoderNonlinearity):
     shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=16),)
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return harmonics(shape[0] * inputs["encoder"])

@@ -32,6 +32,7 @@ class NonlinearGain(Pointwise):
     told_apart_by = "reference weights over the sensor's whole range, both signs"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         reading = inputs["reading"]
         square = reading * reading
         return square, square * reading, reading * np.abs(reading)

@@ -27,6 +27,7 @@ class EndStop(Pointwise):
     told_apart_by = "a slow free sweep to the ends of the travel, in both directions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (np.maximum(inputs["stop"] - shape[0], 0.0),)
 
 
@@ -46,4 +47,5 @@ class OpenEndStop(EndStop):
     shape = (Parameter("onset", "stop", "angle of first contact", -2.6, 0.6, True, 41),)
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (np.minimum(inputs["stop"] - shape[0], 0.0),)

@@ -33,6 +33,7 @@ class Backlash(Pointwise):
     told_apart_by = "a load that passes slowly through zero, in both directions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (np.tanh((inputs["load"] - shape[1]) / shape[0]),)
 
 

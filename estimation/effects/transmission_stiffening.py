@@ -29,6 +29,7 @@ class Stiffening(Pointwise):
     told_apart_by = "a slow ramp of load against a reference weight, to both sides"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (inputs["load"] - shape[0] * np.tanh(inputs["load"] / shape[0]),)
 
 
@@ -51,6 +52,7 @@ class AsymmetricStiffness(Stiffening):
     shape = ()
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (np.abs(inputs["load"]),)
 
 
@@ -71,4 +73,5 @@ class CubicStiffening(Stiffening):
     shape = ()
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
         return (inputs["load"] ** 3,)
