@@ -17,6 +17,7 @@ from scipy import ndimage
 from estimation.campaign import Campaign
 from estimation.derived import (
     CAMPAIGN_TIME,
+    CLOCKS,
     measured_channels,
     origin_of,
     zero_phase_channels,
@@ -382,7 +383,7 @@ def _signals(
     random = zero_phase_channels(
         white_noise(recording, reading, signals), wanted, low_pass, signals
     )
-    noise = {name: np.array(random[name])[::step] for name in dict.fromkeys(wanted)}
+    noise = {n: np.array(random[n])[::step] for n in dict.fromkeys(wanted) if n not in CLOCKS}
     channels[CAMPAIGN_TIME] = np.array(recording[CAMPAIGN_TIME])[::step]
     channels["time_s"] = (recording.time_s - recording.time_s[0])[::step]
     rate_hz = recording.sample_rate_hz / step

@@ -25,6 +25,7 @@ from estimation.causes.scoring import assessed, best_of_each
 from estimation.causes.search import Found, search
 from estimation.causes.sources import sources_at
 from estimation.causes.verdict import answer, diagnose
+from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.split import split
 from estimation.recording import FloatArray, Recording
 from tests.estimation.causes.synthetic import (
@@ -360,10 +361,16 @@ def test_probabilities_of_families_and_of_no_cause_sum_to_one(found: Found) -> N
         assert 0.9 < sum(p.share for p in family_probabilities(ranked, DEFAULT)) <= 1.0
 
 
+def test_readings_have_noise_and_clocks_have_none() -> None:
+    runs = recordings(runs=2)
+    for run in lay_out([motor()], runs, [r.name for r in runs]).runs:
+        shaken = run.shaken()
+        changed = {n for n, x in run.channels.items() if not np.array_equal(x, shaken.channels[n])}
+        assert {"motor_current_a", "proximal_torque_n_m"} <= changed
+        assert not changed & {"time_s", CAMPAIGN_TIME}
+
+
 @pytest.mark.long
-@pytest.mark.xfail(
-    reason="the estimated noise of a late encoder may exceed the residual", strict=True
-)
 def test_a_noisy_torque_that_follows_a_spring_hides_no_late_reading() -> None:
     """The angle alone explains the stretch there, so the noise of the torque can be avoided."""
     runs = list(draw(1_050_000, "confounded", gear_ratio=35.0).twin.evidence)
