@@ -67,9 +67,10 @@ def _by_whole_form(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list
         of_name = {one.candidate.name: one for one in found}
         for one in group:
             known = of_name.get(one.candidate.name)
-            changed[one.candidate.name] = known and replace(
-                one, score=group[0].score + known.score - found[0].score
-            )
+            if known is not None:  # by as much more or less than it has by the odd part
+                more = group[0].score + known.score - found[0].score - one.score
+                known = replace(one, score=one.score + more, gain=one.gain + more)
+            changed[one.candidate.name] = known
     out = [changed.get(one.candidate.name, one) for one in ranked]
     return sorted((one for one in out if one is not None), key=lambda one: -one.score)
 

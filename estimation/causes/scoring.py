@@ -143,11 +143,11 @@ def _in_readings(
         seen = np.ones(len(candidates))
         for k, channel in enumerate(joint.linear(name).values()):
             if channel.endswith(AMPLIFIED):
-                alone = np.array([{*one.cause.reads} <= {channel} for one in candidates])
+                alone = np.array([{*one.cause.reads} == {channel} for one in candidates])
                 seen[alone] = slopes[alone, k]
         if name in outcome.changes:
             change, channel = outcome.changes[name], joint.largest_linear[name][1]
-            other = np.array([not {*one.cause.reads} <= {channel} for one in candidates])
+            other = np.array([{*one.cause.reads} != {channel} for one in candidates])
             seen = np.where(other, np.minimum(seen, change), seen)
             replaces |= other & ((change < 1.0 / MOST_CHANGE) | (change > MOST_CHANGE))
         seen = np.where(moved, 1.0, seen)
