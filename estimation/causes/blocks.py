@@ -34,13 +34,22 @@ class Block:
     target: Mapping[Part, FloatArray]
     taken: FloatArray
 
+    def only(self, chosen: NDArray[np.bool_]) -> "Block":
+        """Return some of the causes."""
+        base, own, target = (
+            {p: x[:, chosen] for p, x in kind.items()}
+            for kind in (self.base, self.own, self.target)
+        )
+        return Block(self.laid.only(chosen), base, own, target, self.taken[chosen])
+
 
 @dataclass(frozen=True)
 class Outcome:
     """Causes of one block, fitted and left out.
 
     Attributes:
-        errors: For each family of folds, part to squared error, shape (runs, causes).
+        promising: Which of them could be worth a price, shape (causes,).
+        errors: For each family of folds, part to squared error of these, (runs, promising).
         amplitudes: On all runs, shape (causes, k).
         changes: Equation to the factor by which its largest linear term changes, shape (causes,).
         slopes: Equation to the factor of each channel times a constant within runs, the causes'
@@ -51,6 +60,7 @@ class Outcome:
         base: Products of the base's columns with the columns, shape (runs, causes, base, k).
     """
 
+    promising: NDArray[np.bool_]
     errors: Sequence[Mapping[Part, FloatArray]]
     amplitudes: FloatArray
     changes: Mapping[str, FloatArray]
@@ -101,39 +111,21 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
         folds: Families of folds.
         precision: Prior precision of every amplitude, shape (causes, k).
     """
-    weights, zero = joint.weights, np.zeros(())
-    sums = [
-        np.asarray(sum((weights[p] * kind[p] for p in block.base), zero))
-        for kind in (block.base, block.own, block.target)
-    ]
-
-    of_prior = joint.prior_products(block.taken)
-    own_prior = -block.taken.swapaxes(1, 2) @ of_prior[:, : block.taken.shape[1]]
-
-    def fitted(family: Sequence[Sequence[int]]) -> tuple[FloatArray, FloatArray]:
-        """Return the base and the amplitudes without each fold, (folds, causes, .) each."""
-        fits = joint.left_out(family)
-        cross, own, right = (x.sum(axis=0) - np.tensordot(fits.left, x, 1) for x in sums)
-        cross, own = cross + of_prior, own + own_prior
-        through = fits.inverse[:, None] @ cross
-        eye = np.eye(own.shape[-1])
-        spread = 1e-9 * np.einsum("fckk->fck", own) + precision
-        schur = own - cross.swapaxes(2, 3) @ through + spread[..., None] * eye
-        left = right - (fits.base[:, None, None] @ cross)[:, :, 0]
-        amplitudes = np.linalg.solve(schur, left[..., None])
-        return fits.base[:, None] - (through @ amplitudes)[..., 0], amplitudes[..., 0]
-
+    whole = _Fitting(joint, block, precision)
+    (base,), (amplitudes,) = whole.left_out([[]])
+    promising = _gain(joint, block, base, amplitudes) >= joint.numbers.cause_cost
+    some = _Fitting(joint, block.only(promising), precision[promising])
     errors = []
-    for family in folds:
+    for family in folds if promising.any() else ():
         fits = joint.left_out(family)
-        base, amplitudes = (x[fits.fold] for x in fitted(family))
+        of_base, of_causes = (x[fits.fold] for x in some.left_out(family))
         found = {}
         for p in joint.parts:
-            found[p] = np.zeros((len(joint.runs), len(precision)))
-            found[p][fits.runs] = _squared(joint, block, p, fits.runs, base, amplitudes)
+            found[p] = np.zeros((len(joint.runs), of_causes.shape[1]))
+            found[p][fits.runs] = _squared(joint, some.block, p, fits.runs, of_base, of_causes)
         errors.append(found)
-    (base,), (amplitudes,) = fitted([[]])
     inside, usual = [p for p in block.base if p[1] == "within"], joint.left_out([[]]).base[0]
+    weights, zero = joint.weights, np.zeros(())
     cross, own, right = (
         np.asarray(sum((weights[p] * kind[p] for p in inside), zero))
         for kind in (block.base, block.own, block.target)
@@ -158,7 +150,60 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
     right = right + (gram[:, None, None, :count, -1] @ block.taken)[:, :, 0]
     cross = cross + gram[:, None, :-1, :count] @ block.taken
     residual = right - (usual @ cross)
-    return Outcome(errors, amplitudes, changes, slopes, residual, own, cross)
+    return Outcome(promising, errors, amplitudes, changes, slopes, residual, own, cross)
+
+
+class _Fitting:
+    """Causes of a block, fitted together with the base.
+
+    Args:
+        joint: The regression.
+        block: The causes.
+        precision: Prior precision of every amplitude, shape (causes, k).
+    """
+
+    def __init__(self, joint: Joint, block: Block, precision: FloatArray) -> None:
+        self.joint, self.block, self.precision = joint, block, precision
+        weights, zero = joint.weights, np.zeros(())
+        self._sums = [
+            np.asarray(sum((weights[p] * kind[p] for p in block.base), zero))
+            for kind in (block.base, block.own, block.target)
+        ]
+        self._of_prior = joint.prior_products(block.taken)
+        declared = self._of_prior[:, : block.taken.shape[1]]
+        self._own_prior = -block.taken.swapaxes(1, 2) @ declared
+
+    def left_out(self, family: Sequence[Sequence[int]]) -> tuple[FloatArray, FloatArray]:
+        """Return the base and the amplitudes without each fold, (folds, causes, .) each."""
+        fits = self.joint.left_out(family)
+        cross, own, right = (x.sum(axis=0) - np.tensordot(fits.left, x, 1) for x in self._sums)
+        cross, own = cross + self._of_prior, own + self._own_prior
+        through = fits.inverse[:, None] @ cross
+        eye = np.eye(own.shape[-1])
+        spread = 1e-9 * np.einsum("fckk->fck", own) + self.precision
+        schur = own - cross.swapaxes(2, 3) @ through + spread[..., None] * eye
+        left = right - (fits.base[:, None, None] @ cross)[:, :, 0]
+        amplitudes = np.linalg.solve(schur, left[..., None])
+        return fits.base[:, None] - (through @ amplitudes)[..., 0], amplitudes[..., 0]
+
+
+def _gain(joint: Joint, block: Block, base: FloatArray, amplitudes: FloatArray) -> FloatArray:
+    """Return the score of causes on the runs that they were fitted on, shape (causes,).
+
+    What is left out shows less. A cause that is not even worth its least price here is none.
+    """
+    usual, total = np.append(joint.left_out([[]]).base[0], -1.0), np.zeros(len(base))
+    for p in joint.parts:
+        gram, samples = joint.gram[p].sum(axis=0), joint.samples[p].sum()
+        error = ((base @ gram[:-1, :-1] - 2.0 * gram[-1, :-1]) * base).sum(axis=1) + gram[-1, -1]
+        if p in block.base:
+            across = (base[:, None] @ block.base[p].sum(axis=0))[:, 0]
+            own = (amplitudes[:, None] @ block.own[p].sum(axis=0))[:, 0]
+            right = block.target[p].sum(axis=0)
+            error += ((2.0 * (across - right) + own) * amplitudes).sum(axis=1)
+        before = float(usual @ gram @ usual)
+        total += joint.log_ratio(p, max(before, 0.0) / samples, np.maximum(error, 0.0) / samples)
+    return total
 
 
 def _per_unit(

@@ -473,7 +473,7 @@ class Joint:
             total = total + np.sum(least, axis=0) / sum(trusts)
         return np.asarray(total)
 
-    def log_ratio(self, part: Part, before: FloatArray, after: FloatArray) -> FloatArray:
+    def log_ratio(self, part: Part, before: FloatArray | float, after: FloatArray) -> FloatArray:
         """Return the weighted log ratio of mean squared errors of a part, above its floor."""
         numbers, weight = self.numbers, 1.0
         floor = numbers.form_floor * self.error[part]

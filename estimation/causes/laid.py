@@ -44,7 +44,7 @@ class Laid:
     def __len__(self) -> int:
         return len(self.size)
 
-    def only(self, chosen: slice | NDArray[np.intp]) -> "Laid":
+    def only(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> "Laid":
         """Return some of the causes."""
         return Laid(
             {name: x[:, chosen] for name, x in self.inner.items()},

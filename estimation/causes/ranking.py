@@ -23,14 +23,14 @@ KNOTS_OF_BEND, BENT = 5, 24
 """Hat functions of a form's deviation from its equation, and families that are given one."""
 
 REFINED = 8
-"""Families whose shapes are refined after the grid."""
+"""Names whose shapes are refined after the grid, and those whose choices of runs are."""
 
 
 def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
     """Return the best of each name: on the grid, on some of the runs, refined, and relaxed."""
     everything = assessed(joint, pool, folds)
     some = best_of_each(assessed(joint, groups_of(joint, on_some_runs(joint, everything)), folds))
-    climbing = some
+    climbing = some[:REFINED]
     for _ in range(TURNS):
         flipped = [c for s in climbing for c in one_run_changed(s.candidate)]
         found = best_of_each(assessed(joint, groups_of(joint, flipped), folds))

@@ -79,12 +79,14 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
         block = block_of(joint, group.laid, group.block)
         outcome = evaluate(joint, block, folds, group.precision)
         replaces = _in_readings(joint, group.candidates, outcome)
-        scores = joint.score(spreads, before, outcome.errors)
+        gains = np.zeros(len(group.candidates))
+        if outcome.errors:
+            gains[outcome.promising] = joint.score(spreads, before, outcome.errors)
         for k, candidate in enumerate(group.candidates):
             amplitudes = outcome.amplitudes[k]
             if replaces[k] or _is_impossible(candidate, amplitudes):
                 continue
-            gain, price = float(scores[k]), _price(candidate, joint)
+            gain, price = float(gains[k]), _price(candidate, joint)
             score = gain - price.score(joint.numbers)
             by_run = outcome.cross[:, k], outcome.own[:, k], outcome.base[:, k]
             out.append(Scored(candidate, score, gain, price, amplitudes, by_run))
@@ -153,7 +155,7 @@ def _in_readings(
         seen = np.where(moved, 1.0, seen)
         unit = np.maximum(1.0, np.maximum(seen, 1e-3) ** -2.0)
         for family in outcome.errors:
-            family[name, "within"][:] *= unit
+            family[name, "within"][:] *= unit[outcome.promising]
     replaces[moved] = False
     return replaces
 

@@ -157,6 +157,10 @@ class Source:
         """Whether its columns need no other samples than those that are regressed on."""
         return isinstance(self.effect, Pointwise) and not any(e.order for e in self.place.enters)
 
+    @cached_property
+    def _is_whole(self) -> bool:
+        return self.parts == tuple(range(len(self.effect.amplitudes)))
+
     def values(self, run: RunSignals) -> FloatArray | None:
         """Return the source's columns over the run, (n, parts), as its own equation reads them.
 
@@ -171,7 +175,7 @@ class Source:
         made: dict[str, FloatArray] = {}
         series: dict[object, FloatArray | None] = {}
         bends_first = None if self.on_grid else self.bend  # before it is differentiated
-        chosen = list(self.parts)
+        chosen = slice(None) if self._is_whole else list(self.parts)
         for entry in self.place.enters:
             names = self._names(run, entry.equation)
             load = entry.load and signal(run, entry.load, entry.equation)
@@ -192,7 +196,8 @@ class Source:
             if bends_first is None:
                 found = found[:, chosen]
                 found = found if self.bend is None else _bent(found, self.bend)
-            used = entry.gain * self.side * found[run.used[entry.equation]]
+            used = found.take(run.used[entry.equation], axis=0)
+            used *= entry.gain * self.side
             made[entry.equation] = made[entry.equation] + used if entry.equation in made else used
         return made
 
