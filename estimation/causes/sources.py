@@ -269,7 +269,7 @@ def _acts(effect: Effect, place: Place) -> bool:
         case "lever":
             return True
         case "actuator":
-            return effect.id.startswith((*ACTUATOR, "sensor.delay"))
+            return effect.id.startswith((*ACTUATOR, "sensor.delay", "sensor.gain_nonlinear"))
         case "deflection":
             return effect.id.startswith(DEFLECTION) and not effect.id.endswith(".lugre")
         case "torque sensor":

@@ -5,15 +5,16 @@ from typing import ClassVar
 import numpy as np
 
 from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
+from estimation.recording import FloatArray
 
 
 class Capstan(Pointwise):
     """Friction of a cable over a constant wrap angle.
 
-    Equation: torque = c load (exp(wrap tanh(speed / width)) - 1). `wrap` is the coefficient of
-    friction times the wrap angle, without unit; load in N m, width in rad/s, c without unit. The
-    tension is multiplied by exp(wrap) when the cable is pulled and divided by it when it is
-    released.
+    Equation: torque = c load (exp(wrap sign(load) tanh(speed / width)) - 1). `wrap` is the
+    coefficient of friction times the wrap angle, without unit; load in N m, width in rad/s, c
+    without unit. The tension is multiplied by exp(wrap) when the cable is pulled against its load
+    and divided by it when it is released. A load of the other sign is that of the other cable.
 
     Check: inspect the cable and its guides for wear and dirt; the ratio of the torques of pulling
     and releasing is exp(2 wrap).
@@ -33,15 +34,15 @@ class Capstan(Pointwise):
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
-        return (inputs["load"] * np.expm1(shape[0] * np.tanh(inputs["speed"] / shape[1])),)
+        return (_carried(inputs, shape[0], shape[1]),)
 
 
 class WristCapstan(Capstan):
     """Friction of a cable that is wrapped over a joint by that joint's own angle.
 
-    Equation: torque = c load (exp(friction |bend| tanh(speed / width)) - 1). `bend` is the wrist's
-    angle in rad, `friction` the coefficient of friction, load in N m, width in rad/s, c without
-    unit.
+    Equation: torque = c load (exp(friction |bend| sign(load) tanh(speed / width)) - 1). `bend` is
+    the wrist's angle in rad, `friction` the coefficient of friction, load in N m, width in rad/s,
+    c without unit.
 
     Check: repeat the same motion with the wrist straight and bent; inspect the cable at the wrist.
 
@@ -62,5 +63,10 @@ class WristCapstan(Capstan):
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
-        wrap = shape[0] * np.abs(inputs["other_angle"])
-        return (inputs["load"] * np.expm1(wrap * np.tanh(inputs["speed"] / shape[1])),)
+        return (_carried(inputs, shape[0] * np.abs(inputs["other_angle"]), shape[1]),)
+
+
+def _carried(inputs: Inputs, wrap: FloatArray | float, width: float) -> FloatArray:
+    """Return what a wrapped cable adds to its load, or takes off."""
+    load, direction = inputs["load"], np.tanh(inputs["speed"] / width)
+    return np.asarray(load * np.expm1(wrap * np.sign(load) * direction))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from estimation.campaign import Campaign
 from estimation.channels import unit_of
 from estimation.derived import measured_channels
-from estimation.effects import UnknownEffectError, catalogue, effect
+from estimation.effects import Pointwise, UnknownEffectError, catalogue, effect
 from estimation.filters import LowPass
 from estimation.fitting import fit
 from estimation.model import Model, Term, balance_channels
@@ -264,3 +264,23 @@ def test_units_of_parameters_follow_from_the_channels():
 def test_an_unknown_effect_names_the_nearest():
     with pytest.raises(UnknownEffectError, match=r"Did you mean 'friction\.coulomb'"):
         effect("friction.columb")
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        e
+        for e in catalogue().values()
+        if isinstance(e, Pointwise)
+        and e.id.startswith("friction.")
+        and all(p.lower == 0.0 for p in e.amplitudes)
+    ],
+    ids=lambda e: e.id,
+)
+@given(place=st.floats(0.1, 0.9), seed=st.integers(0, 2**16))
+@settings(max_examples=20, deadline=None)
+def test_friction_opposes_the_motion_against_loads_of_both_signs(kind, place, seed):
+    random = np.random.default_rng(seed)
+    inputs = {role: random.normal(0.0, 1.0, 200) for role in kind.roles}
+    columns = kind.columns(inputs, [at(p, place) for p in kind.shape])
+    assert np.all(columns * inputs["speed"][:, None] >= 0.0)
