@@ -197,6 +197,7 @@ def _page(done: Sequence[Searched], seed: int) -> str:
     early = sum(any(p > 0.5 for p in _shares(c.first, DEFAULT).values()) for c in clean)
     false = sum(bool(case.findings) for case in clean)
     bound = float(beta.ppf(0.95, false + 1, len(clean) - false)) if clean else 1.0
+    conformal = (false + 1) / (len(clean) + 1)  # exchangeable seeds, nothing chosen by these
     stated = [one for case in named for one in case.stated(DEFAULT)]
     rows = "\n".join(
         f"| {name} | {getattr(DEFAULT, name):g} | {getattr(best, name):g} | "
@@ -219,8 +220,9 @@ Mean log probability of the truth: {log_score(done, DEFAULT):.3f} with the shipp
 {rows}
 
 In the training runs {early} of {len(clean)} campaigns without a cause show one at more than one
-half. After the test runs {false} have a finding: below {100.0 * bound:.1f} % of such campaigns, at
-95 %.
+half. After the test runs {false} have a finding. By split conformal prediction the next such
+campaign has one with a probability of at most {100.0 * conformal:.2f} %; with a confidence of 95 %
+fewer than {100.0 * bound:.1f} % of all such campaigns have one.
 
 How often the family that a finding names is the true one, by the confidence stated:
 
