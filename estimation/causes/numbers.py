@@ -1,10 +1,11 @@
 """The numbers that decide a diagnosis.
 
-`python -m benchmarks.diagnosis.calibrate` measures on drawn campaigns which `sharpness` and
-`cause_cost` give the truth the best mean log probability, see docs/results/diagnosis-numbers.md.
-The shipped ones are round values within .03 of the best; a larger cost keeps more clean campaigns
-without a cause and loses weak effects. All others were set by hand while the core was developed on
-campaigns of the develop range.
+`python -m benchmarks.diagnosis.calibrate` measures on drawn campaigns which `sharpness`,
+`cause_cost`, `rare_cost` and `choice_price` give the truth the best mean log probability, see
+docs/results/diagnosis-numbers.md. The three costs are the best of those compared; `sharpness` is
+a round value within .02 of the best. A larger cost keeps more clean campaigns without a cause and
+loses weak effects. All others were set by hand while the core was developed on campaigns of the
+develop range.
 """
 
 from dataclasses import dataclass
