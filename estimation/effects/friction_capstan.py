@@ -67,6 +67,6 @@ class WristCapstan(Capstan):
 
 
 def _carried(inputs: Inputs, wrap: FloatArray | float, width: float) -> FloatArray:
-    """Return what a wrapped cable adds to its load, or takes off."""
+    """Return the friction of a cable that is wrapped, for one unit of amplitude."""
     load, direction = inputs["load"], np.tanh(inputs["speed"] / width)
     return np.asarray(load * np.expm1(wrap * np.sign(load) * direction))
