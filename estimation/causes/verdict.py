@@ -253,7 +253,7 @@ def _tested(
         gains[k] = (train * gains[k] + of_runs.log_ratio(rate) / rate) / count
     shares = np.array([p.share for p in known])
     total = float(np.logaddexp.reduce(np.log(shares / shares.sum()) + logs))
-    prices = np.array([p.best.gain - p.best.score for p in known])
+    prices = np.array([p.best.price.score(numbers) for p in known])
     weights = probabilities(gains - prices, gains, numbers.sharpness)
     found = sorted(
         (
