@@ -38,8 +38,10 @@ def test_a_drive_of_another_ratio_goes_from_table_to_export(run, tmp_path, hidde
     run("fit", "runs", "--machine", "drive.toml", "--out", "fitted.toml")
     words = ["--quick", "--machine", "drive.toml", "--model-out", "model.toml", "--json"]
     told = json.loads(run("diagnose", "runs", *words))
-    named = [(f["balance"], f["family"]) for f in told["findings"] if f["verdict"] == "identified"]
-    assert named == found
+    named = [f for f in told["findings"] if f["verdict"] in ("identified", "one_of")]
+    assert [(f["balance"], f["family"]) for f in named] == found  # the likeliest of a set
+    # over a small wrap, a cable's friction is proportional to the load
+    assert {other for f in named for other in f["alternatives"]} <= {"friction.capstan"}
     words = ["--machine", "drive.toml", "--model", "model.toml", "--speed", "0", "--json"]
     assert "cell_torque_n_m" in run("replay", "runs", *words)
     run("export", "model.toml", "--equation", "input", "--out", "input.h")
