@@ -39,7 +39,7 @@ GEAR_RATIO = 35.0
 KINDS = ("strong", "weak", "outside", "pair")
 
 SILENCED = "silenced"
-"""A protocol in which an effect is confounded, played without it: as hard as a clean one gets."""
+"""A rig and protocol in which an effect would be confounded, without that effect."""
 
 GRID = {
     "sharpness": (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0),
@@ -163,8 +163,7 @@ def _searched(out: Path, kind: str, seed: int, models: Sequence[Model]) -> Searc
     path = out / commit(Path.cwd()) / f"{kind}-{seed}.json"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        case = draw(seed, "confounded" if kind == SILENCED else kind, gear_ratio=GEAR_RATIO)
-        campaign = case.twin if kind == SILENCED else Campaign.of(case.recordings)
+        campaign, families = _drawn(kind, seed)
         recordings = list(campaign.evidence)
         whole = answer(recordings, models, split(recordings))
         found = whole.found
@@ -172,10 +171,18 @@ def _searched(out: Path, kind: str, seed: int, models: Sequence[Model]) -> Searc
         content = {
             "first": [_row(p.family, p.best, p.gain) for p in _best(ranked)],
             "findings": [[_row(p.family, p.best, p.gain) for p in k.likely] for k in whole.kept],
-            "families": () if kind == SILENCED else case.truth.families,
+            "families": families,
         }
         write_text_atomic(path, json.dumps(content))
     return Searched(path.stem, **json.loads(path.read_text()))
+
+
+def _drawn(kind: str, seed: int) -> tuple[Campaign, Sequence[Sequence[str]]]:
+    """Return a drawn campaign, and the true families of each effect."""
+    if kind == SILENCED:
+        return draw(seed, "confounded", gear_ratio=GEAR_RATIO).twin, ()
+    case = draw(seed, kind, gear_ratio=GEAR_RATIO)
+    return case.campaign, case.truth.families
 
 
 def _best(ranked: Sequence[Scored]) -> list[Probability]:

@@ -111,19 +111,11 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
         folds: Families of folds.
         precision: Prior precision of every amplitude, shape (causes, k).
     """
-    whole = _Fitting(joint, block, precision)
-    (base,), (amplitudes,) = whole.left_out([[]])
+    (base,), (amplitudes,) = _Fitting(joint, block, precision).left_out([[]])
     promising = _gain(joint, block, base, amplitudes) >= joint.numbers.cause_cost
-    some = _Fitting(joint, block.only(promising), precision[promising])
     errors = []
-    for family in folds if promising.any() else ():
-        fits = joint.left_out(family)
-        of_base, of_causes = (x[fits.fold] for x in some.left_out(family))
-        found = {}
-        for p in joint.parts:
-            found[p] = np.zeros((len(joint.runs), of_causes.shape[1]))
-            found[p][fits.runs] = _squared(joint, some.block, p, fits.runs, of_base, of_causes)
-        errors.append(found)
+    if promising.any():
+        errors = _errors(joint, block.only(promising), folds, precision[promising])
     inside, usual = [p for p in block.base if p[1] == "within"], joint.left_out([[]]).base[0]
     weights, zero = joint.weights, np.zeros(())
     cross, own, right = (
@@ -153,6 +145,23 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
     return Outcome(promising, errors, amplitudes, changes, slopes, residual, own, cross)
 
 
+def _errors(
+    joint: Joint, block: Block, folds: Folds, precision: FloatArray
+) -> list[Mapping[Part, FloatArray]]:
+    """Return the squared errors on what each family of folds left out, (runs, causes) a part."""
+    fitting = _Fitting(joint, block, precision)
+    errors: list[Mapping[Part, FloatArray]] = []
+    for family in folds:
+        fits = joint.left_out(family)
+        base, amplitudes = (x[fits.fold] for x in fitting.left_out(family))
+        found = {}
+        for p in joint.parts:
+            found[p] = np.zeros((len(joint.runs), len(precision)))
+            found[p][fits.runs] = _squared(joint, block, p, fits.runs, base, amplitudes)
+        errors.append(found)
+    return errors
+
+
 class _Fitting:
     """Causes of a block, fitted together with the base.
 
@@ -163,7 +172,7 @@ class _Fitting:
     """
 
     def __init__(self, joint: Joint, block: Block, precision: FloatArray) -> None:
-        self.joint, self.block, self.precision = joint, block, precision
+        self.joint, self.precision = joint, precision
         weights, zero = joint.weights, np.zeros(())
         self._sums = [
             np.asarray(sum((weights[p] * kind[p] for p in block.base), zero))
@@ -195,14 +204,12 @@ def _gain(joint: Joint, block: Block, base: FloatArray, amplitudes: FloatArray) 
     usual, total = np.append(joint.left_out([[]]).base[0], -1.0), np.zeros(len(base))
     for p in joint.parts:
         gram, samples = joint.gram[p].sum(axis=0), joint.samples[p].sum()
-        error = ((base @ gram[:-1, :-1] - 2.0 * gram[-1, :-1]) * base).sum(axis=1) + gram[-1, -1]
+        products = None
         if p in block.base:
-            across = (base[:, None] @ block.base[p].sum(axis=0))[:, 0]
-            own = (amplitudes[:, None] @ block.own[p].sum(axis=0))[:, 0]
-            right = block.target[p].sum(axis=0)
-            error += ((2.0 * (across - right) + own) * amplitudes).sum(axis=1)
+            products = [x[p].sum(axis=0)[None] for x in (block.base, block.own, block.target)]
+        (error,) = _residual(gram[None], products, base[None], amplitudes[None])
         before = float(usual @ gram @ usual)
-        total += joint.log_ratio(p, max(before, 0.0) / samples, np.maximum(error, 0.0) / samples)
+        total += joint.log_ratio(p, max(before, 0.0) / samples, error / samples)
     return total
 
 
@@ -225,12 +232,33 @@ def _squared(
     amplitudes: FloatArray,
 ) -> FloatArray:
     """Return squared errors of runs, (n, causes), of parameters (n, causes, .)."""
-    gram = joint.gram[p][runs]
+    products = None
+    if p in block.base:
+        products = [x[p][runs] for x in (block.base, block.own, block.target)]
+    error = _residual(joint.gram[p][runs], products, base, amplitudes)
+    next_to = Next(block.laid, amplitudes, (block.taken @ amplitudes[..., None])[..., 0])
+    return np.asarray(error + joint.avoided(p, runs, base, next_to))
+
+
+def _residual(
+    gram: FloatArray,
+    products: Sequence[FloatArray] | None,
+    base: FloatArray,
+    amplitudes: FloatArray,
+) -> FloatArray:
+    """Return squared residuals, (n, causes), from cross-products.
+
+    Args:
+        gram: Of the base and, last, the target, shape (n, base + 1, base + 1).
+        products: Of the causes with the base, themselves and the target; None without columns.
+        base: Parameters of the base, shape (n, causes, base).
+        amplitudes: Of the causes, shape (n, causes, k).
+    """
     error = ((base @ gram[:, :-1, :-1]) * base).sum(axis=2) + gram[:, None, -1, -1]
     error -= 2.0 * (base @ gram[:, :-1, -1:])[..., 0]
-    if p in block.base:
-        across = (base[:, :, None] @ block.base[p][runs])[:, :, 0]
-        own = (amplitudes[:, :, None] @ block.own[p][runs])[:, :, 0]
-        error += ((2.0 * (across - block.target[p][runs]) + own) * amplitudes).sum(axis=2)
-    next_to = Next(block.laid, amplitudes, (block.taken @ amplitudes[..., None])[..., 0])
-    return np.asarray(np.maximum(error, 0.0) + joint.avoided(p, runs, base, next_to))
+    if products is not None:
+        of_base, of_causes, of_target = products
+        across = (base[:, :, None] @ of_base)[:, :, 0]
+        own = (amplitudes[:, :, None] @ of_causes)[:, :, 0]
+        error += ((2.0 * (across - of_target) + own) * amplitudes).sum(axis=2)
+    return np.asarray(np.maximum(error, 0.0))

@@ -209,7 +209,7 @@ def _differs(one: Scored, joint: Joint, folds: Folds) -> bool:
     both = joint.with_cause(shared.laid, shared.precision)
     changed = replace(Claim(one.candidate.cause), acts=one.candidate.acts, given=True)
     again = assessed(both, groups_of(both, [changed]), folds)
-    return bool(again) and again[0].gain > one.gain - one.score
+    return bool(again) and again[0].gain > one.price.score(joint.numbers)
 
 
 def _predicted(
