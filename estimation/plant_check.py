@@ -19,9 +19,7 @@ from estimation.plant_equations import Missing, missing, unused
 from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.signals import Reading
-
-FOLLOWS = 0.02
-"""Share by which two readings of one travel may differ."""
+from estimation.travel import FOLLOWS, slope
 
 ALIKE = 3.0
 """Factor between a noise that is stated and that of the recordings."""
@@ -173,11 +171,11 @@ def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) ->
     for axis in plant.axes:
         readings = [s.name for s in plant.sensors if (s.axis, s.reads) == (axis.name, "position")]
         for first, second in pairwise(readings):
-            slope = _slope(recordings, first, second)
-            if slope is not None and abs(slope - 1.0) > FOLLOWS:
+            change = slope(recordings, first, second)
+            if change is not None and abs(change - 1.0) > FOLLOWS:
                 yield (
                     f"{first} and {second} both read the position of {axis.name}, but {second}"
-                    f" changes {slope:.4g} times as much. Correct its unit, gain or sign, or its"
+                    f" changes {change:.4g} times as much. Correct its unit, gain or sign, or its"
                     f" axis, in {file}."
                 )
     for sensor in plant.sensors:
@@ -197,21 +195,11 @@ def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) ->
         driving, driven = plant.position(joint.input), plant.position(joint.output)
         if joint.ratio is None or driving is None or driven is None:
             continue
-        slope = _slope(recordings, driven.name, driving.name)
-        if slope is not None and abs(slope / joint.ratio - 1.0) > FOLLOWS:
+        wound = [s.name for s in plant.sensors if s.reads == "effort" and s.axis == joint.output]
+        change = slope(recordings, driven.name, driving.name, wound if joint.compliant else ())
+        if change is not None and abs(change / joint.ratio - 1.0) > FOLLOWS:
             yield (
                 f"{file} states the ratio {joint.ratio:g} for {joint.name}, but {driving.name}"
-                f" changes {slope:.4g} times as much as {driven.name}. Correct the ratio, or the"
+                f" changes {change:.4g} times as much as {driven.name}. Correct the ratio, or the"
                 " counts of one of the sensors."
             )
-
-
-def _slope(recordings: Sequence[Recording], x: str, y: str) -> float | None:
-    """Return the change of one channel per change of another; None where neither moves."""
-    above, below = 0.0, 0.0
-    for recording in recordings:
-        if x in recording and y in recording:
-            across = recording[x][recording.valid] - recording[x][recording.valid].mean()
-            up = recording[y][recording.valid] - recording[y][recording.valid].mean()
-            above, below = above + float(across @ up), below + float(across @ across)
-    return above / below if below > 0.0 else None

@@ -33,6 +33,7 @@ from estimation.predicted import with_prediction
 from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.rest import in_motion
 from estimation.signals import Signals
+from estimation.travel import off_ratio
 
 SERIES_PER_CUTOFF = 5.0
 """Samples kept for each period of the filter's cutoff, for effects with memory."""
@@ -269,6 +270,12 @@ def lay_out(
                     f"Some run has no {', '.join(sorted(lacking))}.",
                     f"The equation {model.balance} needs it. Every run has {', '.join(measured)}.",
                     "Record it, or declare an equation of channels that were recorded.",
+                )
+            if contradicted := off_ratio(model, list(campaign.evidence)):
+                raise LayoutError(
+                    contradicted,
+                    "A deflection from another ratio is mostly travel.",
+                    "Correct the ratio in the machine file, or the counts of one of the sensors.",
                 )
             equations[model.balance] = equation_of(fit(model, campaign, bootstrap=0, every=None))
         except EstimationError as error:

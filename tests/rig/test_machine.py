@@ -216,3 +216,10 @@ def test_another_gear_ratio_is_fitted_with_its_file_and_contradicted_without(gea
         for equations in (own, other["equations"])
     ]
     assert 5 * errors[0] < errors[1]
+
+
+def test_no_cause_is_sought_in_a_deflection_from_another_gear_ratio(geared, tmp_path, capsys):
+    _, runs = geared
+    words = ["diagnose", str(runs), "--equation", "gearbox", "--ledger", str(tmp_path / "used")]
+    assert main([*words, "--json-out", str(tmp_path / "out.json")]) == 5
+    assert "changes 20 times as much as spindle_angle_rad" in capsys.readouterr().err
