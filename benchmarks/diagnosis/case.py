@@ -25,6 +25,9 @@ KINDS = {
 MACHINE = "machine"
 """Kind of a case that holds measured data of a machine somebody else built."""
 
+MACHINE_FILE = "machine.toml"
+"""In the folder of a case: the machine of the recordings, where it is not the reference rig."""
+
 BLOCK = 1000
 """Seeds of a measurement, which is named by the first of them; `benchmarks.rigs.seeds` states which
 are for what. Of the calibrating seeds those below a thousand were also looked at while the first

@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis.asking import Answer, Rig
-from benchmarks.diagnosis.case import Case, Judgement, Report
-from estimation import model_file
+from benchmarks.diagnosis.case import MACHINE_FILE, Case, Judgement, Report
+from estimation import plant_file
 from estimation.campaign import Campaign
 from estimation.files import write_text_atomic
 from estimation.fitting import fit
 from estimation.model import Model, balance_channels, estimate, settled
+from estimation.plant_models import declared
 from estimation.recording import FloatArray
 from rig.importers.registry import open_campaign
 
@@ -195,18 +196,22 @@ def _errors_without(
     Args:
         write: Writes the campaign without the effects into an empty folder.
         report: The answer whose training and test runs are used.
-        equations: Names of shipped models.
+        equations: Names of equations of the case's machine.
     """
     with tempfile.TemporaryDirectory(prefix="case-") as folder:
         write(Path(folder))
         recordings = list(open_campaign(Path(folder)))
+        machine = Path(folder, MACHINE_FILE)
+        own = plant_file.read(machine) if machine.exists() else None
+        plant = own or plant_file.shipped_plant("reference")
     training, test = (
         Campaign.of([r for r in recordings if r.name in report["runs"][part]])
         for part in ("discover", "confirm")
     )
+    models = {model.balance: model for model in declared(plant)}
     errors = {}
     for equation in equations:
-        fitted = fit(model_file.read(Path(equation)), training, bootstrap=0)
+        fitted = fit(models[equation], training, bootstrap=0)
         errors[equation] = _error(replace(fitted, counted="all"), test)
     return errors
 

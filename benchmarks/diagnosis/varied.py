@@ -3,17 +3,26 @@
 import itertools
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.diagnosis import scoring
-from benchmarks.diagnosis.case import BLOCK, KINDS, Case, Judgement, Report, write_recordings
+from benchmarks.diagnosis.case import (
+    BLOCK,
+    KINDS,
+    MACHINE_FILE,
+    Case,
+    Judgement,
+    Report,
+    write_recordings,
+)
 from benchmarks.diagnosis.truths import same_on_one_rig
 from benchmarks.rigs import Case as Drawn
 from benchmarks.rigs import draw
+from estimation import plant_file
 from estimation.files import write_text_atomic
 
 
@@ -26,7 +35,8 @@ def cases(
         seed: First seed of the block.
         counts: Cases of each class, at most a block.
         kept: Folder where the answers are kept: to draw a case takes seconds.
-        gear_ratio: One gear ratio for all rigs, for a version that derives channels with one ratio.
+        gear_ratio: One gear ratio for all rigs; by default each has its own, and its machine file
+            is handed over.
     """
     of_kind = [[seed + k for k in range(min(counts.get(kind, 0), BLOCK))] for kind in KINDS]
     for turn in itertools.zip_longest(*of_kind):
@@ -64,9 +74,18 @@ class _Lazy:
 
     def write(self, folder: Path) -> None:
         write_recordings(folder, self.drawn.recordings)
+        self._write_machine(folder)
 
     def write_without(self, folder: Path) -> None:
         write_recordings(folder, self.drawn.twin.evidence)
+        self._write_machine(folder)
+
+    def _write_machine(self, folder: Path) -> None:
+        if self.gear_ratio is None:
+            plant = plant_file.shipped_plant("reference")
+            ratio = self.drawn.stage.plant.ratio
+            parts = [replace(t, ratio=ratio) if t.ratio else t for t in plant.transmissions]
+            plant_file.write(replace(plant, transmissions=tuple(parts)), folder / MACHINE_FILE)
 
     def judge(self, report: Report) -> Judgement:
         return scoring.judge(self.truth(), report)
@@ -74,7 +93,8 @@ class _Lazy:
 
 def _case(lazy: _Lazy) -> Case:
     without = None if lazy.kind == "clean" else lazy.write_without
-    return Case(lazy.name, lazy.kind, lazy.write, lazy.judge, without)
+    options = ("--machine", f"{{case}}/{MACHINE_FILE}") if lazy.gear_ratio is None else ()
+    return Case(lazy.name, lazy.kind, lazy.write, lazy.judge, without, options=options)
 
 
 def _described(drawn: Drawn) -> dict[str, object]:
