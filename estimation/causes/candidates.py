@@ -2,7 +2,7 @@
 
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -96,6 +96,10 @@ class Group:
     laid: Laid
     precision: FloatArray
     block: Block | None = None
+
+    def within(self, equations: Container[str]) -> "Group":
+        """Return the same candidates as if they entered some of the equations only."""
+        return replace(self, laid=self.laid.within(equations), block=None)
 
 
 def every_claim(layout: Layout) -> Iterator[Claim]:

@@ -163,6 +163,12 @@ class Equation:
         return kinds
 
     @cached_property
+    def signs(self) -> list[int]:
+        """The sign with which each column's term enters."""
+        counts = [len(t.effect.amplitudes) + len(t.effect.shape) for t in self.terms]
+        return [t.sign for t, count in zip(self.terms, counts, strict=True) for _ in range(count)]
+
+    @cached_property
     def of_channel(self) -> list[str]:
         """The channel that each column is a constant times, or nothing."""
         channels = []

@@ -405,6 +405,15 @@ class Joint:
         at = self._equations_at[name].start + np.flatnonzero(equation.of_channel)
         return dict(zip(at.tolist(), filter(None, equation.of_channel), strict=True))
 
+    def weights_of(self, name: str) -> Mapping[str, float]:
+        """Return channel to weight of the terms that are a constant times it, next to the base."""
+        equation, base = self.layout.equations[name], self.whole(self.left_out(((),)).base[0])
+        found: dict[str, float] = {}
+        for at, channel in self.linear(name).items():
+            sign = equation.signs[at - self._equations_at[name].start]
+            found[channel] = found.get(channel, 0.0) + sign * float(base[at])
+        return found
+
     @cached_property
     def largest_linear(self) -> Mapping[str, tuple[int, str]]:
         """Return place and channel of each equation's largest channel times a constant."""

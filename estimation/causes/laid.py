@@ -1,6 +1,6 @@
 """Candidate causes laid out on the runs, without what the declared columns explain."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -54,6 +54,14 @@ class Laid:
             {name: x[:, chosen] for name, x in self.noise.items()},
             {name: x[:, chosen] for name, x in self.own_noise.items()},
         )
+
+    def within(self, equations: Container[str]) -> "Laid":
+        """Return the same causes as if they entered some of the equations only."""
+        parts = (self.inner, self.means, self.taken, self.noise, self.own_noise)
+        inner, means, taken, noise, own_noise = (
+            {name: x for name, x in part.items() if name in equations} for part in parts
+        )
+        return Laid(inner, means, taken, self.size, noise, own_noise)
 
 
 class Stacks:

@@ -17,6 +17,7 @@ from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.scoring import Scored, assessed, best_of_each
 from estimation.causes.sources import RELATIVE, Bend, Source
+from estimation.causes.weights import reweighted
 from estimation.effects import Parameter
 
 KNOTS_OF_BEND, BENT = 5, 24
@@ -37,7 +38,8 @@ def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]
         before = {s.candidate.name: s.score for s in some}
         climbing = [s for s in found if s.score > before[s.candidate.name]]
         some = best_of_each([*some, *climbing])
-    best = best_of_each([*everything, *some])
+    spoilt = assessed(joint, groups_of(joint, reweighted(joint, pool, folds)), folds)
+    best = best_of_each([*everything, *some, *spoilt])
     near = [c for s in best[:REFINED] for c in _neighbours(s.candidate)]
     best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
     bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]

@@ -66,7 +66,13 @@ def gearbox() -> Model:
 
 
 def geared(
-    slow: float = 0.0, bend: float = 0.0, creep: float = 0.0, runs: int = 12, seed: int = 0
+    slow: float = 0.0,
+    bend: float = 0.0,
+    creep: float = 0.0,
+    wave: float = 0.0,
+    *,
+    runs: int = 12,
+    seed: int = 0,
 ) -> list[Recording]:
     """Return runs of motor and gearbox against a load of both signs that moves in steps.
 
@@ -74,6 +80,7 @@ def geared(
         slow: Compliance that acts late, by .6 s, over the gear's own.
         bend: Gain of the torque's reading that grows with its size, at the largest load.
         creep: Share of the torque's reading that comes slowly, over .5 s.
+        wave: Error of the motor's encoder, two waves a turn, rad.
         runs: How many.
         seed: Of the noise.
     """
@@ -93,6 +100,7 @@ def geared(
             "motor_current_a": (load + lost) / 1.2 + random.normal(0, 2e-3, len(load)),
             "proximal_torque_n_m": reading,
             "spindle_angle_rad": motor_angle / 35.0 - twist + random.normal(0, 1e-5, len(load)),
+            "motor_angle_rad": motor_angle + wave * np.sin(2.0 * motor_angle + 0.4),
         }
         out.append(one.with_columns(**columns))
     return out
