@@ -5,7 +5,7 @@ recording on request, so a campaign may be larger than memory: iterate over it a
 you need.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from estimation.derived import CAMPAIGN_TIME
 from estimation.errors import EstimationError
-from estimation.recording import FloatArray, Recording
+from estimation.recording import Recording
 
 SHOWN = 4
 """Runs that the text of a campaign names."""
@@ -54,24 +54,8 @@ class Run:
 class Split:
     """Two disjoint sets of runs: one to fit on, one to report on."""
 
-    name: str
     train: "Campaign"
     test: "Campaign"
-
-
-@dataclass(frozen=True)
-class Table:
-    """Chosen channels of many runs, concatenated.
-
-    Attributes:
-        columns: Channel name to values, shape (n,).
-        run: Index of each sample's run in `names`, shape (n,).
-        names: Names of the runs.
-    """
-
-    columns: Mapping[str, FloatArray]
-    run: NDArray[np.intp]
-    names: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,75 +152,19 @@ class Campaign:
                 f"{len(evidence)} runs cannot be split into {count} folds.",
                 "Each fold needs at least one run to test and one to fit.",
             )
-        return [
-            _split(evidence, f"fold {k}/{count}", {evidence.names[i] for i in fold})
-            for k, fold in enumerate(in_folds(len(evidence), count, seed), 1)
+        tested = [
+            {evidence.names[k] for k in fold} for fold in in_folds(len(evidence), count, seed)
         ]
-
-    def leave_one_condition_out(self, condition: str) -> list[Split]:
-        """Split so that each test set holds all runs of one value of a condition.
-
-        Args:
-            condition: Name of a condition, such as `load_command_a`.
-
-        Raises:
-            CampaignError: A run lacks the condition, or it has one value only.
-        """
-        evidence = self.evidence
-        values: dict[str, float | str] = {}
-        for recording in evidence:
-            if condition not in recording.conditions:
-                raise CampaignError(
-                    f"Run {recording.name!r} does not state the condition {condition!r}.",
-                    f"It states: {', '.join(recording.conditions) or 'none'}.",
-                )
-            values[recording.name] = recording.conditions[condition]
-        levels = sorted(set(values.values()), key=str)
-        if len(levels) < 2:
-            raise CampaignError(
-                f"Every run has {condition} = {levels[0] if levels else 'nothing'}.",
-                "Without its only value there are no runs to fit.",
-            )
         return [
-            _split(evidence, f"{condition} = {v}", {n for n, w in values.items() if w == v})
-            for v in levels
+            Split(evidence.select(set(evidence.names) - names), evidence.select(names))
+            for names in tested
         ]
-
-    def concatenate(self, channels: Sequence[str], valid_only: bool = True) -> Table:
-        """Concatenate channels of all runs that are not excluded.
-
-        Args:
-            channels: Channel names; `time_s` is each run's own clock.
-            valid_only: Leave out flagged samples.
-
-        Raises:
-            MissingChannelError: A run lacks one of the channels.
-        """
-        parts: dict[str, list[FloatArray]] = {name: [] for name in channels}
-        run: list[NDArray[np.intp]] = []
-        names: list[str] = []
-        for index, recording in enumerate(self.evidence):
-            keep = recording.valid if valid_only else np.ones(len(recording), bool)
-            for name in channels:
-                parts[name].append(recording[name][keep])
-            run.append(np.full(int(keep.sum()), index, dtype=np.intp))
-            names.append(recording.name)
-        empty: FloatArray = np.empty(0)
-        return Table(
-            {name: np.concatenate(part) if part else empty for name, part in parts.items()},
-            np.concatenate(run) if run else np.empty(0, np.intp),
-            tuple(names),
-        )
 
 
 def in_folds(runs: int, count: int, seed: int = 0) -> list[NDArray[np.int_]]:
     """Return the places of the runs of each fold, in an order drawn by a seed."""
     order = np.random.default_rng(seed).permutation(runs)
     return [order[k::count] for k in range(count)]
-
-
-def _split(campaign: Campaign, name: str, test: set[str]) -> Split:
-    return Split(name, campaign.select(set(campaign.names) - test), campaign.select(test))
 
 
 def with_campaign_time(recording: Recording, began_ns: int) -> Recording:

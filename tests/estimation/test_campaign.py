@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimation.campaign import Campaign, CampaignError, Run
-from estimation.recording import Flag, Recording, Stretch
+from estimation.recording import Recording
 
 
 def run(name: str, load_a: float = 0.1, count: int = 1000):
@@ -54,39 +54,9 @@ def test_folds_test_every_run_once_and_never_fit_on_it(runs, folds, seed):
     assert all(len(s.train) + len(s.test) == runs for s in splits)
 
 
-def test_leave_one_condition_out_holds_out_whole_levels():
-    campaign = Campaign.of([run(f"r{i}", load_a=0.1 * (1 + i % 3)) for i in range(9)])
-    splits = campaign.leave_one_condition_out("load_command_a")
-    assert len(splits) == 3
-    for split in splits:
-        inside = {r.conditions["load_command_a"] for r in split.test}
-        outside = {r.conditions["load_command_a"] for r in split.train}
-        assert len(inside) == 1
-        assert not inside & outside
-
-
-def test_leave_one_condition_out_needs_the_condition_and_two_levels():
-    campaign = Campaign.of([run("a"), run("b")])
-    with pytest.raises(CampaignError, match="does not state"):
-        campaign.leave_one_condition_out("frequency_hz")
-    with pytest.raises(CampaignError, match="no runs to fit"):
-        campaign.leave_one_condition_out("load_command_a")
-
-
 def test_an_excluded_run_is_kept_with_its_reason_but_is_no_evidence():
     campaign = Campaign.of([run("a"), run("b")]).exclude({"b": "the cable slipped"})
     assert [r.excluded for r in campaign] == [None, "the cable slipped"]
     assert campaign.evidence.names == ("a",)
     with pytest.raises(CampaignError, match="no run 'z'"):
         campaign.exclude({"z": "?"})
-
-
-def test_concatenation_leaves_out_flagged_samples_and_excluded_runs():
-    flagged = run("a").with_stretch(Stretch(0.0, 0.0995, Flag.SUSPECT, "start transient"))
-    campaign = Campaign.of([flagged, run("b"), run("c").exclude("test")])
-    table = campaign.concatenate(["motor_current_a"])
-    assert table.columns["motor_current_a"].shape == (1900,)
-    assert np.bincount(table.run).tolist() == [900, 1000]
-    assert table.names == ("a", "b")
-    whole = campaign.concatenate(["motor_current_a"], valid_only=False)
-    assert whole.columns["motor_current_a"].shape == (2000,)
