@@ -1,6 +1,10 @@
 """Counters of the link to a device."""
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+
+TRIES = 3
+"""How often a question is asked before its device is taken for silent."""
 
 
 @dataclass(slots=True)
@@ -51,3 +55,13 @@ class DeviceCounters(LinkCounters):
     late: int = 0
     device_errors: int = 0
     restarts: int = 0
+
+    def attempts(self) -> Iterator[int]:
+        """Yield the numbers of the attempts at a question, from 0.
+
+        Each but the first is counted as a retry, and a time-out when all have been used.
+        """
+        for attempt in range(TRIES):
+            self.retries += attempt > 0
+            yield attempt
+        self.timeouts += 1

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.counters import DeviceCounters
+from drivers.counters import TRIES, DeviceCounters
 from drivers.device import AXES, Channel, wrench_channels
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.sliding import Check, SlidingFrames
@@ -18,7 +18,6 @@ from drivers.streaming import StreamedDevice
 from drivers.transport.transport import Transport
 
 READ, WRITE = 0x03, 0x10
-TRIES = 3
 REPLY_TIMEOUT_S = 0.2
 
 
@@ -160,9 +159,8 @@ class ModbusLine:
         understood: Callable[[bytes], tuple[int, bytes] | None],
         before_again: Callable[[], None],
     ) -> tuple[int, bytes]:
-        for attempt in range(TRIES):
+        for attempt in self._counters.attempts():
             if attempt:
-                self._counters.retries += 1
                 before_again()
             self._transport.write(request)
             give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
@@ -176,7 +174,6 @@ class ModbusLine:
                     raise self.refused(request[1], answer[1])
                 return answer
             self._counters.discarded_bytes += len(came)
-        self._counters.timeouts += 1
         raise LinkTimeoutError(
             f"No {self._title} answers at {self._transport.url}.",
             f"It was asked {TRIES} times.",

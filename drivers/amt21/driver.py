@@ -8,14 +8,13 @@ from pydantic import Field
 
 from drivers.amt21 import protocol
 from drivers.amt21.turning import TOP_SPEED_RAD_S, RateGate, turns_at
+from drivers.counters import TRIES
 from drivers.device import Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.polling import PolledDevice
 from drivers.registry import BaudOption, Driver, RateOption, made
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
-
-TRIES = 3
 
 
 class Amt21(PolledDevice):
@@ -132,9 +131,7 @@ class Amt21(PolledDevice):
 
     def _ask(self, turns: bool) -> int | None:
         """Return the answer's value, None when no good one comes in `TRIES` questions."""
-        for attempt in range(TRIES):
-            if attempt:
-                self._counters.retries += 1
+        for _ in self._counters.attempts():
             self._discard(self._transport.read(0.0))
             self._transport.write(self._requests[turns])
             reply = self._receive(self._requests[turns])
@@ -145,7 +142,6 @@ class Amt21(PolledDevice):
             except FrameError:
                 self._counters.crc_errors += 1
                 self._discard(reply)
-        self._counters.timeouts += 1
         return None
 
     def _receive(self, request: bytes) -> bytes:

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from drivers.ati_can import protocol
 from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT, slopes
+from drivers.counters import TRIES
 from drivers.device import Channel, DeviceIdentity, SampleFlag, wrench_channels
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.polling import PolledDevice
@@ -16,7 +17,6 @@ from drivers.registry import CanUse, Driver, RateOption, made
 from drivers.transport.can_bus import CanBus
 from drivers.transport.python_can import open_can
 
-TRIES = 3
 REPLY_TIMEOUT_S = 0.02
 """Time for a whole answer: ten times the wire time of the longest at 250 kbit/s."""
 CHECK_S = 1.0  # Time between two checks that the sensor still uses its calibration
@@ -223,15 +223,12 @@ class AtiCan(PolledDevice):
             LinkTimeoutError: No whole answer to `TRIES` requests.
         """
         question = protocol.request(self._base, operation, data)
-        for attempt in range(TRIES):
-            if attempt:
-                self._counters.retries += 1
+        for _ in self._counters.attempts():
             self.idle(0.0)
             self._bus.send(question)
             answer = self._receive(operation, frames)
             if answer is not None:
                 return answer
-        self._counters.timeouts += 1
         raise LinkTimeoutError(
             f"No NETCANOEM answers at {self._bus.url}, base {self._base:#x}.",
             f"{TRIES} requests of operation {operation:#x} had {REPLY_TIMEOUT_S:g} s each.",

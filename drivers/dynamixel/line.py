@@ -1,12 +1,11 @@
 """Questions and answers on a Dynamixel's line: each is asked again when its answer is bad."""
 
-from drivers.counters import DeviceCounters
+from drivers.counters import TRIES, DeviceCounters
 from drivers.dynamixel import protocol
 from drivers.dynamixel.protocol import Register
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.transport.transport import Transport
 
-TRIES = 3
 REPLY_TIMEOUT_S = 0.02
 """Time for an answer: 500 us at most in the device, and what a USB adapter takes."""
 
@@ -59,15 +58,12 @@ class Line:
     def ask(self, instruction: int, parameters: bytes = b"") -> bytes:
         """Return the parameters of the answer to an instruction; raises as `read`."""
         request = protocol.encode(self._id, instruction, parameters)
-        for attempt in range(TRIES):
-            if attempt:
-                self._counters.retries += 1
+        for _ in self._counters.attempts():
             self.discard()
             self._transport.write(request)
             answer = self._receive()
             if answer is not None:
                 return self._checked(answer, instruction)
-        self._counters.timeouts += 1
         raise LinkTimeoutError(
             f"No Dynamixel answers at {self._transport.url}, identifier {self._id}.",
             f"It was asked {TRIES} times and had {REPLY_TIMEOUT_S:g} s each.",

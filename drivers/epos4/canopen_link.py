@@ -12,10 +12,10 @@ import canopen
 from canopen.sdo.client import SdoClient
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
+from drivers.counters import TRIES, DeviceCounters
 from drivers.errors import DriverError, LinkTimeoutError
 from drivers.transport.can_bus import CanBus, CanFrame
 
-TRIES = 3
 REPLY_TIMEOUT_S = 0.1
 EDS = Path(__file__).with_name("epos4.eds")
 
@@ -40,15 +40,13 @@ class CanopenLink:
     Args:
         bus: The bus; closed by whoever opened it.
         node_id: The node.
+        counters: Where retries and time-outs are counted.
     """
 
-    def __init__(self, bus: CanBus, node_id: int) -> None:
+    def __init__(self, bus: CanBus, node_id: int, counters: DeviceCounters) -> None:
         self.bus = bus
         self.node_id = node_id
-        self.retries = 0
-        """Requests sent again because no answer came."""
-        self.timeouts = 0
-        """Requests given up."""
+        self._counters = counters
         self._network = _InlineNetwork(bus)
         dictionary = canopen.import_od(str(EDS), node_id)
         self._sdo = _InlineSdo(  # type: ignore[no-untyped-call]
@@ -114,9 +112,7 @@ class CanopenLink:
     def _transfer(
         self, verb: str, index: int, subindex: int, attempt: Callable[[], bytes]
     ) -> bytes:
-        for number in range(TRIES):
-            if number:
-                self.retries += 1
+        for _ in self._counters.attempts():
             try:
                 return attempt()
             except SdoAbortedError as error:
@@ -128,7 +124,6 @@ class CanopenLink:
                 ) from error
             except SdoCommunicationError:
                 continue
-        self.timeouts += 1
         raise LinkTimeoutError(
             f"Node {self.node_id} on {self.bus.url} does not answer.",
             f"{TRIES} requests to {verb} {index:#06x}:{subindex} had {REPLY_TIMEOUT_S:g} s each.",

@@ -8,6 +8,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from drivers.counters import DeviceCounters
 from drivers.device import Axis, Channel, DeviceIdentity, SampleFlag
 from drivers.epos4 import protocol
 from drivers.epos4.faults import DriveFaultError, fault
@@ -62,7 +63,7 @@ class Epos4(PolledDrive):
         )
         self._bus = bus
         self._host_timeout_ms = host_timeout_ms
-        self._link = _link(bus, node_id)
+        self._link = _link(bus, node_id, self._counters)
         self._node = Node(self._link, host_timeout_ms, self._counters)
         self._power = PowerStage(self._link, self._node)
         self._cycle = Cycle(self._link, rate_hz, late_s, self._counters)
@@ -86,11 +87,8 @@ class Epos4(PolledDrive):
     @property
     def counters(self) -> dict[str, int]:
         """What happened to this drive's frames, and to the bus itself."""
-        counters = super().counters
-        counters["retries"] += self._link.retries
-        counters["timeouts"] += self._link.timeouts
         bus = self._bus.counters
-        return counters | {"error_frames": bus.error_frames, "overruns": bus.overruns}
+        return super().counters | {"error_frames": bus.error_frames, "overruns": bus.overruns}
 
     @property
     def last_error(self) -> int:
@@ -311,7 +309,7 @@ class Epos4(PolledDrive):
         )
 
 
-def _link(bus: CanBus, node_id: int) -> "CanopenLink":
+def _link(bus: CanBus, node_id: int, counters: DeviceCounters) -> "CanopenLink":
     """Return the link; the `canopen` library is an extra, loaded only here.
 
     Raises:
@@ -323,4 +321,4 @@ def _link(bus: CanBus, node_id: int) -> "CanopenLink":
         raise MissingExtraError(
             "An EPOS4 needs the canopen library.", f"{error}.", "can"
         ) from error
-    return CanopenLink(bus, node_id)
+    return CanopenLink(bus, node_id, counters)

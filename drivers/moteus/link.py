@@ -3,13 +3,12 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from drivers.counters import DeviceCounters
+from drivers.counters import TRIES, DeviceCounters
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.moteus import protocol
 from drivers.transport.transport import Transport
 
 T = TypeVar("T")
-TRIES = 3
 REPLY_TIMEOUT_S = 0.02
 """Time for an answer: below a millisecond on the bus, and what USB takes."""
 
@@ -36,9 +35,7 @@ class FdcanusbLink:
             LinkTimeoutError: Nobody answers.
         """
         line = protocol.send_line(self._id, data)
-        for attempt in range(TRIES):
-            if attempt:
-                self._counters.retries += 1
+        for _ in self._counters.attempts():
             self.discard()
             self._transport.write(line)
             answer = self._receive()
@@ -48,7 +45,6 @@ class FdcanusbLink:
                 return decode(answer)
             except FrameError:
                 self._counters.crc_errors += 1
-        self._counters.timeouts += 1
         raise LinkTimeoutError(
             f"No moteus answers at {self._transport.url}, identifier {self._id}.",
             f"It was asked {TRIES} times and had {REPLY_TIMEOUT_S:g} s each.",

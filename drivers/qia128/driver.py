@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from drivers.counters import TRIES
 from drivers.device import Channel, DeviceIdentity, SampleFlag
 from drivers.errors import DriverError, LinkTimeoutError
 from drivers.qia128 import protocol
@@ -16,7 +17,6 @@ from drivers.streaming import StreamedDevice
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
-TRIES = 3
 RATE_HZ = 1300.0
 REPLY_TIMEOUT_S = 0.2
 
@@ -110,9 +110,7 @@ class Qia128(StreamedDevice):
 
     def _number(self, question: bytes, command: tuple[int, int]) -> int:
         """Return the 32-bit number a question is answered with."""
-        for attempt in range(TRIES):
-            if attempt:
-                self._counters.retries += 1
+        for _ in self._counters.attempts():
             self._transport.write(question)
             give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
             came = b""
@@ -122,7 +120,6 @@ class Qia128(StreamedDevice):
                 if found is not None and len(found[0]) == 4:
                     return int.from_bytes(found[0], "big")
             self._counters.discarded_bytes += len(came)
-        self._counters.timeouts += 1
         raise LinkTimeoutError(
             f"No QIA128 answers at {self._transport.url}.",
             f"It was asked {TRIES} times.",

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.counters import DeviceCounters
 from drivers.device import SampleFlag
 from drivers.epos4 import faults, protocol
 from drivers.epos4.canopen_link import CanopenLink, ObjectRefusedError
@@ -357,7 +358,7 @@ def test_the_wrong_device_is_refused_before_anything_is_written() -> None:
 
 
 def test_an_absent_object_is_refused_with_its_code() -> None:
-    link = CanopenLink(SimulatedCanBus([Epos4Fake(absent=(0x6502,))]), 1)
+    link = CanopenLink(SimulatedCanBus([Epos4Fake(absent=(0x6502,))]), 1, DeviceCounters())
     with pytest.raises(ObjectRefusedError, match=r"0x6502.*does not exist") as caught:
         link.read(0x6502)
     assert caught.value.code == 0x06020000
