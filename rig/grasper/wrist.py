@@ -40,23 +40,19 @@ class CablePath:
         d1_m: Diameter of pulley 1.
         d2_m: Diameter of pulley 2.
         d3_m: Diameter of pulley 3, the jaw's.
-        l1_m: Straight length before pulley 1.
         l2_m: Distance of the centres of pulleys 1 and 2.
         l3_m: Distance of the centres of pulleys 2 and 3.
-        l4_m: Straight length after pulley 3.
     """
 
     d1_m: float
     d2_m: float
     d3_m: float
-    l1_m: float
     l2_m: float
     l3_m: float
-    l4_m: float = 0.0
 
     def __post_init__(self) -> None:
         sizes = (self.d1_m, self.d2_m, self.d3_m, self.l2_m, self.l3_m)
-        if not all(math.isfinite(x) and x > 0 for x in sizes) or min(self.l1_m, self.l4_m) < 0:
+        if not all(math.isfinite(x) and x > 0 for x in sizes):
             raise GrasperError(f"{self}: diameters and centre distances are greater than zero.")
 
     def interference(self) -> list[str]:
@@ -84,37 +80,13 @@ class CablePath:
             math.acos((self.d2_m + self.d3_m) / (2 * self.l3_m)),
         )
 
-    def length_m(self, alpha_rad: float = 0.0, beta_rad: float = 0.0) -> float:
-        """Return the path's length C1 by equation 1 at rest and equation 4 with the wrist turned.
+    def shortening_m(self, alpha_rad: float, beta_rad: float) -> float:
+        """Return C1 - C1', by which turning the wrist shortens the path; equation 5.
 
         Args:
             alpha_rad: Angle of the line from pulley 1 to 2, that is of the carrier.
             beta_rad: Angle of the line from pulley 2 to 3 relative to that line.
-
-        Raises:
-            GrasperError: Pulleys overlap, or the cable would lose contact with a pulley.
         """
-        theta1, theta2 = self.tangent_angles_rad()
-        wrap1 = math.pi / 2 - theta1 + alpha_rad
-        wrap2 = math.pi - theta1 - theta2 - beta_rad
-        if wrap1 < 0 or wrap2 < 0:
-            raise GrasperError(
-                f"The cable lifts off pulley {1 if wrap1 < 0 else 2} at alpha {alpha_rad:.4g}, "
-                f"beta {beta_rad:.4g} rad.",
-                "Its angle of wrap is negative there.",
-            )
-        return (
-            self.l1_m
-            + self.d1_m / 2 * wrap1
-            + (self.d1_m + self.d2_m) / 2 * math.tan(theta1)
-            + self.d2_m / 2 * wrap2
-            + (self.d2_m + self.d3_m) / 2 * math.tan(theta2)
-            + self.d3_m / 2 * (math.pi / 2 - theta2)
-            + self.l4_m
-        )
-
-    def shortening_m(self, alpha_rad: float, beta_rad: float) -> float:
-        """Return C1 - C1', by which turning the wrist shortens the path; equation 5."""
         return self.d2_m / 2 * beta_rad - self.d1_m / 2 * alpha_rad
 
 

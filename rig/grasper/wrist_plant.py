@@ -17,7 +17,7 @@ ratio (equation 5 of Zhao and Nelson 2016), turning one joint moves another.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -36,7 +36,7 @@ KP, KD = 12.0, 0.25
 LIMIT_A = 0.6
 TIP_NOISE_RAD, TORQUE_NOISE_N_M, CURRENT_NOISE_A, COUNT_RAD = 1e-3, 1e-4, 2e-3, 2 * np.pi / 2048
 
-DESIGN = CablePath(0.004, 0.004, 0.005, 0.01, 0.006, 0.008)
+DESIGN = CablePath(0.004, 0.004, 0.005, 0.006, 0.008)
 """Pulleys with the ratio that decouples the jaws from the yaw; sizes are assumed."""
 
 
@@ -58,11 +58,7 @@ class Wrist:
     @property
     def built(self) -> Coupling:
         """What moves."""
-        d1 = DESIGN.d1_m
-        path = CablePath(
-            d1, self.pulley_ratio * d1, DESIGN.d3_m, DESIGN.l1_m, DESIGN.l2_m, DESIGN.l3_m
-        )
-        return planetary_grasper(path)
+        return planetary_grasper(replace(DESIGN, d2_m=self.pulley_ratio * DESIGN.d1_m))
 
     @property
     def pitch_per_yaw(self) -> float:

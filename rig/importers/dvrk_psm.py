@@ -19,6 +19,7 @@ from typing import BinaryIO, cast
 
 import numpy as np
 
+from estimation.arm.tables import PSM
 from estimation.campaign import Campaign, Run
 from estimation.recording import FloatArray, Instrument, Recording
 from rig.errors import DataError
@@ -30,9 +31,7 @@ JOINTS = 7
 COLUMNS = 3 * JOINTS
 PRISMATIC_JOINT = 3
 WRIST = slice(4, 7)
-MOTOR_TO_JOINT: FloatArray = np.array(
-    [[1.0186, 0.0, 0.0], [-0.8306, 0.6089, 0.6089], [0.0, -1.2177, 1.2177]]
-)
+MOTOR_TO_JOINT: FloatArray = np.array(PSM.wrist_coupling)
 """M of q_dvrk[5:7] = M q_motor[5:7]."""
 MAX_BYTES = 1 << 28
 LARGEST = 1e6

@@ -31,7 +31,8 @@ class LiveRecorder:
         self._kind = kind
         self._further = tuple(further)
         self._log: SessionLog | None = None
-        self._path: Path | None = None
+        self.path: Path | None = None
+        """The newest log, None before the first."""
         self._samples = 0
         self._marks = 0
 
@@ -41,16 +42,11 @@ class LiveRecorder:
         return self._log is not None
 
     @property
-    def path(self) -> Path | None:
-        """The newest log, None before the first."""
-        return self._path
-
-    @property
     def said(self) -> str:
         """Message for the user; empty before the first recording."""
-        if self._path is None:
+        if self.path is None:
             return ""
-        words = f"{self._path.name}, {self._samples} samples, {self._marks} marks"
+        words = f"{self.path.name}, {self._samples} samples, {self._marks} marks"
         return words if self.is_on else f"kept {words}"
 
     def start(self) -> None:
@@ -58,14 +54,14 @@ class LiveRecorder:
         self._folder.mkdir(parents=True, exist_ok=True)
         name = f"{self._kind}-{datetime.now():%Y-%m-%d-%H%M%S}"
         number = len(list(self._folder.glob(f"{name}*")))
-        self._path = self._folder / (f"{name}-{number}.mcap" if number else f"{name}.mcap")
+        self.path = self._folder / (f"{name}-{number}.mcap" if number else f"{name}.mcap")
         info = RunInfo(
-            name=self._path.stem,
+            name=self.path.stem,
             conditions={"trajectory": self._kind},
             started_at_ns=time.time_ns(),
             zeros_before={f"{name}_counts": zero for name, zero in self._session.zeros.items()},
         )
-        self._log = SessionLog(self._session, self._path, info, further=self._further)
+        self._log = SessionLog(self._session, self.path, info, further=self._further)
         self._samples = self._marks = 0
 
     def write(self, reading: Reading) -> None:
