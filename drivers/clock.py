@@ -21,6 +21,9 @@ from drivers.errors import DriverError
 
 WRAP_US = 2**32
 """A device's microsecond counter wraps after 71.6 minutes."""
+KEPT, SPACING_S = 240, 0.25
+"""Exchanges that a fit keeps, a minute of them: of each so long a stretch, s, the one with the
+shortest round trip."""
 MAX_DRIFT = 200e-6
 """Largest difference of rates that is a crystal's and not a reset; crystals are within 50e-6."""
 RESET_S = 0.05
@@ -96,18 +99,11 @@ class TickUnwrapper:
 
 
 class ClockFit:
-    """The line from one device's clock to the host's, kept up to date.
+    """The line from one device's clock to the host's, kept up to date."""
 
-    Args:
-        memory: Exchanges kept; 240 are a minute.
-        spacing_s: Of the exchanges in a stretch as long as this, the one with the shortest round
-            trip is kept, s.
-    """
-
-    def __init__(self, memory: int = 240, spacing_s: float = 0.25) -> None:
-        self._spacing_s = spacing_s
+    def __init__(self) -> None:
         self._unwrapper = TickUnwrapper()
-        self._exchanges: deque[tuple[float, float, float]] = deque(maxlen=memory)
+        self._exchanges: deque[tuple[float, float, float]] = deque(maxlen=KEPT)
         self._strange = 0
         self._last_sent_s = float("-inf")
         self.rejected = 0
@@ -163,7 +159,7 @@ class ClockFit:
     def _keep(self, sent_s: float, received_s: float, device_s: float) -> None:
         if self._exchanges:
             last_sent_s, last_received_s, _ = self._exchanges[-1]
-            if sent_s // self._spacing_s == last_sent_s // self._spacing_s:
+            if sent_s // SPACING_S == last_sent_s // SPACING_S:
                 if received_s - sent_s >= last_received_s - last_sent_s:
                     return
                 self._exchanges.pop()

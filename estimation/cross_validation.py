@@ -118,7 +118,7 @@ def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int
     estimates, truths = [], []
     for held_out in in_folds(len(runs), folds, seed):
         rest = [run for k, run in enumerate(runs) if k not in held_out]
-        fitted = fit_runs(rest, recipe.bank, recipe.target, recipe.settings)
+        fitted = fit_runs(rest, recipe.bank, recipe.target)
         estimates += [fitted.of_design(runs[k].design, runs[k].rows).value for k in held_out]
         truths += [runs[k].truth for k in held_out]
     return score(np.concatenate(estimates), np.concatenate(truths))

@@ -219,13 +219,12 @@ class Model:
         return all(p.name in term.values for term in self.terms for p in term.parameters)
 
 
-def balance_channels(model: Model, recording: Recording, causal: bool = False) -> Recording:
-    """Return the model's channels and its target, filtered alike.
+def balance_channels(model: Model, recording: Recording) -> Recording:
+    """Return the model's channels and its target, filtered alike and without lag.
 
     Args:
         model: The model.
         recording: Measured channels.
-        causal: Filter as live, with its lag; else without lag.
 
     Raises:
         MissingChannelError: The recording lacks a channel.
@@ -234,7 +233,7 @@ def balance_channels(model: Model, recording: Recording, causal: bool = False) -
     wanted = [*model.channels, model.target]
     if model.samples == "closing":
         wanted.append(SPINDLE_SPEED)
-    return _filtered(model, recording, wanted, causal)
+    return _filtered(model, recording, wanted, causal=False)
 
 
 def _filtered(model: Model, recording: Recording, wanted: Sequence[str], causal: bool) -> Recording:

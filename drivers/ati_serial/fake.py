@@ -32,16 +32,11 @@ def example_calibration() -> Calibration:
 
 
 class AtiSerialFake(Outbox):
-    """A sensor, with the interface of `drivers.transport.simulated.Board`.
+    """A sensor with one calibration, and the interface of `drivers.transport.simulated.Board`."""
 
-    Args:
-        calibration: Its first calibration; the others are empty.
-    """
-
-    def __init__(self, calibration: Calibration | None = None) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        block = protocol.encode_calibration(calibration or example_calibration())
-        self.server = _server(block)
+        self.server = _server(protocol.encode_calibration(example_calibration()))
         self.status_bad = False
         self._sent = 0
 

@@ -10,6 +10,7 @@ cyclic torque. Averaged torque follows the target at once. A quick stop's ramp i
 the power stage stays on.
 """
 
+import math
 import struct
 from collections.abc import Callable
 from typing import Any
@@ -51,32 +52,21 @@ _LOW = {
 
 
 class FreeMotor:
-    """A rotor with friction and nothing on its shaft.
+    """A rotor with viscous friction and nothing on its shaft."""
 
-    Args:
-        inertia_kg_m2: Its inertia.
-        friction_n_m_s: Its viscous friction.
-        counts_a_turn: Counts of its encoder.
-    """
+    INERTIA_KG_M2, FRICTION_N_M_S, COUNTS_A_TURN = 2.72e-7, 2e-5, 4096
 
-    def __init__(
-        self,
-        inertia_kg_m2: float = 2.72e-7,
-        friction_n_m_s: float = 2e-5,
-        counts_a_turn: int = 4096,
-    ) -> None:
-        self._step = 1e-3 / (inertia_kg_m2 + 1e-3 * friction_n_m_s)
-        self._friction = friction_n_m_s
-        self._counts_a_radian = counts_a_turn / 6.283185307179586
+    def __init__(self) -> None:
         self._speed = 0.0
         self._angle = 0.0
 
     def __call__(self, torque_n_m: float, ticks: int) -> int:
         """Move for `ticks` milliseconds and return the position, counts."""
+        step = 1e-3 / (self.INERTIA_KG_M2 + 1e-3 * self.FRICTION_N_M_S)
         for _ in range(ticks):
-            self._speed += (torque_n_m - self._friction * self._speed) * self._step
+            self._speed += (torque_n_m - self.FRICTION_N_M_S * self._speed) * step
             self._angle += self._speed * 1e-3
-        return round(self._angle * self._counts_a_radian)
+        return round(self._angle * (self.COUNTS_A_TURN / math.tau))
 
 
 class Epos4Fake:

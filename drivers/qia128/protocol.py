@@ -49,9 +49,9 @@ def set_stream(on: bool) -> bytes:
     return encode_packet(STREAM, bytes([on]))
 
 
-def set_rate(code: int = RATE_1300) -> bytes:
-    """Return the packet that sets the sample rate."""
-    return encode_packet(SET_RATE, bytes([0x00, code]))
+def set_rate() -> bytes:
+    """Return the packet that sets the sample rate, 1300 Hz."""
+    return encode_packet(SET_RATE, bytes([0x00, RATE_1300]))
 
 
 def decode_packet(packet: bytes) -> tuple[tuple[int, int], bytes]:

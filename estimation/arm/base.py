@@ -37,18 +37,14 @@ class Base:
 
 
 @lru_cache(maxsize=8)
-def base_of(arm: Arm, seed: int = 0) -> Base:
+def base_of(arm: Arm) -> Base:
     """Find the base parameters of an arm over its whole range of motion.
 
     A property of the arm's table, not of a recording: the motions are random within its limits.
     Columns are taken in the order friction, springs, offsets, drives, then links from the base to
     the tip: a friction keeps its own name, and a link's parameter joins those before it.
-
-    Args:
-        arm: The arm.
-        seed: Seed of the motions.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     shape = (SAMPLES, len(arm.joints))
     lower, upper, speed = arm.limits
     motion = Motion(

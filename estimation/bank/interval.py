@@ -105,7 +105,6 @@ def calibrate(
     designs: Sequence[FloatArray],
     residuals: Sequence[FloatArray],
     grid: Beyond,
-    coverage: float = COVERAGE,
 ) -> Interval:
     """Return the interval of the errors on left-out runs, with nothing added anywhere.
 
@@ -114,7 +113,6 @@ def calibrate(
         designs: Design of each run, shape (n, size).
         residuals: Error of each run by weights that it was not fitted with, shape (n,).
         grid: A table whose nodes are those of the conditions.
-        coverage: The share of a new run's samples that it covers on average.
     """
     columns = np.array([bank.products.index(p) for p in SHAPE if p in bank.products])
     sizes = [np.abs(residual) for residual in residuals]
@@ -126,7 +124,7 @@ def calibrate(
     usual = [shape.usual(design) for design in designs]
     squares = [np.mean((size / width) ** 2) for size, width in zip(sizes, usual, strict=True)]
     variance = (1 + 1 / len(sizes)) * float(np.mean(squares))
-    return scaled(shape, student(len(sizes) - 1, coverage) * variance**0.5)
+    return scaled(shape, student(len(sizes) - 1) * variance**0.5)
 
 
 def with_scores(interval: Interval, scores: FloatArray, doubt: float = 1.0) -> Interval:
@@ -158,6 +156,6 @@ def covered_share(error: FloatArray, half_width: FloatArray) -> float | None:
     return float(np.mean(np.abs(error) <= half_width, where=stated)) if stated.any() else None
 
 
-def student(freedom: int, coverage: float = COVERAGE) -> float:
-    """Return the quantile of Student's distribution that a share lies within, both signs."""
-    return float(stats.t.ppf((1 + coverage) / 2, freedom))
+def student(freedom: int) -> float:
+    """Return the quantile of Student's distribution that `COVERAGE` lies within, both signs."""
+    return float(stats.t.ppf((1 + COVERAGE) / 2, freedom))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimation.bank.beyond import coordinates
 from estimation.bank.edges import only_levels, other_levels
 from estimation.bank.fitting import Pool, Settings, chosen, solve
-from estimation.bank.interval import COVERAGE, Interval
+from estimation.bank.interval import Interval
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
@@ -239,21 +239,13 @@ def rows_of(channels: Mapping[str, FloatArray] | Recording, bank: Bank) -> Float
     return np.column_stack([channels[name] for name in bank.channels])
 
 
-def fit_runs(
-    runs: Sequence[RunEvidence],
-    bank: Bank,
-    target: str,
-    settings: Settings | None = None,
-    coverage: float = COVERAGE,
-) -> BankEstimator:
-    """Fit weights and, from runs left out in turn, the interval.
+def fit_runs(runs: Sequence[RunEvidence], bank: Bank, target: str) -> BankEstimator:
+    """Fit weights and, from runs left out in turn, how they are found and the interval.
 
     Args:
         runs: The runs.
         bank: The bank they were reduced with.
         target: Channel that is estimated.
-        settings: How weights are found; chosen on runs left out in turn if None.
-        coverage: Share of the samples of unseen runs that the interval covers.
 
     Raises:
         NetworkError: The campaign is empty.
@@ -261,12 +253,12 @@ def fit_runs(
     if not runs:
         raise NetworkError("No closing samples to fit a state estimator on.")
     whole = Pool.of([run.normal for run in runs])
-    interval = None
+    settings, interval = Settings(), None
     if len(runs) >= INNER_FOLDS:
         folds = [Pool.of([r.normal for r in runs[k::INNER_FOLDS]]) for k in range(INNER_FOLDS)]
-        settings = settings or chosen(whole, folds, bank.shape)
-        interval = interval_of(runs, whole, bank, settings, coverage)
-    weights = solve(whole, bank.shape, settings or Settings())[:, 0]
+        settings = chosen(whole, folds, bank.shape)
+        interval = interval_of(runs, whole, bank, settings)
+    weights = solve(whole, bank.shape, settings)[:, 0]
     return BankEstimator(
         bank,
         target,
@@ -285,18 +277,14 @@ class BankRecipe:
     Attributes:
         target: Channel to estimate.
         bank: The states and products.
-        settings: How weights are found; chosen on runs left out in turn if None.
         causal: Fit on channels filtered as live, for use as live; the target has no lag anyway.
         low_pass: Filter of every channel.
-        coverage: Share of the samples of unseen runs that the interval covers.
     """
 
     target: str
     bank: Bank = field(default_factory=Bank)
-    settings: Settings | None = None
     causal: bool = False
     low_pass: LowPass = PAPER
-    coverage: float = COVERAGE
 
     def fit(self, campaign: Campaign) -> BankEstimator:
         """Fit on the valid closing samples of the runs that are not excluded.
@@ -311,7 +299,7 @@ class BankRecipe:
             if run is not None:
                 runs.append(run)
             instruments.add(instrument_of(recording))
-        fitted = fit_runs(runs, self.bank, self.target, self.settings, self.coverage)
+        fitted = fit_runs(runs, self.bank, self.target)
         return replace(fitted, instrument=only_one(instruments), low_pass=self.low_pass)
 
     def evidence_of(self, recording: Recording) -> RunEvidence | None:

@@ -20,7 +20,7 @@ LEAST_SCORE = 0.02
 
 
 def interval_of(
-    runs: Sequence[RunEvidence], whole: Pool, bank: Bank, settings: Settings, coverage: float
+    runs: Sequence[RunEvidence], whole: Pool, bank: Bank, settings: Settings
 ) -> Interval:
     """Return the interval of a fit.
 
@@ -29,7 +29,6 @@ def interval_of(
         whole: Their sums.
         bank: The bank they were reduced with.
         settings: How the weights are found.
-        coverage: Share of the samples of unseen runs that the interval covers.
     """
 
     def errors(left_out: NDArray[np.int_]) -> list[FloatArray]:
@@ -43,9 +42,9 @@ def interval_of(
     held_out = {k: e for f in folds for k, e in zip(f, errors(f), strict=True)}
     designs, visits = [run.design for run in runs], Visits([run.places for run in runs])
     table = visits.scores(order)
-    interval = calibrate(bank, designs, [held_out[k] for k in order], table, coverage)
+    interval = calibrate(bank, designs, [held_out[k] for k in order], table)
     usual_score = float(np.mean([visits.mean_score(fold) for fold in folds]))
-    scale = student(len(runs) - 1, coverage)
+    scale = student(len(runs) - 1)
     excess, score = [], []
     for level in edges([run.conditions for run in runs], INNER_FOLDS) or _quarters(runs):
         rest = [run.places for k, run in enumerate(runs) if k not in level]
@@ -60,7 +59,7 @@ def interval_of(
     price = max(float(np.mean(excess)), 0.0) / max(float(np.mean(score)), LEAST_SCORE)
     priced = replace(interval, price=scale**2 * price, usual_score=usual_score)
     # few levels can be left out, so the price is less certain than the usual width
-    return with_scores(priced, table.values, (student(len(excess), coverage) / scale) ** 2)
+    return with_scores(priced, table.values, (student(len(excess)) / scale) ** 2)
 
 
 def _quarters(runs: Sequence[RunEvidence]) -> list[NDArray[np.int_]]:

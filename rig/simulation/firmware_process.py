@@ -15,20 +15,19 @@ class FirmwareProcess:
 
     Args:
         profile: What the firmware is of: `reference` or `grasper`.
-        program: The process' program.
 
     Raises:
         FirmwareMissingError: The program is not built.
     """
 
-    def __init__(self, profile: str = "reference", program: Path = PROGRAM) -> None:
-        if not program.is_file():
+    def __init__(self, profile: str = "reference") -> None:
+        if not PROGRAM.is_file():
             raise FirmwareMissingError(
-                "The firmware is not built.", f"There is no {program}.", "Run: make -C firmware"
+                "The firmware is not built.", f"There is no {PROGRAM}.", "Run: make -C firmware"
             )
         # a group of its own: what ends the program must not end the board before it is safe
         self.process = subprocess.Popen(  # noqa: S603
-            [str(program), profile], stdout=subprocess.PIPE, text=True, process_group=0
+            [str(PROGRAM), profile], stdout=subprocess.PIPE, text=True, process_group=0
         )
         assert self.process.stdout is not None  # noqa: S101
         self.path = self.process.stdout.readline().strip()

@@ -117,7 +117,6 @@ def run_states(
     folder: Path | None,
     *,
     seed: int = 0,
-    on_run: Callable[[str], None] = lambda name: None,
     on_row: Callable[[int, int], None] = lambda done, total: None,
     on_shown: Callable[[str, list[Shown]], None] | None = None,
 ) -> StateStudy:
@@ -127,7 +126,6 @@ def run_states(
         neutral: Runs of experiments 1 and 2.
         folder: Folder that may hold the parts of experiment 3, or be next to them.
         seed: Seed of the folds.
-        on_run: Called with each run's name when it has been processed.
         on_row: Called with the number of rows done and their total.
         on_shown: Called with a target and what its figures are drawn from; nothing is made for
             them if None.
@@ -149,7 +147,6 @@ def run_states(
         for recording in campaign.evidence:
             run = _reduced(recording, POSES[pose], wanted)
             runs += [run] if run.valid.any() else []
-            on_run(recording.name)
         for kind, alike in groupby(own, key=lambda job: (job.bank, job.filters)):
             evidence = _evidence(kind, runs)
             rows += _rows(list(alike), runs, evidence, seed)

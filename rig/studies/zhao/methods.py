@@ -104,11 +104,11 @@ def declared(dof: str) -> Model:
     )
 
 
-def calibration_runs(dof: str, axes: Axes, seed: int, repeats: int = 2) -> list[Recording]:
-    """Return runs on objects that differ in stiffness and place, at 250 Hz."""
+def calibration_runs(dof: str, axes: Axes, seed: int) -> list[Recording]:
+    """Return two runs of each kind, on objects that differ in stiffness and place, at 250 Hz."""
     random = np.random.default_rng(seed + 77)
     runs: list[Recording] = []
-    for repeat in range(repeats):
+    for repeat in range(2):
         for force_n in LEVELS_N:
             for number, kind in enumerate(INPUTS):
                 stiffness = float(np.exp(random.uniform(np.log(0.15), np.log(0.6))))
@@ -129,9 +129,9 @@ def calibration_runs(dof: str, axes: Axes, seed: int, repeats: int = 2) -> list[
     return runs
 
 
-def lacking(dof: str, axes: Axes, seed: int, repeats: int = 2) -> Lacking:
+def lacking(dof: str, axes: Axes, seed: int) -> Lacking:
     """Return the effects that the diagnosis identifies on a grasper's runs."""
-    runs = calibration_runs(dof, axes, seed, repeats)
+    runs = calibration_runs(dof, axes, seed)
     model = declared(dof)
     # a diagnosis reads only channels that an equation declares: friction declares the motion
     rubs = Term(effect("friction.coulomb"), -1, {"speed": f"{dof}_velocity_rad_s"})
