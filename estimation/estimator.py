@@ -8,23 +8,33 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from estimation.campaign import Campaign
 from estimation.recording import FloatArray, Recording
 
 
-class Stepper(Protocol):
-    """An estimator as it runs live; it holds the state of the filters."""
+class Stepper:
+    """An estimator as it runs live; it holds the state of the filters.
+
+    Attributes:
+        inside: Which of the last samples lay in the range fitted on, shape (n,); None where an
+            estimator has no range.
+        half_width: Half the 95 % interval of the newest sample; None where it is not known.
+    """
+
+    inside: NDArray[np.bool_] | None = None
+    half_width: float | None = None
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Measured channels that `step` needs."""
-        ...
+        raise NotImplementedError
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples, one or many, and return their estimates, shape (n,)."""
-        ...
+        raise NotImplementedError
 
 
 class Estimator(Protocol):

@@ -17,6 +17,7 @@ from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
 from estimation.derived import zero_phase_channels
+from estimation.estimator import Stepper
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.estimators.left_out_runs import INNER_FOLDS, interval_of
 from estimation.estimators.origin import Origin
@@ -205,17 +206,11 @@ class BankEstimator:
             raise NetworkError(f"The file {path} holds no state estimator.", str(error)) from error
 
 
-class BankStepper:
-    """A state estimator as it runs live.
-
-    Attributes:
-        inside: Whether each of the last samples lay in the range fitted on, shape (n,).
-        half_width: Half the interval's width of each of them, shape (n,); NaN where unknown.
-    """
+class BankStepper(Stepper):
+    """A state estimator as it runs live; its interval differs from sample to sample."""
 
     def __init__(self, estimator: BankEstimator, sample_rate_hz: float) -> None:
-        self.inside: NDArray[np.bool_] = np.empty(0, np.bool_)
-        self.half_width: FloatArray = np.empty(0)
+        self.inside = np.empty(0, np.bool_)
         self._estimator = estimator
         self._source = CausalChannels(
             estimator.bank.channels, sample_rate_hz, estimator.low_pass, tracked=True
@@ -230,7 +225,8 @@ class BankStepper:
         """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""
         channels = self._source.step(time_s, measured)
         found = self._estimator.of_rows(rows_of(channels, self._estimator.bank))
-        self.inside, self.half_width = found.inside, found.half_width
+        self.inside, newest = found.inside, found.half_width[-1:]
+        self.half_width = float(newest[0]) if np.isfinite(newest).any() else None
         return found.value
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from estimation.effects import Effect
 from estimation.effects.effect import Pointwise
 from estimation.errors import EstimationError
+from estimation.estimators.model import usual_half_width
 from estimation.model import Model
 
 UNARY: Mapping[np.ufunc, str] = {
@@ -86,7 +87,7 @@ def model_text(model: Model, place: Callable[[str], int]) -> str:
                 raise NotInCError(
                     f"{term.effect.id} depends on the time.", "C has no clock of the campaign."
                 )
-    error = 2 * model.evidence.rmse_with_means if model.evidence else None
+    error = usual_half_width(model)
     width = "NAN" if error is None else f"{error:.9g}f"
     return "\n".join(
         [

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.campaign import Campaign
+from estimation.estimator import Stepper
 from estimation.fitting import fit
 from estimation.live_channels import CausalChannels
 from estimation.model import Model, predict
@@ -15,7 +16,7 @@ from estimation.model_file import write
 from estimation.recording import FloatArray, Recording
 
 
-class Stream:
+class Stream(Stepper):
     """A model's causal estimator. It holds the state of the filters and of the effects.
 
     The result is that of `predict(model, recording, causal=True)` to rounding, however the samples
@@ -41,8 +42,7 @@ class Stream:
         self._shapes = [term.numbers(term.effect.shape) for term in model.terms]
         self._states = [term.effect.start() for term in model.terms]
         self._rest = {k: v for k, v in model.signals.rest.items() if k in model.channels}
-        self.at_rest = False
-        """Whether one of the model's axes stands at the newest sample."""
+        self.half_width = usual_half_width(model)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -61,7 +61,9 @@ class Stream:
         """
         channels = self._source.step(time_s, measured)
         if np.size(time_s):  # an empty batch changes nothing
-            self.at_rest = any(bool(abs(channels[k][-1]) < v) for k, v in self._rest.items())
+            stands = any(bool(abs(channels[k][-1]) < v) for k, v in self._rest.items())
+            # the interval is of errors in motion: at rest friction takes any value
+            self.half_width = None if stands else usual_half_width(self.model)
         rows = np.column_stack([channels[name] for name in self.model.channels])
         return np.array([self._one(row) for row in rows.tolist()])
 
@@ -75,6 +77,15 @@ class Stream:
             values = term.effect.step(inputs, shape, state)
             total += sum(w * v for w, v in zip(weights, values, strict=True))
         return float(total)
+
+
+def usual_half_width(model: Model) -> float | None:
+    """Return half the 95 % interval of a model's errors in motion; None where it has no evidence.
+
+    Two standard errors of the runs it was fitted on, their means left in: what a person at the
+    bench has to reckon with on a rig that is as it was then.
+    """
+    return 2 * model.evidence.rmse_with_means if model.evidence else None
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimation.campaign import Campaign
 from estimation.closing import closing_samples, processed
 from estimation.derived import zero_phase_channels
+from estimation.estimator import Stepper
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.estimators.origin import Origin
 from estimation.filters import PAPER, LowPass
@@ -115,15 +116,11 @@ class NetworkEstimator:
         files.write_arrays(path, self.SCHEMA, self.arrays())
 
 
-class NetworkStepper:
-    """A network as it runs live.
-
-    Attributes:
-        inside: Whether each of the last samples lay in the range trained on, shape (n,).
-    """
+class NetworkStepper(Stepper):
+    """A network as it runs live; it has no interval."""
 
     def __init__(self, estimator: NetworkEstimator, sample_rate_hz: float) -> None:
-        self.inside: NDArray[np.bool_] = np.empty(0, np.bool_)
+        self.inside = np.empty(0, np.bool_)
         self._network = estimator.network
         self._source = CausalChannels(estimator.network.inputs, sample_rate_hz, estimator.low_pass)
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.campaign import Campaign
+from estimation.estimator import Stepper
 from estimation.estimators.model import ModelRecipe, Stream
 from estimation.estimators.network import NetworkEstimator, NetworkRecipe
 from estimation.model import Model, predict
@@ -68,8 +69,8 @@ class ResidualEstimator:
         return cls(model, NetworkEstimator.from_arrays(arrays))
 
 
-class ResidualStepper:
-    """A model and a network as they run live."""
+class ResidualStepper(Stepper):
+    """A model and a network as they run live; their sum has neither interval nor range."""
 
     def __init__(self, estimator: ResidualEstimator, sample_rate_hz: float) -> None:
         self._parts = (

@@ -11,11 +11,11 @@ from estimation import model_file
 from estimation.bank.edges import other_levels
 from estimation.channels import ESTIMATED
 from estimation.estimator import Stepper, load
-from estimation.estimators.bank import BankEstimator, BankStepper
+from estimation.estimators.bank import BankEstimator
 from estimation.estimators.instrument import require_own
 from estimation.estimators.model import ModelEstimator as PhysicalEstimator
-from estimation.estimators.model import Stream
-from estimation.estimators.network import NetworkEstimator, NetworkStepper
+from estimation.estimators.model import usual_half_width
+from estimation.estimators.network import NetworkEstimator
 from estimation.model import Model
 from estimation.recording import MissingChannelError, Recording
 from estimation.signals import reference
@@ -63,26 +63,15 @@ class ModelEstimator:
         else:
             models = model_file.read_all(path)
             self.model = next((m for m in models if m.balance == balance), models[0])
-            estimator, evidence = PhysicalEstimator(self.model), self.model.evidence
-            # two standard errors of the runs it was fitted on, their means left in: what a person
-            # at the bench has to reckon with, in motion, on a rig that is as it was then
-            self.usual_half_width = 2 * evidence.rmse_with_means if evidence else None
+            estimator = PhysicalEstimator(self.model)
+            self.usual_half_width = usual_half_width(self.model)
         self.target_channel = estimator.target
         self._stream: Stepper = estimator.stepper(sample_rate_hz)
 
     @property
     def half_width(self) -> float | None:
-        """Half the 95 % interval of the newest sample; None where it is not known.
-
-        A state estimator's differs from sample to sample, as in its C header. A physical model's is
-        of its errors in motion; at rest friction takes any value.
-        """
-        if isinstance(self._stream, Stream):
-            return None if self._stream.at_rest else self.usual_half_width
-        if not isinstance(self._stream, BankStepper):
-            return self.usual_half_width
-        newest = self._stream.half_width[-1:]
-        return float(newest[0]) if np.isfinite(newest).any() else None
+        """Half the 95 % interval of the newest sample; None where it is not known."""
+        return self._stream.half_width
 
     @property
     def inside(self) -> NDArray[np.bool_] | None:
@@ -90,9 +79,7 @@ class ModelEstimator:
 
         None for a physical model, which has no validity per sample.
         """
-        if isinstance(self._stream, BankStepper | NetworkStepper):
-            return self._stream.inside
-        return None
+        return self._stream.inside
 
     @property
     def outside(self) -> bool:
