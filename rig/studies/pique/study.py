@@ -8,6 +8,7 @@ effects chosen on the path that is fitted alone, so that the other is untouched 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -139,10 +140,10 @@ def run_study(
     }
     for one, other in (there, back, *((there[1], prepare(run, effects)) for run in also)):
         rows += [
-            _row(THESIS, one, other, one.thesis, other.thesis),
-            _row(CLOSED, one, other, one.closed, other.closed),
-            _consistent_row(one, other),
-            _row(FILTERED, one, other, one.filtered, other.filtered),
+            _row(THESIS, one, other, attrgetter("thesis")),
+            _row(CLOSED, one, other, attrgetter("closed")),
+            _row(CONSISTENT, one, other, attrgetter("thesis"), _consistent(one)),
+            _row(FILTERED, one, other, attrgetter("filtered")),
             _row_with_effects(EFFECTS, one, other, kept),
             _row_with_effects(WITHIN, one, other, alone[one.name]),
         ]
@@ -168,37 +169,29 @@ def _fit(path: Prepared, columns: FloatArray) -> Fit:
     return fit(columns, torque, weights, 0.0, path.independent_share)
 
 
-def _row(model: str, one: Prepared, other: Prepared, own: FloatArray, others: FloatArray) -> Row:
-    found = _fit(one, own)
+def _row(
+    model: str,
+    one: Prepared,
+    other: Prepared,
+    columns: Callable[[Prepared], FloatArray],
+    values: FloatArray | None = None,
+) -> Row:
+    """Return the row of a model's columns; without values they are fitted by least squares."""
+    condition = None
+    if values is None:
+        found = _fit(one, columns(one))
+        values, condition = found.values, found.condition
 
-    def error(path: Prepared, columns: FloatArray) -> tuple[float, ...]:
-        left = nrmsd_percent(columns @ found.values, path.torque[:, : path.joints])
+    def error(path: Prepared) -> tuple[float, ...]:
+        left = nrmsd_percent(columns(path) @ values, path.torque[:, : path.joints])
         return tuple(map(float, left))
 
-    return Row(
-        model=model,
-        fitted_on=one.name,
-        tested_on=other.name,
-        parameters=own.shape[2],
-        condition=found.condition,
-        nrmsd_percent=error(other, others),
-        fitted_nrmsd_percent=error(one, own),
-    )
+    return Row(model, one.name, other.name, len(values), condition, error(other), error(one))
 
 
 def _consistent(path: Prepared) -> FloatArray:
     torque, weights = path.torque[:, : path.joints], path.weights[: path.joints]
     return consistent_fit(PSM, path.thesis, torque, weights).base
-
-
-def _consistent_row(one: Prepared, other: Prepared) -> Row:
-    values = _consistent(one)
-
-    def error(path: Prepared) -> tuple[float, ...]:
-        left = nrmsd_percent(path.thesis @ values, path.torque[:, : path.joints])
-        return tuple(map(float, left))
-
-    return Row(CONSISTENT, one.name, other.name, len(values), None, error(other), error(one))
 
 
 def _simpler_rows(one: Prepared, other: Prepared, trials: Sequence[Trial]) -> list[Row]:
