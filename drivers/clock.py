@@ -60,11 +60,6 @@ class ClockLine:
     bound_s: float
     exchanges: int
 
-    @property
-    def drift_ppm(self) -> float:
-        """How much faster the host's clock runs than the device's, parts per million."""
-        return (self.rate - 1.0) * 1e6
-
     def to_host(self, device_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the host times of device times, s."""
         return self.host_s + (device_s - self.device_s) * self.rate

@@ -232,21 +232,6 @@ class Recording:
             flags=self.flags[places],
         )
 
-    def slice_time(self, start_s: float, stop_s: float) -> "Recording":
-        """Return the samples with start_s <= time < stop_s; columns are views, not copies."""
-        first, last = np.searchsorted(self.time_s, [start_s, stop_s], side="left")
-        part = slice(int(first), int(last))
-        return replace(
-            self,
-            time_s=self.time_s[part],
-            columns={name: values[part] for name, values in self.columns.items()},
-            flags=self.flags[part],
-            marks=tuple(m for m in self.marks if start_s <= m.time_s < stop_s),
-            stretches=tuple(
-                s for s in self.stretches if s.stop_s >= start_s and s.start_s < stop_s
-            ),
-        )
-
     def with_columns(self, **columns: ArrayLike) -> "Recording":
         """Return a recording with these columns added or replaced."""
         added = {name: np.array(values, dtype=np.float64) for name, values in columns.items()}

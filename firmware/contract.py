@@ -13,15 +13,7 @@ from pathlib import Path
 
 from drivers.teensy import protocol
 from drivers.teensy.grasper import AXIS_LIMIT_NAMES, GRASPER
-from drivers.teensy.limits import (
-    CHOICE_NAMES,
-    FIXED_LIMITS,
-    FREE_LIMITS,
-    HIGHEST_LIMITS,
-    LEAST_LIMITS,
-    LOOP_LIMIT_NAMES,
-    MOTOR_LIMIT_NAMES,
-)
+from drivers.teensy.limits import CHOICE_NAMES, LOOP_LIMIT_NAMES, MOTOR_LIMIT_NAMES
 from drivers.teensy.profile import Profile
 from drivers.teensy.reference import LIMIT_NAMES, REFERENCE
 
@@ -32,6 +24,19 @@ GROUPS = {
     "ChoiceFields": CHOICE_NAMES,
 }
 """Limits that several structures hold, in the order of the wire."""
+LEAST_LIMITS = ("min_spindle", "min_jaw", "min_motor")
+"""Limits that are the stricter the larger they are."""
+HIGHEST_LIMITS = ("max_spindle", "max_jaw", "max_motor")
+"""The other ends, which may be negative; all other limits are sizes, the stricter the smaller."""
+FIXED_LIMITS = (
+    *("full_scale_current", "motor_per_turn", "spindle_per_turn", "jaw_per_turn", "torque_e3"),
+)
+"""What a rig is built like: a board that holds such a number takes no other."""
+FREE_LIMITS = (
+    *("stall_motion", "current_offset", "frozen_motion", "twist_e6", "stretch_e6", "jaw_zero"),
+    *("probe_within", "safe_state", "seek"),
+)
+"""What a host may choose on any board."""
 STATUS = {
     name.removeprefix("STATUS_"): value
     for name, value in vars(protocol).items()

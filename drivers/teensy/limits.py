@@ -4,20 +4,6 @@ from dataclasses import dataclass
 
 from drivers.teensy.protocol import TOP, WATCHDOG_US, SafeState
 
-LEAST_LIMITS = ("min_spindle", "min_jaw", "min_motor")
-"""Limits that are the stricter the larger they are."""
-HIGHEST_LIMITS = ("max_spindle", "max_jaw", "max_motor")
-"""The other ends, which may be negative; all other limits are sizes, the stricter the smaller."""
-FIXED_LIMITS = (
-    *("full_scale_current", "motor_per_turn", "spindle_per_turn", "jaw_per_turn", "torque_e3"),
-)
-"""What a rig is built like: a board that holds such a number takes no other."""
-FREE_LIMITS = (
-    *("stall_motion", "current_offset", "frozen_motion", "twist_e6", "stretch_e6", "jaw_zero"),
-    *("probe_within", "safe_state", "seek"),
-)
-"""What a host may choose on any board."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class MotorLimits:

@@ -65,10 +65,6 @@ class Coupling:
         """Statics: actuator torques to the joint torques they hold, N m; A^-T."""
         return self._through(self._inverse.T, actuator_n_m)
 
-    def actuator_torque(self, joint_n_m: ArrayLike) -> FloatArray:
-        """Statics: joint torques to the actuator torques that hold them, N m; A^T."""
-        return self._through(self.jacobian.T, joint_n_m)
-
     @property
     def _inverse(self) -> FloatArray:
         return np.asarray(np.linalg.inv(self.jacobian), dtype=np.float64)

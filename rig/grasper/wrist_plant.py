@@ -60,12 +60,6 @@ class Wrist:
         """What moves."""
         return planetary_grasper(replace(DESIGN, d2_m=self.pulley_ratio * DESIGN.d1_m))
 
-    @property
-    def pitch_per_yaw(self) -> float:
-        """How far the pitch turns along with the yaw, its own motors at rest; equation 5."""
-        matrix = self.built.jacobian
-        return float(matrix[1, 0] / matrix[0, 0])
-
 
 RUN_S = 10.0  # Length of each run
 

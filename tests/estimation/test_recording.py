@@ -2,13 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from estimation.channels import UnknownUnitError, unit_of
 from estimation.recording import (
     Flag,
-    Mark,
     MissingChannelError,
     Recording,
     RecordingError,
@@ -50,16 +47,6 @@ def test_columns_cannot_be_written_to():
 def test_what_is_no_recording_is_refused(changes, error, match):
     with pytest.raises(error, match=match):
         make(**changes)
-
-
-@given(st.floats(-0.05, 0.15), st.floats(-0.05, 0.15))
-def test_a_slice_holds_just_the_samples_inside(start_s, stop_s):
-    recording = make(marks=(Mark(0.02, "touch"),))
-    part = recording.slice_time(start_s, stop_s)
-    expected = recording.time_s[(recording.time_s >= start_s) & (recording.time_s < stop_s)]
-    np.testing.assert_array_equal(part.time_s, expected)
-    np.testing.assert_array_equal(part["jaw_angle_rad"], expected)
-    assert (len(part.marks) == 1) == (start_s <= 0.02 < stop_s)
 
 
 def test_a_stretch_flags_its_samples_and_keeps_its_reason():

@@ -151,12 +151,6 @@ class Physics:
     values: FloatArray
     rest: tuple[Network | None, ...]
 
-    @property
-    def leaks(self) -> FloatArray:
-        """Share of the gripper's measured torque that shows in joints 3 to 6, shape (4,)."""
-        declared = len(base_block().at)
-        return self.values[declared - len(LEAKS) : declared]
-
     def __call__(self, run: PsmRun, network: bool = True) -> FloatArray:
         """Return the torque of each sample in free space, shape (n, 7).
 
