@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 from calibration.linear import CalibrationSet
@@ -12,6 +11,7 @@ from calibration.store import CalibrationStore
 from rig import __version__
 from rig.calibrate.raw import whole_folder, write_raw
 from rig.output.figures import scattered
+from rig.output.provenance import now_utc
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,7 @@ def keep(
     drawn = scattered(left.series, left.label, left.unit, f"Residuals over {left.label}")
     # a separate file needs its namespace
     figure = str(drawn).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
-    made_at = datetime.now(UTC).isoformat(timespec="seconds")
+    made_at = now_utc()
     with whole_folder(folder) as part:
         files = [RawFile.of(path) for path in write_raw(part, procedure.kind, measurements, lines)]
     # the folder has its name now, and the records name the files in it

@@ -2,7 +2,7 @@
 
 import shlex
 import sys
-from datetime import UTC, datetime
+from datetime import datetime
 from os import W_OK, access
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from rig.cli.options import chosen_rig
 from rig.configuration.config import Config
 from rig.errors import UsageError
 from rig.output.console import present, remarks, results
-from rig.output.provenance import Provenance
+from rig.output.provenance import Provenance, now_utc
 from rig.reports.calibration import alarms, page
 
 QUESTION = "Enter when done, b to measure the step before again, q to stop: "
@@ -78,7 +78,7 @@ def conduct(procedure: Procedure, how: Keeping) -> None:
     page = _write_page(kept, store)
     if how.use:
         for digest in kept.records:
-            store.use(digest, _now(), how.operator)
+            store.use(digest, now_utc(), how.operator)
     _show(kept, how, store, page)
     if settings.store is None or settings.store.folder != store.folder:
         results(how.json).print(
@@ -250,10 +250,6 @@ def _force_sensor(words: str | None, devices: tuple[str, ...]) -> Any:
         return open_device(driver, url)
 
     return opened
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def _write_page(kept: Kept, store: CalibrationStore) -> Path:

@@ -1,6 +1,5 @@
 """`rig calibrate add | list | show | diff | use | diagnose`: the store of calibrations."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +9,7 @@ from estimation.files import write_text_atomic
 from rig.cli.options import LedgerOption, SeedOption
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, stages
+from rig.output.provenance import now_utc
 
 if TYPE_CHECKING:
     from calibration.record import CalibrationRecord
@@ -58,7 +58,7 @@ def add(
         record_of_line(
             lines[name],
             kind=kind,
-            made_at=made_at or _now(),
+            made_at=made_at or now_utc(),
             operator=operator,
             instrument=instrument,
             serials=_serials(serial or []),
@@ -144,7 +144,7 @@ def use(
     """Make a record the active one of its kind, channel and instrument."""
     kept = _holding(record, store)
     before = kept.active()
-    chosen = kept.use(record, _now(), by)
+    chosen = kept.use(record, now_utc(), by)
     old = before.get(chosen.key)
     was = old.content_hash if old else None
     data = {"record": chosen.content_hash, "replaced": was, "key": chosen.key}
@@ -199,10 +199,6 @@ def _holding(start: str, folder: Path | None) -> "CalibrationStore":
     holds = (s for s in more if any(r.content_hash.startswith(start) for r in s.records()))
     known = any(r.content_hash.startswith(start) for r in first.records())
     return first if known else next(holds, first)
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def _serials(words: list[str]) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -22,6 +21,7 @@ from rig.cli.options import (
 )
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, progress
+from rig.output.provenance import now_utc
 from rig.output.table import TextTable
 
 if TYPE_CHECKING:
@@ -216,7 +216,7 @@ def declared_models(model: str | None, machine: Path | None) -> "list[Model]":
 def _dated(model: "Model") -> "Model":
     """Return a fitted model with the time of its fit."""
     assert model.evidence is not None  # noqa: S101  a fit sets its evidence
-    now = datetime.now(UTC).isoformat(timespec="seconds")
+    now = now_utc()
     return replace(model, evidence=replace(model.evidence, made_at=now))
 
 

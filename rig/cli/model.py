@@ -1,6 +1,5 @@
 """`rig model`: which model estimates for a rig, and the choice of another one."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +10,7 @@ from rig.cli.help import group
 from rig.cli.options import ConfigOption, SimFlag, complete_fitted
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, present
+from rig.output.provenance import now_utc
 
 if TYPE_CHECKING:
     from rig.configuration.config import Config
@@ -96,7 +96,7 @@ def _choose(settings: "Config", source: Path | None, json: bool) -> None:
     # refuses what is no fitted model
     estimates = [] if source is None else [e.target_channel for e in estimators_of(source, 1000.0)]
     replaced, was = settings.model_path, _name(settings)
-    choose(settings.name, source, datetime.now(UTC).isoformat(timespec="seconds"))
+    choose(settings.name, source, now_utc())
     now = settings.model_path
     said = [f"{settings.name}: {_name(settings)} in place of {was}."]
     if now is not None:

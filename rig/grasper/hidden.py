@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.grasper.plant import FORM_VARIABLES, AxisParameters, FloatArray, Form
+from estimation.recording import FloatArray
+from rig.grasper.plant import FORM_VARIABLES, AxisParameters, Form
 from rig.simulation.forms import Random, course, falling, grid, power, rising, smooth, spots
 
 OWN = "the simulation's own"

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from rig.grasper.plant import RATE_HZ, AxisParameters, FloatArray
+from estimation.recording import FloatArray
+from rig.grasper.plant import RATE_HZ, AxisParameters
 from rig.protocols.trajectory import minimum_jerk
 
 LEAD_S = 0.5

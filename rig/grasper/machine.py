@@ -15,11 +15,12 @@ from calibration.linear import CalibrationSet
 from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import TOP, Trip
+from estimation.recording import FloatArray
 from rig.configuration.config import Config
 from rig.errors import UsageError
 from rig.log.schema import Field, Stream
 from rig.log.streams import COUNTS
-from rig.machines.machine import FloatArray, Machine
+from rig.machines.machine import Machine
 from rig.machines.safety import InCounts, choices, motor_limits
 from rig.protocols.joints import JointPlan
 from rig.protocols.motion import Motion, path_of, relaxed

@@ -21,9 +21,8 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from estimation.recording import FloatArray
 
 RATE_HZ = 2000.0
 SUBSTEPS = 5

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.recording import FloatArray
 from rig.errors import DataError
-
-FloatArray = NDArray[np.float64]
 
 
 class BlockError(DataError):

@@ -17,9 +17,8 @@ from estimation.estimators.model import ModelEstimator as PhysicalEstimator
 from estimation.estimators.model import usual_half_width
 from estimation.estimators.network import NetworkEstimator
 from estimation.model import Model
-from estimation.recording import MissingChannelError, Recording
+from estimation.recording import FloatArray, MissingChannelError, Recording
 from estimation.signals import reference
-from rig.live.block import FloatArray
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints
 
 NOT_STATED: Mapping[str, float | str] = {}

@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.live.block import FloatArray, SampleBlock
+from estimation.recording import FloatArray
+from rig.live.block import SampleBlock
 
 AXES = ("yaw_force_n", "jaw_1_force_n", "jaw_2_force_n")
 JOINTS = ("grasp_force_n", "pitch_force_n", "yaw_force_n")

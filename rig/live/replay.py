@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from estimation.channels import ESTIMATED
-from estimation.recording import Flag, Recording
+from estimation.recording import Flag, FloatArray, Recording
 from rig.errors import DataError, UsageError
-from rig.live.block import DeviceStatus, FloatArray, SampleBlock
+from rig.live.block import DeviceStatus, SampleBlock
 from rig.live.estimator import ModelEstimator
 from rig.live.keys import LEAVE, OF_DISPLAY, Keys, no_keys
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from rig.live.block import FloatArray
+from estimation.recording import FloatArray
 
 DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Bit of each dot of a braille character, (row, column), Unicode block U+2800."""

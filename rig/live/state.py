@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.channels import unit_of
-from estimation.recording import Flag
+from estimation.recording import Flag, FloatArray
 from rig.errors import ExitCode
-from rig.live.block import DeviceStatus, FloatArray, LimitStatus, SampleBlock
+from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
 
 BIN_S = 0.02
 VALUE_S = 0.1

@@ -12,11 +12,11 @@ from calibration.store import active_lines
 from estimation.channels import unit_of
 from estimation.errors import EstimationError
 from estimation.model import Model
-from estimation.recording import Recording
+from estimation.recording import FloatArray, Recording
 from estimation.watch import ResidualWatch, Sight
 from rig.configuration.config import Config
 from rig.live import text as words
-from rig.live.block import DeviceStatus, FloatArray, SampleBlock, Step, joined
+from rig.live.block import DeviceStatus, SampleBlock, Step, joined
 from rig.live.estimator import ModelEstimator
 from rig.live.joint_forces import with_joint_forces
 from rig.live.state import Value

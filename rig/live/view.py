@@ -7,8 +7,9 @@ import numpy as np
 from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
+from estimation.recording import FloatArray
 from rig.live import text as words
-from rig.live.block import DeviceStatus, FloatArray, LimitStatus
+from rig.live.block import DeviceStatus, LimitStatus
 from rig.live.options import ShowOptions
 from rig.live.sparkline import round_scale, sparkline
 from rig.live.state import TRACE_S, Reading, Snapshot

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from estimation.channels import UnknownUnitError, unit_of
+from estimation.recording import FloatArray
 from rig.errors import MissingExtraError
 from rig.live import text as words
-from rig.live.block import FloatArray, LimitStatus, SampleBlock, joined
+from rig.live.block import LimitStatus, SampleBlock, joined
 from rig.live.options import ShowOptions
 from rig.live.state import LiveState, Snapshot
 

@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 from calibration.linear import CalibrationSet
 from drivers.teensy.profile import ArmLimits, Profile
 from drivers.teensy.protocol import Trip
+from estimation.recording import FloatArray
 from rig.configuration.config import Config
 from rig.errors import SafetyTripError, UsageError
 from rig.log.schema import Stream
 from rig.log.streams import COUNTS_STREAM
 from rig.protocols.motion import Motion
 from rig.protocols.protocol import Plan
-
-FloatArray = NDArray[np.float64]
 
 
 class Machine:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import rig
 from estimation.campaign import Campaign
 from estimation.estimators.adaptation import Adaptable
 from estimation.estimators.origin import HASH_DIGITS, Origin, data_hash
-from rig.output.provenance import commit
+from rig.output.provenance import commit, now_utc
 
 
 def with_origin(
@@ -28,7 +27,7 @@ def with_origin(
         source: File of the estimator it was adapted from, if any.
     """
     origin = Origin(
-        made_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        made_at=now_utc(),
         code=f"rig {rig.__version__}, commit {commit(Path(rig.__file__).parents[1])}",
         data={recording.name: data_hash(recording) for recording in campaign.evidence},
         figures=dict(figures),

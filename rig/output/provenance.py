@@ -10,6 +10,11 @@ from pathlib import Path
 import rig
 
 
+def now_utc() -> str:
+    """Return the time now, UTC, ISO 8601 to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
 @dataclass(frozen=True)
 class Provenance:
     """Data needed to reproduce a result.

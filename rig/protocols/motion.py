@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimation.recording import FloatArray
 from rig.protocols import trajectory
 from rig.protocols.protocol import RunPlan
-from rig.protocols.trajectory import SAMPLE_RATE_HZ, FloatArray
+from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
 APPROACH_SPEED_RAD_S = 0.8
 LOAD_RAMP_S = SHORTEST_MOVE_S = 0.5

@@ -8,14 +8,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+
+from estimation.recording import FloatArray
 
 SAMPLE_RATE_HZ = 1000.0
 
 DECAYS = 4.0
 """Time constants of a relaxation's decay."""
-
-FloatArray = NDArray[np.float64]
 
 
 def times(duration_s: float, rate_hz: float = SAMPLE_RATE_HZ) -> FloatArray:

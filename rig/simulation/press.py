@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.fsr_curve import ZHANG_2022
-
-FloatArray = NDArray[np.float64]
+from estimation.recording import FloatArray
 
 VOLT_PER_COUNT = 3.3 / 4095.0
 TOP_COUNT = 4095
