@@ -1,7 +1,6 @@
 """UDP to one device: `udp:HOST:PORT`. Each read is one datagram.
 
-The socket is connected: the kernel drops datagrams from anyone else. Only `listen_udp` accepts
-unknown senders, for fakes in another process, by default on the loopback interface.
+The socket is connected: the kernel drops datagrams from anyone else.
 """
 
 import select
@@ -84,18 +83,6 @@ def open_udp(url: str) -> UdpTransport:
         connected.close()
         raise LinkError(f"{url} cannot be reached.", f"{error}.", "Check the network.") from error
     return UdpTransport(url, connected)
-
-
-def listen_udp(port: int = 0, host: str = "127.0.0.1") -> socket.socket:
-    """Return a socket that receives datagrams, by default on the loopback interface.
-
-    Args:
-        port: Port; any free one when 0.
-        host: Address to listen on.
-    """
-    listening = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    listening.bind((host, port))
-    return listening
 
 
 def split_address(url: str) -> tuple[str, int]:
