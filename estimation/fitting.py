@@ -126,8 +126,10 @@ def _bootstrap(
     shapes = problem.shape_parameters
     start = np.concatenate([free, [scaled(p, x) for p, x in zip(shapes, shape, strict=True)]])
     values = np.full((count, len(start) + 1), np.nan)
+    # a shape that was given may be beyond those that are searched
     low = np.concatenate([problem.lower, [scaled(p, p.lower) for p in shapes]]) - start
     high = np.concatenate([problem.upper, [scaled(p, p.upper) for p in shapes]]) - start
+    low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
     for replicate, weight in enumerate(weights):
         total = np.tensordot(weight, products, axes=1)
         step = np.zeros(len(start))

@@ -10,7 +10,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
 
 from benchmarks.rigs import residual
 from benchmarks.rigs.residual import EQUATIONS, GEARBOX, Fitted, Prepared
@@ -18,6 +17,7 @@ from estimation.derived import zero_phase_channels
 from estimation.effects import Remembering
 from estimation.model import Term
 from estimation.recording import FloatArray, Recording
+from estimation.within_bounds import solve_within
 from rig.simulation.reference_roles import CABLE_ANGLE, CABLE_LOAD, MOTOR_LOAD, candidates
 
 POINTS = 25
@@ -117,13 +117,7 @@ def _left(table: FloatArray, whole: FloatArray, gains: FloatArray) -> float:
     right = scaled.T @ whole / len(whole)
     most = np.full(len(scale), np.inf)
     most[: len(gains)] = FREE * np.abs(gains) * scale[: len(gains)]
-    values, vectors = np.linalg.eigh(gram)
-    kept = values > 1e-10 * values[-1]
-    root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
-    rotated = (vectors[:, kept].T @ right) / np.sqrt(values[kept])
-    weights = np.linalg.lstsq(root, rotated)[0]
-    if np.any(np.abs(weights) > most):
-        weights = optimize.lsq_linear(root, rotated, (-most - 1e-300, most + 1e-300)).x
+    weights = solve_within(gram, right, -most - 1e-300, most + 1e-300)
     left = np.mean(whole**2) - 2.0 * weights @ right + weights @ gram @ weights
     return float(max(left, 0.0))
 

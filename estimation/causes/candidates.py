@@ -120,10 +120,15 @@ def pool_of(joint: Joint, claims: Iterable[Claim]) -> list[Group]:
     for run in (*train.runs, *train.shaken):
         run.memo.clear()  # columns of the whole run, many times as large as those on the grid
     count = Counter(_form(c) for group in pool for c in group.candidates)
+    forms = len({(place, effect) for place, effect, _ in count})
+    sizes = Counter((place, effect) for place, effect, _ in count)
     return [
         replace(
             group,
-            candidates=[replace(c, choices=count[_form(c)] * len(count)) for c in group.candidates],
+            candidates=[
+                replace(c, choices=count[_form(c)] * sizes[_form(c)[:2]] * forms)
+                for c in group.candidates
+            ],
             block=block_of(joint, group.laid),
         )
         for group in pool
@@ -304,7 +309,13 @@ def _precision(joint: Joint, cause: Source | Function, size: FloatArray) -> Floa
     return everything
 
 
-def _form(candidate: Claim) -> tuple[str, str]:
-    """Return the key of one prior probability: a form of an effect, or all smooth functions."""
+def _form(candidate: Claim) -> tuple[str, str, int]:
+    """Return the key of one prior probability: a form of an effect, or functions of n variables.
+
+    The smooth functions at a place share the prior probability of one form, first by the number of
+    their variables, then by which these are.
+    """
     cause = candidate.cause
-    return cause.place.name, "" if isinstance(cause, Function) else cause.effect.id
+    if isinstance(cause, Function):
+        return cause.place.name, "", len(cause.variables)
+    return cause.place.name, cause.effect.id, 0

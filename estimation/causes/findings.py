@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from estimation.causes.candidates import Candidate
-from estimation.causes.functions import Function, names
+from estimation.causes.functions import Function, name_of_angle, names
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Part
 from estimation.causes.refits import Refits
@@ -22,12 +22,6 @@ IN_SET = 0.95
 VARIABLE_OF_ROLE: Mapping[str, str] = {
     "speed": "velocity",
     "acceleration": "acceleration",
-    "position": "spindle_angle",
-    "output_angle": "spindle_angle",
-    "encoder": "spindle_angle",
-    "stop": "jaw_angle",
-    "tilt": "jaw_angle",
-    "motor_angle": "motor_angle",
     "load": "load",
     "reading": "load",
     "creeping": "load",
@@ -39,7 +33,10 @@ VARIABLE_OF_ROLE: Mapping[str, str] = {
     "travel": "history",
     "temperature": "temperature",
 }
-"""Role of an effect to the variable a finding names."""
+"""Role of an effect to the variable that a finding names."""
+
+ANGLES_OF_ROLE = ("position", "output_angle", "motor_angle", "encoder", "stop", "tilt")
+"""Roles of an angle or a position, which a finding names by its channel."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +174,11 @@ def _variables(candidate: Candidate) -> tuple[str, ...]:
     cause = candidate.cause
     if isinstance(cause, Function):
         return names(cause.place, cause.variables)
-    found = [VARIABLE_OF_ROLE[r] for r, _ in cause.channels if r in VARIABLE_OF_ROLE]
+    found = [
+        name_of_angle(channel) if role in ANGLES_OF_ROLE else VARIABLE_OF_ROLE[role]
+        for role, channel in cause.channels
+        if role in ANGLES_OF_ROLE or role in VARIABLE_OF_ROLE
+    ]
     if cause.family == "friction.dwell":
         found = ["dwell" if v == "time" else v for v in found]
     signed = cause.family.startswith("friction.") and not cause.family.endswith(

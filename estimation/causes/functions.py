@@ -129,12 +129,12 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
 
 def reported(place: Place, variable: str) -> str:
     """Return the name under which a variable of a place is reported."""
-    if variable != "position":
-        return variable
-    angle = place.roles["position"][0]
-    return {"jaw_angle_rad": "jaw_angle", "motor_angle_rad": "motor_angle"}.get(
-        angle, "spindle_angle"
-    )
+    return name_of_angle(place.roles["position"][0]) if variable == "position" else variable
+
+
+def name_of_angle(channel: str) -> str:
+    """Return the name of an angle or a position in a finding: its channel without the unit."""
+    return channel.removesuffix("_rad").removesuffix("_m")
 
 
 def variable_of(

@@ -203,6 +203,9 @@ def _own(
     if equation.of_angle:
         roles |= {"travel": (effort, *roles["travel"])}  # what bends has the history of its load
         roles |= {"other_angle": _unrelated(layout, equation, everywhere)}
+        if "output_angle" in roles:  # a wave comes from either shaft of a gear
+            ends = tuple(a for a in angles if a != roles["output_angle"][0] and _share(equation, a))
+            roles |= {"output_angle": (*roles["output_angle"], *ends)}
         bends = [t.sign for t in equation.terms if t.effect.id == "compliance.link"]
         like = "stretch" if -1 in bends else "gearbox"
         enters = (Entry(equation.name, 1.0),)

@@ -113,7 +113,8 @@ def _neighbours(candidate: Candidate) -> list[Claim]:
 def _nearby(cause: Source, k: int, parameter: Parameter) -> list[float]:
     """Return values of one shape parameter between the points of its grid."""
     if parameter.name == "order":
-        return [cause.shape[k] + step for step in (-2.0, -1.0, 1.0, 2.0)]  # whole: of its shaft
+        near = [cause.shape[k] + step for step in (-2.0, -1.0, 1.0, 2.0)]  # whole: of its shaft
+        return [order for order in near if order > 0.0]
     values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
     if parameter.name in ("width", "settled") or values is None or len(values) < 2:
         return []

@@ -74,7 +74,7 @@ LATE = ("sensor.delay", "sensor.lag", "motor.electrical")
 LEAST_LATE = 0.3
 """Share of a reading that a delay or a lag makes late, at least: a small slow share is creep."""
 
-LEAST_PERIODS = 1.5
+LEAST_PERIODS, MOST_PERIODS = 1.5, 60.0
 """Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
 
 
@@ -376,10 +376,12 @@ def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:
     """
     travel = max(float(np.ptp(r.channels[angle])) for r in layout.runs)
     resolved = 2 * math.pi / travel
+    if not angle.endswith("_angle_rad"):  # nothing turns: any period
+        return list(np.arange(LEAST_PERIODS, MOST_PERIODS, 1.0 / 3.0) * resolved)
     first = max(1, math.ceil(LEAST_PERIODS * resolved))
     if effect.id == "eccentric.load":
         first = 1  # the load multiplies it, so a part of one sine shows
-    last = max(40, round(60 * min(resolved, 1.5))) // (len(effect.amplitudes) // 2)
+    last = max(40, round(MOST_PERIODS * min(resolved, 1.5))) // (len(effect.amplitudes) // 2)
     return [float(k) for k in range(first, last + 1, max(1, round(resolved / 3)))]
 
 

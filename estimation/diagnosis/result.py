@@ -15,9 +15,6 @@ VERDICTS = ("identified", "one_of", "depends_on", "something_missing", "nothing_
 VARIABLES = [
     "velocity",
     "velocity_sign",
-    "spindle_angle",
-    "motor_angle",
-    "jaw_angle",
     "load",
     "current",
     "acceleration",
@@ -29,7 +26,8 @@ VARIABLES = [
     "wrist_pitch",
     "wrist_roll",
 ]
-"""Variables a finding may depend on; besides these, `joint_N` of an arm."""
+"""Variables that a finding may depend on; besides these, `joint_N` of an arm, and angles and
+positions by the name of their channel, such as `spindle_angle`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,12 +10,10 @@ from estimation.effects import families
 
 FILE = "docs/schemas/rig.diagnosis-1.json"
 
-Balance = Annotated[
-    str,
-    Field(pattern=r"^(motor|gearbox|cable|stretch|grasp|pitch|yaw|joint\.\d+|calibration\.\S+)$"),
-]
+Balance = Annotated[str, Field(pattern=r"^\S+$")]
 Family = Annotated[str, Field(json_schema_extra={"enum": list(families())})]
-Variable = Annotated[str, Field(pattern=rf"^({'|'.join(VARIABLES)}|joint_\d+)$")]
+ANGLE = r"\w+_(angle|position)"
+Variable = Annotated[str, Field(pattern=rf"^({'|'.join(VARIABLES)}|joint_\d+|{ANGLE})$")]
 Name = Literal["identified", "one_of", "depends_on", "something_missing"]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 

@@ -140,7 +140,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> Card:
     variables = " and ".join(v.replace("_", " ") for v in finding.depends_on)
     facts = []
     if named and finding.parameters:
-        sizes = ", ".join(f"{name} {text}" for name, text in sizes_of(finding.parameters).items())
+        sizes = ", ".join(f"{name} {text}".strip() for name, text in sizes_of(finding).items())
         facts.append(("Size", sizes))
     fall = f"{scale * finding.rmse_before:.3g} to {scale * finding.rmse_after:.3g} {unit}"
     runs = f"lower in {finding.runs_improved} of {finding.runs_total} held-out test runs"

@@ -3,9 +3,8 @@
 import inspect
 import math
 import sys
-from collections.abc import Mapping
 
-from estimation.diagnosis.result import Diagnosis, Finding, Value
+from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.effects import catalogue
 
 NO_NEXT = "None is proposed: no named hypotheses compete, or none was searched for (--quick)."
@@ -64,7 +63,7 @@ def _claim(finding: Finding) -> str:
 
 
 def _named(finding: Finding) -> str:
-    sizes = [f"{name} {text}" for name, text in sizes_of(finding.parameters).items()]
+    sizes = [f"{name} {text}".strip() for name, text in sizes_of(finding).items()]
     if finding.confidence is not None:
         sizes.append(f"confidence {finding.confidence:.0%}")
     plain = meaning(finding.family)
@@ -106,9 +105,13 @@ def _check(family: str) -> str:
     return " ".join(advice.removeprefix("Check: ").split())
 
 
-def sizes_of(parameters: Mapping[str, Value]) -> dict[str, str]:
-    """Return parameters with their units, sine and cosine of one wave as its amplitude."""
-    left = dict(parameters)
+def sizes_of(finding: Finding) -> dict[str, str]:
+    """Return parameters with their units, sine and cosine of one wave as its amplitude.
+
+    How often a wave repeats has no name: so many times per turn of a shaft, or a period of a
+    position.
+    """
+    left = dict(finding.parameters)
     sizes = {}
     if "sine" in left and "cosine" in left:
         sine, cosine = left.pop("sine"), left.pop("cosine")
@@ -117,6 +120,12 @@ def sizes_of(parameters: Mapping[str, Value]) -> dict[str, str]:
     for name, known in left.items():
         scale, unit = display(known.unit)
         sizes[name] = _measured(scale * known.value, unit)
+    along = next((v for v in finding.depends_on if v.endswith(("_angle", "_position"))), "")
+    if "order" in left and along.endswith("_position"):
+        del sizes["order"]
+        sizes["period"] = f"{2.0 * math.pi / left['order'].value:.3g} m"
+    elif "order" in left and along:
+        sizes[""] = f"{sizes.pop('order')} per turn of the {along.replace('_', ' ')}"
     return sizes
 
 

@@ -96,14 +96,25 @@ changes = ["trial"]
 """`RATIO` stands for the ratio."""
 
 
-def axis_table(file: Path, runs: int = 10, asymmetry: float = 0.0, seed: int = 1) -> None:
-    """Write a table of an axis whose viscous friction differs by direction, N s/m as share."""
+def axis_table(
+    file: Path, runs: int = 10, asymmetry: float = 0.0, cogging: float = 0.0, seed: int = 1
+) -> None:
+    """Write a table of an axis.
+
+    Args:
+        file: The table.
+        runs: Laps.
+        asymmetry: Difference of its viscous friction between the directions, N s/m as share.
+        cogging: Amplitude of a force that repeats every 12 mm, as share.
+        seed: Seed of the noise.
+    """
     random = np.random.default_rng(seed)
     time_s = np.arange(0.0, 4.0 * runs, 2e-3)
     position = 0.15 * np.sin(2 * np.pi * time_s / 4.0) + 0.03 * np.sin(2.7 * time_s)
     speed = np.gradient(position, time_s)
     pwm = 0.01 * np.gradient(speed, time_s) + 0.2 * speed + 0.05 * np.tanh(speed / 2e-3)
     pwm += asymmetry * np.abs(speed) + random.normal(0.0, 1e-3, time_s.size)
+    pwm += cogging * np.sin(2 * np.pi * position / 0.012 + 0.3)
     read = np.round(position * 20000) / 20000
     rows = np.column_stack([1e3 * time_s, 255 * pwm, 1e3 * read])
     np.savetxt(file, rows, delimiter=",", header="t,pwm,x", comments="", fmt="%.9g")
@@ -115,6 +126,7 @@ def drive_table(
     runs: int = 9,
     rubs: float = 0.0,
     lost_rad: float = 0.0,
+    wave_rad: float = 0.0,
     seed: int = 1,
 ) -> None:
     """Write a table of a belt drive with a torque cell.
@@ -125,23 +137,26 @@ def drive_table(
         runs: Trials.
         rubs: Share of the torque that friction takes at the input.
         lost_rad: Half of the belt's free travel, at the output.
+        wave_rad: Error of the belt's travel, once a turn of the input, at the output.
         seed: Seed of the noise.
     """
     random = np.random.default_rng(seed)
-    parts = [_trial(k, ratio, rubs, lost_rad, random) for k in range(runs)]
+    parts = [_trial(k, ratio, rubs, (lost_rad, wave_rad), random) for k in range(runs)]
     rows = np.concatenate(parts)
     head = "trial,t,q_in,q_out,i,cell"
     np.savetxt(file, rows, delimiter=",", header=head, comments="", fmt="%.9g")
 
 
 def _trial(
-    k: int, ratio: float, rubs: float, lost_rad: float, random: np.random.Generator
+    k: int, ratio: float, rubs: float, travel: tuple[float, float], random: np.random.Generator
 ) -> FloatArray:
     time_s = np.arange(0.0, 8.0, 1e-3)
     turn = 2 * np.pi * time_s
     output = 0.8 * np.sin((0.2 + 0.05 * (k % 3)) * turn + k) + 0.2 * np.sin(0.61 * turn)
     torque = (0.5 + 0.5 * (k // 3)) * np.sin(0.33 * turn + 2 * k) + 0.3 * output
+    lost_rad, wave_rad = travel
     bend = 0.02 * torque + lost_rad * np.tanh(torque / 0.02)
+    bend += wave_rad * np.sin(ratio * (output + bend) + 0.4)
     angle = ratio * (output + bend)
     speed = np.gradient(angle, time_s)
     loss = 1e-5 * np.gradient(speed, time_s) + 2e-4 * speed + 4e-3 * np.tanh(speed / 0.5)

@@ -8,7 +8,7 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from estimation.diagnosis.result import Value
+from estimation.diagnosis.result import Finding, Value
 from estimation.effects import catalogue
 from rig.output import figures
 from rig.output.provenance import Provenance, commit
@@ -82,14 +82,29 @@ def test_every_family_has_a_meaning_in_plain_words():
         assert not words.endswith("."), family
 
 
-def test_sizes_are_those_of_the_wave_and_in_readable_units():
+@pytest.mark.parametrize(
+    ("along", "repeats"),
+    [
+        ("motor_angle", {"": "7 per turn of the motor angle"}),
+        ("table_position", {"period": "0.898 m"}),
+    ],
+)
+def test_sizes_are_those_of_the_wave_and_in_readable_units(along, repeats):
     wave = {
         "sine": Value(3e-3, "N m", None),
         "cosine": Value(4e-3, "N m", None),
         "order": Value(7.0, "1", None),
         "time": Value(0.25, "s", None),
     }
-    assert sizes_of(wave) == {"amplitude": "5 mN m", "order": "7", "time": "0.25 s"}
+    finding = Finding(
+        balance="motor",
+        place="motor",
+        family="ripple.motor",
+        verdict="identified",
+        depends_on=(along,),
+        parameters=wave,
+    )
+    assert sizes_of(finding) == {"amplitude": "5 mN m", "time": "0.25 s"} | repeats
 
 
 def test_a_table_is_the_same_in_every_medium():

@@ -1,10 +1,12 @@
 """Machines that nobody has, from a table to a named effect in a model that runs live."""
 
 import json
+import math
 
 import pytest
 
 from rig.cli.main import main
+from rig.diagnosis.schema import DiagnosisSchema
 from tests.rig.strangers import AXIS, DRIVE, axis_table, drive_table
 
 pytestmark = pytest.mark.integration
@@ -28,6 +30,7 @@ def run(tmp_path, monkeypatch, capsys):
         ({}, []),
         ({"rubs": 0.08}, [("input", "friction.load")]),
         ({"lost_rad": 0.003}, [("belt", "transmission.backlash")]),
+        ({"wave_rad": 0.002}, [("belt", "ripple.output")]),  # of the input's pulley
     ],
 )
 def test_a_drive_of_another_ratio_goes_from_table_to_export(run, tmp_path, hidden, found):
@@ -40,8 +43,11 @@ def test_a_drive_of_another_ratio_goes_from_table_to_export(run, tmp_path, hidde
     told = json.loads(run("diagnose", "runs", *words))
     named = [f for f in told["findings"] if f["verdict"] in ("identified", "one_of")]
     assert [(f["balance"], f["family"]) for f in named] == found  # the likeliest of a set
-    # over a small wrap, a cable's friction is proportional to the load
-    assert {other for f in named for other in f["alternatives"]} <= {"friction.capstan"}
+    # over a small wrap, a cable's friction is proportional to the load; the acceleration of a wave
+    # does not show in this torque, so the wave may be the encoder's
+    others = {other for f in named for other in f["alternatives"]}
+    assert others <= {"friction.capstan", "sensor.encoder_inl"}
+    DiagnosisSchema.model_validate(told)  # the names of anyone's equations and angles
     words = ["--machine", "drive.toml", "--model", "model.toml", "--speed", "0", "--json"]
     assert "cell_torque_n_m" in run("replay", "runs", *words)
     run("export", "model.toml", "--equation", "input", "--out", "input.h")
@@ -65,3 +71,15 @@ def test_an_axis_driven_by_pwm_is_diagnosed_in_units_of_its_drive(run, tmp_path)
     (finding,) = told["findings"]
     assert finding["family"] == "friction.viscous_asymmetry"
     assert finding["parameters"]["asymmetry"]["value"] == pytest.approx(0.03, rel=0.1)
+
+
+def test_a_force_that_repeats_along_an_axis_has_a_period(run, tmp_path):
+    (tmp_path / "axis.toml").write_text(AXIS)
+    axis_table(tmp_path / "axis.csv", cogging=0.02)
+    told = json.loads(run("diagnose", "axis.csv", "--quick", "--machine", "axis.toml", "--json"))
+    (finding,) = told["findings"]
+    assert (finding["family"], finding["depends_on"]) == ("ripple.motor", ["gantry_position"])
+    period_m = 2 * math.pi / finding["parameters"]["order"]["value"]
+    assert period_m == pytest.approx(0.012, rel=0.01)
+    low, high = finding["parameters"]["order"]["ci95"]
+    assert low <= finding["parameters"]["order"]["value"] <= high
