@@ -5,6 +5,10 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
+# some containers forbid Python to keep what it compiled; then each process compiles numba and scipy
+# again, for five seconds
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: setup demo demo-real test test-unit test-long lint site bench measure results mutants mutants-core proofs soak fuzz hunt figures firmware firmware-arm firmware-teensy clean
 
 # what users run; nothing in it needs a compiler. A command that needs more says so and offers it.
