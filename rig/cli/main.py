@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Callable
+from functools import cache
 from io import TextIOWrapper
 from typing import Annotated, Any
 
@@ -106,6 +107,12 @@ def options(
         show_next_steps()
 
 
+@cache
+def _commands() -> Any:
+    """Return all commands with their options, made once in a process."""
+    return typer.main.get_command(app)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
@@ -114,7 +121,7 @@ def main(arguments: list[str] | None = None) -> int:
     """
     words = _present_words(sys.argv[1:] if arguments is None else arguments)
     try:
-        result = app(args=words, standalone_mode=False, prog_name="rig")
+        result = _commands()(args=words, standalone_mode=False, prog_name="rig")
     except typer.Exit as stop:
         return stop.exit_code
     except SystemExit:  # how typer and rich exit when the reader of stdout is closed

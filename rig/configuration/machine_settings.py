@@ -1,6 +1,7 @@
 """The tables of a configuration that depend on the machine, each machine's by an entry point."""
 
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
 
@@ -44,6 +45,7 @@ class MachineSettings:
     moves: bool = True
 
 
+@cache  # the computer's packages are read through for every look
 def installed(group: str, profile: str) -> Any:
     """Return the object in an entry point group for a profile.
 
