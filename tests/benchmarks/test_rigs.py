@@ -70,6 +70,7 @@ def test_a_clean_residual_is_the_noise_of_its_sensors() -> None:
         assert silent[equation].rms() < 0.4 * noisy[equation].rms()
 
 
+@pytest.mark.long
 def test_an_effect_of_some_runs_is_in_these_alone() -> None:
     case = case_of("some_runs")
     (effect,) = case.truth.effects
@@ -80,18 +81,21 @@ def test_an_effect_of_some_runs_is_in_these_alone() -> None:
         assert same != (k in there)
 
 
+@pytest.mark.long
 def test_a_confounded_case_states_the_families_that_cannot_be_separated() -> None:
     truth = case_of("confounded").truth
     assert len(truth.together) >= 2
     assert truth.effects[0].family in truth.together
 
 
+@pytest.mark.long
 def test_an_effect_outside_the_catalogue_has_no_name_but_variables() -> None:
     (effect,) = case_of("outside").truth.effects
     assert effect.family == "unknown"
     assert effect.variables
 
 
+@pytest.mark.long
 def test_a_faulty_sensor_does_not_move_the_plant() -> None:
     faulty = (case_of("strong", FIRST + k) for k in range(14))
     case = next(c for c in faulty if c.truth.effects[0].family.startswith("sensor."))

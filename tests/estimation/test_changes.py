@@ -99,6 +99,7 @@ def test_a_sensor_that_is_knocked_in_every_run_of_one_campaign_is_a_step():
     assert (found.verdict, found.family) == ("came", "change.step")
 
 
+@pytest.mark.long
 def test_chance_is_not_a_change():
     pairs = [(record(seed), record(seed + 100)) for seed in range(20, 30)]
     wrong = [pair for pair in pairs if compare(*pair, [axis()]).changes]
@@ -106,6 +107,7 @@ def test_chance_is_not_a_change():
     assert len(wrong) <= 3
 
 
+@pytest.mark.long
 def test_what_the_model_lacks_in_both_campaigns_is_no_change():
     alike = {"asymmetry": 2.0, "stiction": 1.0}
     pairs = [(record(seed, **alike), record(seed + 100, **alike)) for seed in range(20, 26)]

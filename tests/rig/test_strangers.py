@@ -27,8 +27,8 @@ def run(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("hidden", "found"),
     [
-        ({}, []),
-        ({"rubs": 0.08}, [("input", "friction.load")]),
+        pytest.param({}, [], marks=pytest.mark.long),
+        pytest.param({"rubs": 0.08}, [("input", "friction.load")], marks=pytest.mark.long),
         ({"lost_rad": 0.003}, [("belt", "transmission.backlash")]),
         ({"wave_rad": 0.002}, [("belt", "ripple.output")]),  # of the input's pulley
     ],

@@ -137,8 +137,9 @@ def test_a_loss_at_a_spot_that_grows_with_the_load_is_found_with_both_variables(
     ("fault", "family"),
     [
         ({"slow": 0.3}, "transmission.relaxation"),
-        ({"bend": 0.1}, "sensor.gain_nonlinear"),
-        ({"creep": 0.1}, "sensor.creep"),  # a torque sensor that is slow by a share is not late
+        pytest.param({"bend": 0.1}, "sensor.gain_nonlinear", marks=pytest.mark.long),
+        # a torque sensor that is slow by a share is not late
+        pytest.param({"creep": 0.1}, "sensor.creep", marks=pytest.mark.long),
         ({"wave": 0.03}, "sensor.encoder_inl"),  # its acceleration hides the rotor's inertia
     ],
 )
@@ -149,6 +150,7 @@ def test_a_gear_and_its_sensors_are_kept_apart(fault: dict[str, float], family: 
     assert finding.rmse_after < (0.6 if "slow" in fault else 1.0) * finding.rmse_before
 
 
+@pytest.mark.long
 def test_a_pulley_that_is_not_round_is_one_cause_and_holds_in_both_equations() -> None:
     runs = cabled(wave=0.05)
     found = answer(runs, cable(), split(runs))
@@ -229,6 +231,7 @@ def test_runs_without_a_cause_show_nothing_of_its_size() -> None:
     assert max(one.gain for one in assessed(joint, groups_of(joint, claims), folds_of(layout))) > 1
 
 
+@pytest.mark.long
 def test_friction_that_jumps_at_random_times_is_found_without_a_name() -> None:
     random = np.random.default_rng(3)
 

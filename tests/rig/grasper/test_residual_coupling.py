@@ -40,6 +40,7 @@ def test_a_wrong_pulley_ratio_is_found_from_a_folder_of_recordings(tmp_path):
     assert ratio["value"] == pytest.approx(built[1, 0] / built[0, 0], rel=0.05)
 
 
+@pytest.mark.long
 def test_the_right_pulley_ratio_lacks_nothing(tmp_path):
     assert diagnosed(tmp_path / "right", pulley_ratio=1.0)["findings"] == []
 
