@@ -22,30 +22,36 @@ duration_s = 2000.0
 """
 
 
-def typed(words: list[str], until: Callable[[str], bool]) -> int:
-    """Type a command in a terminal of its own, close that terminal; return the exit code."""
-    child, terminal = pty.fork()
-    if child == 0:
-        os.execv(sys.executable, [sys.executable, "-m", "rig", *words])  # noqa: S606
-    shown = ""
-    while not until(shown):
-        shown += os.read(terminal, 4096).decode(errors="replace")
-    os.close(terminal)
-    _, status = os.waitpid(child, 0)
-    return os.waitstatus_to_exitcode(status)
+class Typed:
+    """A command that was typed in a terminal of its own."""
+
+    def __init__(self, *words: str) -> None:
+        self._child, self._terminal = pty.fork()
+        if self._child == 0:
+            os.execv(sys.executable, [sys.executable, "-m", "rig", *words])  # noqa: S606
+        os.set_inheritable(self._terminal, False)  # a later command would keep it open
+
+    def close_terminal(self, when: Callable[[str], bool]) -> int:
+        """Close the terminal when it shows something; return the command's exit code."""
+        shown = ""
+        while not when(shown):
+            shown += os.read(self._terminal, 4096).decode(errors="replace")
+        os.close(self._terminal)
+        _, status = os.waitpid(self._child, 0)
+        return os.waitstatus_to_exitcode(status)
 
 
 def test_recording_closes_its_log_and_the_rig_is_safe(tmp_path: Path) -> None:
     (tmp_path / "long.toml").write_text(PROTOCOL)
     out = tmp_path / "campaign"
-    words = ["record", "-p", str(tmp_path / "long.toml"), "-o", str(out)]
-    assert typed(words, lambda _: bool(list(out.glob("*.part")))) == 130
+    command = Typed("record", "-p", str(tmp_path / "long.toml"), "-o", str(out))
+    assert command.close_terminal(lambda _: bool(list(out.glob("*.part")))) == 130
     (path,) = out.glob("*.mcap*")
     end = read_log(path).end
     assert end is not None
     assert not end.clean
 
 
-@pytest.mark.parametrize("words", [["live", "--pace", "1"], ["live", "--plain"]])
-def test_the_display_ends_as_ctrl_c_ends_it(words: list[str]) -> None:
-    assert typed(words, lambda shown: "mN" in shown) == 130
+def test_the_display_ends_as_ctrl_c_ends_it() -> None:
+    displays = Typed("live", "--pace", "1"), Typed("live", "--plain")
+    assert [one.close_terminal(lambda shown: "mN" in shown) for one in displays] == [130, 130]
