@@ -111,7 +111,7 @@ MUTATIONS = st.lists(
 
 
 @settings(
-    max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(mutations=MUTATIONS)
 @example(mutations=[(0.99, 0, "999")])
@@ -139,7 +139,7 @@ def test_a_mutated_log_gives_its_values_or_a_data_error(path, lines, mutations):
     np.testing.assert_allclose(recording["jaw_angle_rad"], raw[4] * np.deg2rad(0.09), rtol=1e-14)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     st.lists(
         st.decimals(-(10**9), 10**9, places=5, allow_nan=False).map(str), min_size=3, max_size=30

@@ -1,14 +1,16 @@
 """Machines that other people built: the shipped mappings on their authors' own files."""
 
 import tarfile
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rig.importers.derivatives import checked
 from rig.importers.table.mapping import read_mapping
-from rig.importers.table.open import open_table, read_runs
+from rig.importers.table.open import read_runs
 from rig.importers.table.preview import preview
 
 pytestmark = pytest.mark.measured
@@ -33,6 +35,20 @@ def unpacked(measured_data, tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def read(unpacked):
+    """Return the function that reads a machine's runs, and what is remarked on them."""
+
+    @cache
+    def _read(machine):
+        remarks = []
+        mapping = read_mapping(SHIPPED / f"{machine}.toml", [])
+        runs = read_runs(unpacked / ARCHIVES[machine], mapping, remarks)
+        return [checked(run) for run in runs], remarks
+
+    return _read
+
+
 @pytest.mark.parametrize(
     ("machine", "runs", "channel", "range_"),
     [
@@ -42,20 +58,16 @@ def unpacked(measured_data, tmp_path_factory):
         ("ur10e", 79, "joint_6_angle_rad", (-1.548, 1.573)),
     ],
 )
-def test_a_shipped_mapping_reads_the_authors_files(unpacked, machine, runs, channel, range_):
-    mapping = read_mapping(SHIPPED / f"{machine}.toml", [])
-    folder = unpacked / ARCHIVES[machine]
-    remarks = []
-    recordings = list(read_runs(folder, mapping, remarks))
+def test_a_shipped_mapping_reads_the_authors_files(read, machine, runs, channel, range_):
+    recordings, remarks = read(machine)
     assert len(recordings) == runs
     assert machine != "emps" or preview(recordings, remarks).questions == []
     values = np.concatenate([recording[channel][recording.valid] for recording in recordings])
     np.testing.assert_allclose((values.min(), values.max()), range_, atol=1e-3)
 
 
-def test_the_drop_outs_of_the_servo_are_flagged_with_the_reason(unpacked):
-    mapping = read_mapping(SHIPPED / "sts3215.toml", [])
-    recordings = open_table(unpacked / "sts3215", mapping)
+def test_the_drop_outs_of_the_servo_are_flagged_with_the_reason(read):
+    recordings, _ = read("sts3215")
     reasons = {stretch.reason for recording in recordings for stretch in recording.stretches}
     assert reasons <= {"the servo did not answer: its reading is -pi", "the drive was switched off"}
     for recording in recordings:
