@@ -28,8 +28,9 @@ def left(case: Case, recordings: tuple[Recording, ...]) -> dict[str, Fitted]:
     return {equation: fit(runs, equation) for equation in EQUATIONS}
 
 
-def test_a_seed_and_kind_give_the_same_samples_every_time() -> None:
-    one, other = draw(FIRST, "strong"), case_of("strong")
+@pytest.mark.parametrize("kind", ["clean", pytest.param("strong", marks=pytest.mark.long)])
+def test_a_seed_and_kind_give_the_same_samples_every_time(kind: str) -> None:
+    one, other = draw(FIRST + 1, kind), case_of(kind, FIRST + 1)
     for first, second in zip(one.recordings, other.recordings, strict=True):
         assert first.conditions == second.conditions
         for name in first.columns:

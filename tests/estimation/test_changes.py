@@ -25,21 +25,25 @@ MACHINE = {
 }
 
 
-def axis() -> Model:
-    speed = {"speed": "axis_velocity_m_s"}
+def equation(target: str, first: Term, friction: int, speed: str) -> Model:
+    """Return an equation with friction, of a sign, and an offset."""
+    rubbing = [
+        Term(effect(f"friction.{kind}"), friction, {"speed": speed})
+        for kind in ("viscous", "coulomb")
+    ]
     return Model(
-        name="axis",
+        name="declared",
         balance="motor",
-        target="drive_force_n",
+        target=target,
         low_pass=LowPass(cutoff_hz=20.0),
         run_offsets=False,
-        terms=(
-            Term(effect("inertia.missing"), 1, {"acceleration": "axis_acceleration_m_s2"}),
-            Term(effect("friction.viscous"), 1, speed),
-            Term(effect("friction.coulomb"), 1, speed),
-            Term(effect("sensor.offset"), 1, {}),
-        ),
+        terms=(first, *rubbing, Term(effect("sensor.offset"), 1, {})),
     )
+
+
+def axis() -> Model:
+    inertia = Term(effect("inertia.missing"), 1, {"acceleration": "axis_acceleration_m_s2"})
+    return equation("drive_force_n", inertia, 1, "axis_velocity_m_s")
 
 
 def record(seed: int, only: int | None = None, **changed: float) -> list[Recording]:
@@ -177,20 +181,8 @@ def held_loads(seed: int, torque_constant: float) -> list[Recording]:
 
 
 def motor() -> Model:
-    speed = {"speed": "motor_velocity_rad_s"}
-    return Model(
-        name="motor",
-        balance="motor",
-        target="proximal_torque_n_m",
-        low_pass=LowPass(cutoff_hz=20.0),
-        run_offsets=False,
-        terms=(
-            Term(effect("motor.torque_constant"), 1, {"source": "motor_current_a"}),
-            Term(effect("friction.viscous"), -1, speed),
-            Term(effect("friction.coulomb"), -1, speed),
-            Term(effect("sensor.offset"), 1, {}),
-        ),
-    )
+    constant = Term(effect("motor.torque_constant"), 1, {"source": "motor_current_a"})
+    return equation("proximal_torque_n_m", constant, -1, "motor_velocity_rad_s")
 
 
 def test_a_torque_constant_that_moved_is_named_where_friction_could_stand_in_for_the_current():

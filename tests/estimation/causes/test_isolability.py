@@ -2,6 +2,8 @@
 
 from functools import cache
 
+import pytest
+
 from estimation.causes.isolability import NOTHING, Isolable, isolability
 from estimation.recording import Recording
 from tests.estimation.causes.synthetic import motor, recordings
@@ -33,6 +35,7 @@ def test_a_ripple_with_the_motor_angle_is_distinguished() -> None:
     assert _effects(one_load=False)["motor", "ripple.motor"].share > 0.5
 
 
+@pytest.mark.long
 def test_several_loads_make_the_saturation_of_a_motor_easier_to_name() -> None:
     one, several = (_effects(k)["actuator motor_current_a", "motor.saturation"] for k in (1, 0))
     assert several.share > one.share

@@ -102,7 +102,7 @@ def _coarse(seed: int, count_rad: float = 0.01) -> list[Recording]:
         recordings,
         partial(recordings, spring=True),  # an angle that follows the load
         partial(_coarse, 0),
-        partial(_coarse, 1),
+        pytest.param(partial(_coarse, 1), marks=pytest.mark.long),
     ],
 )
 def test_nothing_is_found_where_nothing_is_missing(made: Callable[[], list[Recording]]) -> None:
@@ -110,7 +110,14 @@ def test_nothing_is_found_where_nothing_is_missing(made: Callable[[], list[Recor
     assert diagnose(runs, [motor()], split(runs)).verdict == "nothing_missing"
 
 
-@pytest.mark.parametrize("having", [(1, 2, 5, 6, 7, 10), (0, 3, 5, 8, 9), (2, 4, 7, 11)])
+@pytest.mark.parametrize(
+    "having",
+    [
+        (2, 4, 7, 11),
+        pytest.param((1, 2, 5, 6, 7, 10), marks=pytest.mark.long),
+        pytest.param((0, 3, 5, 8, 9), marks=pytest.mark.long),
+    ],
+)
 def test_a_test_run_decides_itself_where_the_training_runs_do_not(having: tuple[int, ...]) -> None:
     plain, rippled = recordings(), recordings(_rippled)
     runs = [rippled[k] if k in having else plain[k] for k in range(12)]
