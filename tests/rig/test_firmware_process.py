@@ -17,6 +17,7 @@ from drivers.teensy.protocol import STATUS_ARMED, Trip
 from drivers.transport import open_transport
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
+from rig.canopen.process import CanopenProcess
 from rig.configuration.config import SHIPPED, load_config
 from rig.errors import SafetyTripError
 from rig.simulation.firmware_process import PROGRAM, FirmwareProcess
@@ -44,20 +45,6 @@ def program(library: Path) -> Path:
     if not PROGRAM.is_file():
         pytest.skip("the firmware process is built on Linux only")
     return PROGRAM
-
-
-def test_a_session_runs_on_it_unchanged(program: Path) -> None:
-    config = load_config(Path("pty"))
-    angle = np.linspace(-1.04, -0.9, 500)
-    with Session(config, open_logger(config)) as session:
-        assert session.identity.serial == "PTY-0001"
-        session.take_zeros(0.3)
-        readings = list(session.play(angle, np.zeros(500)))
-    setpoint = np.concatenate([reading.setpoint for reading in readings])
-    assert np.array_equal(setpoint[setpoint >= 0], np.arange(500))
-    assert readings[-1].lost == 0
-    moved = np.concatenate([r.columns["spindle_angle_rad"] for r in readings])
-    assert moved[-1] - moved[0] > 0.05
 
 
 @pytest.mark.parametrize("safe_state", ["release", "hold"])
@@ -110,10 +97,15 @@ def test_a_second_program_on_the_port_is_refused_and_the_first_goes_on(
     assert [one["lost"] for one in later] == [0] * 5
 
 
-def test_a_process_that_dies_is_a_lost_link(program: Path) -> None:
-    config = load_config(Path("pty"))
+@pytest.mark.parametrize(
+    ("name", "kind"), [("pty", FirmwareProcess), ("canopen_virtual", CanopenProcess)]
+)
+def test_a_process_that_dies_is_a_lost_link(
+    program: Path, name: str, kind: type[FirmwareProcess] | type[CanopenProcess]
+) -> None:
+    config = load_config(Path(name)).changed(devices={}, safety={"watchdog_s": 1.0})
     link = open_logger(config)
-    assert isinstance(link, FirmwareProcess)
+    assert isinstance(link, kind)
     unsafe = pytest.raises(SafetyTripError, match="did not confirm")
     with unsafe as left, Session(config, link) as session:
         next(session.rest(0.1))

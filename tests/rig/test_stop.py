@@ -90,29 +90,19 @@ def is_armed(config: Path) -> bool:
         return bool(int(logger.read(1.0).samples["status"][-1]) & STATUS_ARMED)
 
 
-def test_a_session_that_has_the_rig_is_asked_to_end(
-    board: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("hangs", [False, True])
+def test_a_session_that_has_the_rig_is_asked_to_end_and_killed_if_it_hangs(
+    board: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, hangs: bool
 ) -> None:
     with started(SESSION, board) as session:
+        if hangs:
+            monkeypatch.setattr("rig.bench.holding.ENDS_S", 0.2)
+            os.kill(session.pid, signal.SIGSTOP)
         code, told = stopped(board, capsys)
         session.communicate()
     assert (code, told["state"]) == (0, "disarmed")
-    assert told["holder"] == {"pid": session.pid, "was_killed": False}
-    assert session.returncode != -signal.SIGKILL
-    assert not is_armed(board)
-
-
-def test_a_session_that_hangs_is_killed(
-    board: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("rig.bench.holding.ENDS_S", 0.2)
-    with started(SESSION, board) as session:
-        os.kill(session.pid, signal.SIGSTOP)
-        code, told = stopped(board, capsys)
-        session.communicate()
-    assert (code, told["state"]) == (0, "disarmed")
-    assert told["holder"] == {"pid": session.pid, "was_killed": True}
-    assert session.returncode == -signal.SIGKILL
+    assert told["holder"] == {"pid": session.pid, "was_killed": hangs}
+    assert (session.returncode == -signal.SIGKILL) == hangs
     assert not is_armed(board)
 
 
