@@ -5,6 +5,7 @@ Those that need no rig, no data and seconds only are run, on the simulated rig.
 
 import re
 import shlex
+from functools import cache
 from pathlib import Path
 
 import click
@@ -44,9 +45,15 @@ COMMANDS = sorted(
 )
 
 
+@cache
+def tree() -> click.Command:
+    """Return the program with all its commands, made once: it takes as long as a test."""
+    return typer.main.get_command(app)
+
+
 def resolved(words: list[str]) -> tuple[click.Command, list[str]]:
     """Return the command that words name, and the words after it."""
-    command = typer.main.get_command(app)
+    command = tree()
     while words and hasattr(command, "commands"):
         if words[0].startswith("-"):
             break
