@@ -91,7 +91,8 @@ def ending_of(name: str) -> str:
     raise UnknownUnitError(
         f"The channel name {name!r} carries no unit.",
         "Every column is in SI units and its name ends in the unit.",
-        "Rename it, for example `spindle_angle_rad` or `motor_current_a`.",
+        "End it in its SI unit, such as motor_current_a or motor_temperature_k. The endings are"
+        f" {', '.join(sorted(UNIT_BY_SUFFIX))}.",
     )
 
 

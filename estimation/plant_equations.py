@@ -125,7 +125,8 @@ def signals(plant: Plant) -> Signals:
         count = sensor.step or 0.0
         rest[speed] = count * plant.cutoff_hz if axis.rest_speed is None else axis.rest_speed
     stated = {s.name: Reading(s.noise, s.step, s.rate_hz, s.delay_s) for s in plant.sensors}
-    readings = {name: one for name, one in stated.items() if one != Reading()}
+    warmth = {s.name for s in plant.sensors if s.reads == "temperature"}
+    readings = {name: one for name, one in stated.items() if one != Reading() or name in warmth}
     return Signals((*bends, *plant.derived), rest, readings)
 
 

@@ -98,12 +98,17 @@ class Signals:
             spindle stands still: an equation is static when the speed of its own friction is below
             the threshold. Slower than a share of the usual speed is at rest too, see
             `estimation.rest`, so 0 is a threshold that follows the data.
-        readings: What is stated of the sensors of some channels.
+        readings: What is stated of the sensors of some channels; of a temperature that it is one.
     """
 
     combinations: tuple[Combination, ...] = ()
     rest: Mapping[str, float] = field(default_factory=dict)
     readings: Mapping[str, Reading] = field(default_factory=dict)
+
+    @property
+    def temperatures(self) -> tuple[str, ...]:
+        """Channels that the machine states to be temperatures, K."""
+        return tuple(name for name in self.readings if name.endswith("_k"))
 
     def combination(self, name: str) -> Combination | None:
         """Return the combination of that name, or None where there is none."""

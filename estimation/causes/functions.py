@@ -123,6 +123,8 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
         found.append("history")
     if "speed" in roles:
         found.append("dwell")
+    if "temperature" in roles:
+        found.append("temperature")
     found.append("time")
     return found
 

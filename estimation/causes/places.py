@@ -6,7 +6,7 @@ the sensor; a torque beyond a compliance bends it as well.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -59,6 +59,17 @@ class Place:
 
 def places_of(layout: Layout) -> list[Place]:
     """Return every place the declared equations know of."""
+    warmth = tuple(n for n in _signals(layout).temperatures if n in layout.measured)
+    roles = {"temperature": warmth} if warmth else {}
+    return [
+        replace(place, roles={**place.roles, **roles})
+        if place.kind in ("loss", "actuator")
+        else place
+        for place in _places_of(layout)
+    ]
+
+
+def _places_of(layout: Layout) -> list[Place]:
     found = []
     angles = _angles(layout)
     for equation in layout.equations.values():

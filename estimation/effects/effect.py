@@ -22,6 +22,9 @@ Shape = Sequence[float]
 Row = Sequence[Any]
 """One value or one array of shape (n,) for each amplitude."""
 
+REFERENCE_K = 298.15
+"""Temperature at which data sheets state values, K."""
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:

@@ -5,7 +5,15 @@ from typing import ClassVar
 import numba
 import numpy as np
 
-from estimation.effects.effect import Inputs, Parameter, Pointwise, Remembering, Row, Shape
+from estimation.effects.effect import (
+    REFERENCE_K,
+    Inputs,
+    Parameter,
+    Pointwise,
+    Remembering,
+    Row,
+    Shape,
+)
 from estimation.recording import FloatArray
 
 
@@ -73,3 +81,31 @@ class CampaignWarmup(Pointwise):
         """Return one value or one array per amplitude."""
         fade = np.exp(-np.maximum(inputs["campaign_clock"], 0.0) / shape[0])
         return (fade * np.tanh(inputs["speed"] / shape[1]),)
+
+
+class MeasuredWarmup(Pointwise):
+    """Friction that decreases with a measured temperature, or with a negative F grows.
+
+    Equation: torque = F (298.15 K - temperature) tanh(speed / width). F in N m/K, temperature in K,
+    width in rad/s.
+
+    Check: compare a cold run with the same run when the machine is warm.
+
+    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010 (friction of a robot joint as
+    it warms), to first order in temperature.
+    """
+
+    id = "friction.warmup.measured"
+    family = "friction.warmup"
+    balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
+    roles: ClassVar = {"speed": "motor_velocity_rad_s", "temperature": "motor_temperature_k"}
+    amplitudes = (Parameter("friction", "target / temperature", "fall of the loss per kelvin"),)
+    shape = (
+        Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=6),
+    )
+    told_apart_by = "the same run when the machine is cold and when it is warm"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        colder = REFERENCE_K - inputs["temperature"]
+        return (colder * np.tanh(inputs["speed"] / shape[0]),)

@@ -5,7 +5,15 @@ from typing import ClassVar
 import numba
 import numpy as np
 
-from estimation.effects.effect import Inputs, Parameter, Pointwise, Remembering, Row, Shape
+from estimation.effects.effect import (
+    REFERENCE_K,
+    Inputs,
+    Parameter,
+    Pointwise,
+    Remembering,
+    Row,
+    Shape,
+)
 from estimation.recording import FloatArray
 
 
@@ -73,10 +81,6 @@ class CampaignWarming(Pointwise):
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
         return (-inputs["current"] * np.expm1(-np.maximum(inputs["campaign_clock"], 0) / shape[0]),)
-
-
-REFERENCE_K = 298.15
-"""Reference temperature of the torque constant in data sheets, K."""
 
 
 class MeasuredThermalLoss(Pointwise):

@@ -7,7 +7,7 @@ import pytest
 
 from rig.cli.main import main
 from rig.diagnosis.schema import DiagnosisSchema
-from tests.rig.strangers import AXIS, DRIVE, axis_table, drive_table
+from tests.rig.strangers import AXIS, DRIVE, axis_table, drive_table, warming_table
 
 pytestmark = pytest.mark.integration
 
@@ -83,3 +83,18 @@ def test_a_force_that_repeats_along_an_axis_has_a_period(run, tmp_path):
     assert period_m == pytest.approx(0.012, rel=0.01)
     low, high = finding["parameters"]["order"]["ci95"]
     assert low <= finding["parameters"]["order"]["value"] <= high
+
+
+def test_friction_follows_a_temperature_that_the_machine_states(run, tmp_path):
+    sensor = '[[sensor]]\nname = "rail_temperature_k"\nreads = "temperature"\n\n[data]\n'
+    column = '[data.columns]\nrail_temperature_k = "warm:degC"\n'
+    text = AXIS.replace("[data]\n", sensor, 1).replace("[data.columns]\n", column)
+    (tmp_path / "axis.toml").write_text(text)
+    warming_table(tmp_path / "axis.csv")
+    words = ["--machine", "axis.toml", "--model-out", "model.toml", "--json"]
+    told = json.loads(run("diagnose", "axis.csv", "--quick", *words))
+    (finding,) = told["findings"]
+    assert finding["family"] == "friction.warmup"
+    assert finding["depends_on"] == ["velocity_sign", "temperature"]
+    assert finding["parameters"]["friction"]["value"] == pytest.approx(0.003, rel=0.1)
+    assert "rail_temperature_k" in (tmp_path / "model.toml").read_text()
