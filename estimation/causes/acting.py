@@ -30,25 +30,23 @@ def on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
     for one in everything:
         if not one.candidate.is_function:
             named.setdefault(len(one.amplitudes), []).append(one)
-    promise: list[tuple[float, Candidate, tuple[int, ...]]] = []
+    promise: list[tuple[float, Candidate, NDArray[np.bool_]]] = []
     for group in named.values():
         products = tuple(np.stack([s.by_run[i] for s in group]) for i in range(3))
         for acts in _acting(inverse, products):
             gains = _removed(inverse, *(_over(acts, x) for x in products))
-            promise += [
-                (float(gain), one.candidate, tuple(np.flatnonzero(acting).tolist()))
-                for one, gain, acting in zip(group, gains, acts, strict=True)
-                if 1 < acting.sum() < count
-            ]
+            acting = acts.sum(axis=1)
+            some = np.flatnonzero((acting > 1) & (acting < count))
+            promise += [(float(gains[k]), group[k].candidate, acts[k]) for k in some]
     promise.sort(key=lambda p: -p[0])
-    tried, seen = [], dict[object, set[tuple[int, ...]]]()
-    for _, candidate, acting in promise:
+    tried, seen = [], dict[object, set[tuple[bool, ...]]]()
+    for _, candidate, runs in promise:
         if candidate.name not in seen and len(seen) == PARTIAL:
             continue
         known = seen.setdefault(candidate.name, set())
-        if len(known) < CHOICES and acting not in known:
-            known.add(acting)
-            chosen = tuple(k in acting for k in range(count))
+        chosen = tuple(runs.tolist())
+        if len(known) < CHOICES and chosen not in known:
+            known.add(chosen)
             tried.append(Claim(candidate.cause, chosen, candidate.choices))
     return tried
 
