@@ -223,3 +223,6 @@ def test_no_cause_is_sought_in_a_deflection_from_another_gear_ratio(geared, tmp_
     words = ["diagnose", str(runs), "--equation", "gearbox", "--ledger", str(tmp_path / "used")]
     assert main([*words, "--json-out", str(tmp_path / "out.json")]) == 5
     assert "changes 20 times as much as spindle_angle_rad" in capsys.readouterr().err
+    assert main(["fit", str(runs), "--model", "gearbox", "--folds", "2"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "but the machine states the ratio 35. The values above describe that" in printed
