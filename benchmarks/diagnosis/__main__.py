@@ -1,8 +1,8 @@
 """Measure how good a version of `rig diagnose` is, and append a line to the results page.
 
-`python -m benchmarks.diagnosis measure [--varied] [--own] [--otherlab FOLDER] [--machines FOLDER]`,
-without a generator `--varied`. Resumes where it stopped; a line goes to the page when every case is
-answered.
+`python -m benchmarks.diagnosis measure [--varied] [--own] [--strangers] [--otherlab FOLDER]
+[--machines FOLDER]`, without a generator `--varied`. Resumes where it stopped; a line goes to the
+page when every case is answered.
 """
 
 import argparse
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.diagnosis import machines, otherlab, own, varied
+from benchmarks.diagnosis import machines, otherlab, own, strangers, varied
 from benchmarks.diagnosis.asking import Rig
 from benchmarks.diagnosis.case import KINDS, Case
 from benchmarks.diagnosis.measure import Row, measure
@@ -36,7 +36,7 @@ class Generator:
 def main() -> int:
     """Measure what the command line asks for."""
     options = _parser().parse_args()
-    options.varied |= not (options.own or options.otherlab or options.machines)
+    options.varied |= not (options.own or options.strangers or options.otherlab or options.machines)
     rig = Rig(options.rig, options.version)
     for generator in _generators(options):
         rows = measure(
@@ -58,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
         "--varied", action="store_true", help="rigs, protocols and forms drawn at random"
     )
     parser.add_argument("--own", action="store_true", help="the reference rig and its protocols")
+    parser.add_argument("--strangers", action="store_true", help="machines drawn at random")
     parser.add_argument("--otherlab", type=Path, help="folder of another simulator and its cases")
     parser.add_argument("--machines", type=Path, help="folder of measured data, one a machine")
     parser.add_argument(
@@ -93,7 +94,7 @@ def _counts(text: str) -> dict[str, int]:
 
 
 def _generators(options: argparse.Namespace) -> Iterator[Generator]:
-    if options.own or options.varied:
+    if options.own or options.varied or options.strangers:
         seed = next_to_judge(options.page) if options.seed is None else options.seed
         _say(f"seed {seed}: {part_of(seed)}")
         if options.own:
@@ -103,6 +104,9 @@ def _generators(options: argparse.Namespace) -> Iterator[Generator]:
             name = "varied" if ratio is None else f"varied, gear {ratio:g}"
             drawn = varied.cases(seed, options.counts, options.out / "truths", ratio)
             yield Generator(name, list(drawn), seed)
+        if options.strangers:
+            drawn = strangers.cases(seed, options.counts, options.out / "truths")
+            yield Generator("strangers", list(drawn), seed)
     for path, cases in ((options.otherlab, otherlab.cases), (options.machines, machines.cases)):
         if path is not None and not path.is_dir():
             _say(f"skipped: no folder {path}")

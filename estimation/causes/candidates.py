@@ -1,6 +1,7 @@
 """The candidate causes of a search, laid out on the runs."""
 
 import itertools
+import math
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ import numpy as np
 
 from estimation.causes.blocks import Block, block_of
 from estimation.causes.equations import Layout, RunSignals
-from estimation.causes.functions import Function, functions_at
+from estimation.causes.functions import MOST_VARIABLES, Function, functions_at
 from estimation.causes.instruments import signal
 from estimation.causes.joint import Joint
 from estimation.causes.laid import NOTHING, Laid, Scale
@@ -119,20 +120,38 @@ def pool_of(joint: Joint, claims: Iterable[Claim]) -> list[Group]:
     train, pool = joint.layout, groups_of(joint, claims)
     for run in (*train.runs, *train.shaken):
         run.memo.clear()  # columns of the whole run, many times as large as those on the grid
-    count = Counter(_form(c) for group in pool for c in group.candidates)
-    forms = len({(place, effect) for place, effect, _ in count})
-    sizes = Counter((place, effect) for place, effect, _ in count)
+    count = Counter(_form(c.cause) for group in pool for c in group.candidates)
     return [
         replace(
             group,
-            candidates=[
-                replace(c, choices=count[_form(c)] * sizes[_form(c)[:2]] * forms)
-                for c in group.candidates
-            ],
+            candidates=[replace(c, choices=_choices(c.cause, count)) for c in group.candidates],
             block=block_of(joint, group.laid),
         )
         for group in pool
     ]
+
+
+def _form(cause: Source | Function) -> tuple[str, str]:
+    """Return the key of one prior probability: a form of an effect, or functions of one variable.
+
+    Functions of several variables share that of the functions at their place.
+    """
+    if not isinstance(cause, Function):
+        return cause.place.name, cause.effect.id
+    return cause.place.name, "" if len(cause.variables) == 1 else "several"
+
+
+def _choices(cause: Source | Function, count: Mapping[tuple[str, str], int]) -> int:
+    """Return the number of choices that a cause is one of: of forms, and within its form.
+
+    Within a form these are the points of its grid. Of smooth functions these are the numbers of
+    variables, and the sets of so many.
+    """
+    forms = sum(effect != "several" for _, effect in count)
+    if not isinstance(cause, Function):
+        return forms * count[_form(cause)]
+    sets = max(1, math.comb(count[cause.place.name, ""], len(cause.variables)))
+    return forms * MOST_VARIABLES * sets
 
 
 def skews(joint: Joint) -> list[Claim]:
@@ -307,15 +326,3 @@ def _precision(joint: Joint, cause: Source | Function, size: FloatArray) -> Floa
     if cause.bend is not None:
         everything[1:] += 1.0 / (cause.bend.sd * size[1:]) ** 2
     return everything
-
-
-def _form(candidate: Claim) -> tuple[str, str, int]:
-    """Return the key of one prior probability: a form of an effect, or functions of n variables.
-
-    The smooth functions at a place share the prior probability of one form, first by the number of
-    their variables, then by which these are.
-    """
-    cause = candidate.cause
-    if isinstance(cause, Function):
-        return cause.place.name, "", len(cause.variables)
-    return cause.place.name, cause.effect.id, 0

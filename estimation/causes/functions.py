@@ -31,6 +31,9 @@ ROLE_OF_VARIABLE = {
 }
 """Variable to the role of an effect that its channel plays, where the names differ."""
 
+MOST_VARIABLES = 3
+"""Variables of one function, direction included."""
+
 LOOSE_PLACES = ("loss", "deflection", "actuator")
 
 
