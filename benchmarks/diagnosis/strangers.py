@@ -220,6 +220,11 @@ def _spot(scale: Scale, run: Run) -> FloatArray:
     return np.exp(-0.5 * ((run.position - place) / wide) ** 2)
 
 
+def _hump(scale: Scale, run: Run) -> FloatArray:
+    pace = _between(scale, 0, 0.3, 0.6) * scale.speed
+    return np.exp(-((5.0 * (np.abs(run.speed) / pace - 1.0)) ** 2))
+
+
 def _step(scale: Scale, run: Run) -> FloatArray:
     later = run.number >= round(scale.runs * (0.35 + 0.3 * scale.drawn[0]))
     return float(later) * _signed(scale, run)
@@ -270,7 +275,7 @@ NAMED = {
         enters="bend",
         of_single=False,
     ),
-    "bent gear": Effect(
+    "shaped gear": Effect(
         ("ripple.output", "sensor.encoder_inl"), _wave, enters="bend", of_single=False
     ),
     "input encoder": Effect(("sensor.encoder_inl",), _wave, enters="x", of_single=False),
@@ -295,10 +300,10 @@ UNNAMED = {
         ("velocity_sign velocity", "position"),
     ),
     "notch": Effect(("unknown",), _spot, ("position",)),
-    "push": Effect(
+    "rough speed": Effect(
         ("unknown",),
-        lambda s, run: np.gradient(run.speed, run.time_s) ** 2 * _signed(s, run),
-        ("velocity_sign velocity", "acceleration"),
+        lambda s, run: _hump(s, run) * _signed(s, run),
+        ("velocity_sign velocity",),
     ),
 }
 
@@ -507,7 +512,7 @@ def _hidden(
     floor: Mapping[str, float],
     size: float,
 ) -> list[dict[str, FloatArray]]:
-    """Return what the effect adds to the loss, the bend and the readings of each run."""
+    """Return the shares of the effect in the loss, the bend and the readings of each run."""
     out = [dict.fromkeys(floor, np.zeros(len(run.time_s))) for run in runs]
     if chosen is None:
         return out
