@@ -166,7 +166,7 @@ def holoborodko_derivative(
     three points. All of them are exact on parabolas.
 
     Args:
-        values: Shape (n,), n at least 3.
+        values: Shape (n,) or (n, k), n at least 3.
         period_s: Sample period, s.
         points: Length of the stencil.
         exact_degree: 2 or 4, see `holoborodko_coefficients`.
@@ -178,14 +178,14 @@ def holoborodko_derivative(
     n = len(signal_values)
     if n < 3:
         raise FilterError(f"{n} samples cannot be differentiated; three are needed.")
-    derivative = np.empty(n)
-    derivative[0] = signal_values[:3] @ [-1.5, 2.0, -0.5]
-    derivative[-1] = signal_values[-3:] @ [0.5, -2.0, 1.5]
+    derivative = np.empty_like(signal_values)
+    derivative[0] = [-1.5, 2.0, -0.5] @ signal_values[:3]
+    derivative[-1] = [0.5, -2.0, 1.5] @ signal_values[-3:]
     # each longer stencil overwrites the samples it reaches
     for length in range(3, min(points, n if n % 2 else n - 1) + 1, 2):
         degree = exact_degree if length > exact_degree else 2
         half = (length - 1) // 2
-        inner = np.zeros(n - 2 * half)
+        inner = np.zeros((n - 2 * half, *signal_values.shape[1:]))
         for k, c in enumerate(holoborodko_coefficients(length, degree), start=1):
             inner += c * (
                 signal_values[half + k : n - half + k] - signal_values[half - k : n - half - k]

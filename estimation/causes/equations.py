@@ -71,6 +71,7 @@ class RunSignals:
         name: Name of the run.
         channels: Channel to values, each of shape (n,), SI units; further signals may be added.
         rate_hz: Rate of these values.
+        step: They are every so many samples of the recording.
         noise: Channel to one realisation of its sensors' white noise, filtered in the same way.
         grid: Places regressed on, indices into n.
         used: Equation to the samples it counts, indices into `grid`.
@@ -80,6 +81,7 @@ class RunSignals:
     channels: dict[str, FloatArray]
     noise: Mapping[str, FloatArray]
     rate_hz: float
+    step: int
     low_pass: LowPass
     grid: NDArray[np.intp]
     used: Mapping[str, NDArray[np.intp]]
@@ -410,7 +412,7 @@ def _signals(
                 "The others are flagged, at rest, or too near to the ends for the filter.",
                 "Record it again, or exclude it.",
             )
-    return RunSignals(recording.name, channels, noise, rate_hz, low_pass, grid, used)
+    return RunSignals(recording.name, channels, noise, rate_hz, step, low_pass, grid, used)
 
 
 def samples_in_motion(model: Model, recording: Recording) -> int:

@@ -16,6 +16,7 @@ from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
 from estimation.causes.places import Place, direction_width
 from estimation.effects import Effect, Parameter, Pointwise, catalogue
+from estimation.filters import holoborodko_derivative
 from estimation.recording import FloatArray
 
 DECLARED_ONLY = (
@@ -188,7 +189,7 @@ class Source:
                 if found is not None and bends_first is not None:
                     found = _bent(found[:, chosen], bends_first)
                 if found is not None and not self.on_grid:
-                    found = _derived(found, run.rate_hz, entry.order)[run.grid]
+                    found = _derived(found, run, entry.order)[run.grid]
                 run.memo[key] = found
             found = run.memo[key]
             if found is None:
@@ -450,10 +451,17 @@ def _passed(run: RunSignals, angle: str, order: float) -> FloatArray:
     return np.asarray(1.0 / (1.0 + relative ** (2 * low_pass.order)))
 
 
-def _derived(columns: FloatArray, rate_hz: float, order: int) -> FloatArray:
-    """Return the time derivative of columns of order 0 to 2, by differences over five samples."""
+def _derived(columns: FloatArray, run: RunSignals, order: int) -> FloatArray:
+    """Return the time derivative of columns of order 0 to 2, as that of the channels is.
+
+    Their differentiator has an error near half the recording's rate. Where the series has fewer
+    samples than the recording, the channels have next to none of it.
+    """
     for _ in range(order):
-        wide = np.pad(columns, ((2, 2), (0, 0)), mode="edge")
-        near, far = wide[3:-1] - wide[1:-3], wide[4:] - wide[:-4]
-        columns = (8.0 * near - far) * (rate_hz / 12.0)
+        if run.step == 1:
+            columns = holoborodko_derivative(columns, 1.0 / run.rate_hz)
+        else:
+            wide = np.pad(columns, ((2, 2), (0, 0)), mode="edge")
+            near, far = wide[3:-1] - wide[1:-3], wide[4:] - wide[:-4]
+            columns = (8.0 * near - far) * (run.rate_hz / 12.0)
     return columns

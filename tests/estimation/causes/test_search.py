@@ -358,6 +358,39 @@ def test_no_candidate_carries_the_noise_of_its_own_equations_torque_sensor() -> 
                     assert abs(np.corrcoef(column, added[run.used["motor"]])[0, 1]) < 0.3
 
 
+@pytest.mark.parametrize("every", [1, 2])
+def test_a_wave_in_an_encoder_is_differentiated_as_the_channels_are(every: int) -> None:
+    """At a low rate the differentiator of the channels takes much off a fast wave."""
+    sound = [run.at(np.arange(0, len(run.time_s), every)) for run in recordings(runs=6)]
+    order, names = 8.0 / every, [run.name for run in sound]
+    waved = [
+        run.with_columns(motor_angle_rad=angle + 1e-3 * np.sin(order * angle))
+        for run in sound
+        for angle in [run["motor_angle_rad"]]
+    ]
+    layouts = [lay_out([motor()], runs, names) for runs in (sound, waved)]
+    add_instruments(layouts[0], names)
+    (place,) = [p for p in places_of(layouts[0]) if p.name == "sensor motor_angle_rad"]
+    source = next(
+        s
+        for s in sources_at(layouts[0], place)
+        if s.family == "sensor.encoder_inl" and s.shape == (order,)
+    )
+    left, made = [], []
+    for before, after in zip(*(layout.runs for layout in layouts), strict=True):
+        columns = source.columns(before)
+        assert columns is not None
+        made.append(columns["motor"])
+        at = before.grid[before.used["motor"]]
+        equation = layouts[0].equations["motor"].channels
+        left.append(
+            sum(w * (after.channels[c][at] - before.channels[c][at]) for c, w in equation.items())
+        )
+    shown, columns = np.concatenate(left), np.concatenate(made)
+    rest = shown - columns @ np.linalg.lstsq(columns, shown, rcond=None)[0]
+    assert np.std(rest) < 0.1 * np.std(shown)
+
+
 def test_each_family_of_folds_leaves_every_run_out_once() -> None:
     runs = recordings(runs=9)
     layout = lay_out([motor()], runs, [r.name for r in runs])
