@@ -232,15 +232,30 @@ class Plant:
         """Return the first sensor of an axis' position, or None."""
         return next((s for s in self.sensors if (s.axis, s.reads) == (axis, "position")), None)
 
+    def speed(self, axis: str) -> Sensor | None:
+        """Return the first sensor of an axis' speed, or None."""
+        return next((s for s in self.sensors if (s.axis, s.reads) == (axis, "speed")), None)
+
+    @property
+    def integrals(self) -> dict[str, str]:
+        """Positions that no sensor reads, to the speeds that they are the integrals of."""
+        return {
+            self.moved(axis.name, POSITION): speed.name
+            for axis in self.axes
+            if self.position(axis.name) is None and (speed := self.speed(axis.name)) is not None
+        }
+
     def effort(self, axis: str) -> Sensor | None:
         """Return the first sensor of what an axis passes on, or None."""
         return next((s for s in self.sensors if (s.axis, s.reads) == (axis, "effort")), None)
 
     def moved(self, axis: str, ending: Mapping[str, str]) -> str:
-        """Return a channel of an axis' motion; empty without a sensor of its position."""
-        sensor = self.position(axis)
+        """Return a channel of an axis' motion; empty where neither position nor speed is read."""
         unit = self.axis(axis).unit
-        return sensor.name.removesuffix(POSITION[unit]) + ending[unit] if sensor else ""
+        if (position := self.position(axis)) is not None:
+            return position.name.removesuffix(POSITION[unit]) + ending[unit]
+        speed = self.speed(axis)
+        return speed.name.removesuffix(SPEED[unit]) + ending[unit] if speed else ""
 
 
 def _check_names(plant: Plant) -> None:

@@ -120,9 +120,9 @@ def signals(plant: Plant) -> Signals:
     rest = {}
     for axis in plant.axes:
         sensor, speed = plant.position(axis.name), plant.moved(axis.name, SPEED)
-        if sensor is None or speed not in speeds:
+        if speed not in speeds:
             continue
-        count = sensor.step or 0.0
+        count = (sensor and sensor.step) or 0.0
         rest[speed] = count * plant.cutoff_hz if axis.rest_speed is None else axis.rest_speed
     stated = {s.name: Reading(s.noise, s.step, s.rate_hz, s.delay_s) for s in plant.sensors}
     warmth = {s.name for s in plant.sensors if s.reads == "temperature"}
@@ -175,8 +175,9 @@ def _bend_name(plant: Plant, joint: Transmission) -> str:
 
 
 def _driven(plant: Plant, axes: tuple[str, ...]) -> str:
-    """Return the first axis whose travel is read; empty where none is."""
-    return next((axis for axis in axes if plant.position(axis)), "")
+    """Return the first axis whose travel is read, else the first whose speed is; else empty."""
+    sensors = (plant.position, plant.speed)
+    return next((axis for read in sensors for axis in axes if read(axis)), "")
 
 
 def _motion(plant: Plant, speed_of: str, acceleration_of: str, sign: int) -> list[Part]:
@@ -268,9 +269,18 @@ def missing(plant: Plant) -> list[Missing]:
                 Missing(
                     f"No motion is measured behind {chain.actuator.name}: neither inertia nor"
                     " friction can be identified.",
-                    f"A sensor of position on one of {', '.join(chain.axes)}.",
+                    f"A sensor of position or speed on one of {', '.join(chain.axes)}.",
                 )
             )
+    axis_of = {sensor.name: sensor.axis for sensor in plant.sensors}
+    found += [
+        Missing(
+            f"{position} is the integral of {speed} and begins at 0 in each run: what depends on"
+            " it cannot be compared between runs.",
+            f"A sensor of position on {axis_of[speed]}.",
+        )
+        for position, speed in plant.integrals.items()
+    ]
     for joint in plant.transmissions:
         ends = (joint.input, joint.output)
         absent = [f"of position on {axis}" for axis in ends if not plant.position(axis)]
@@ -305,4 +315,5 @@ def unused(plant: Plant) -> list[str]:
         for name in (equation.target, *(n for p in equation.parts for n in p.channels.values()))
     ]
     read = {*names, *measured_channels(names, signals(plant))}
+    read |= {speed for position, speed in plant.integrals.items() if position in read}
     return [s.name for s in plant.sensors if s.name not in read]

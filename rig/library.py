@@ -89,6 +89,8 @@ def read(
     from rig.importers.registry import open_campaign
     from rig.importers.table.mapping import read_mapping
     from rig.importers.table.open import open_table
+    from rig.machines.recordings import with_positions
+    from rig.machines.shipped import read_machine
 
     if machine is None and columns is None and runs is None and rate_hz is None:
         return open_campaign(Path(path), format_name)
@@ -99,7 +101,8 @@ def read(
     ]
     if rate_hz is not None:
         flags.append((("sample_rate_hz",), rate_hz, "rate_hz"))
-    return open_table(Path(path), read_mapping(Path(machine) if machine else None, flags))
+    campaign = open_table(Path(path), read_mapping(Path(machine) if machine else None, flags))
+    return with_positions(campaign, read_machine(Path(machine))) if machine else campaign
 
 
 def save(campaign: Campaign, folder: Path | str) -> list[Path]:
@@ -145,16 +148,16 @@ def declared(name: Path | str | None = None, *, machine: Path | str | None = Non
     Raises:
         ModelFileError: No such file or model, or it is wrong.
         PlantFileError: No such machine, or its file is wrong.
+        UsageError: The machine's sensors allow no equation.
     """
     from estimation import model_file
-    from estimation.plant_models import declared as equations_of
-    from rig.machines.shipped import read_machine
+    from rig.machines.shipped import equations_of
 
     if name is not None:
         return model_file.read_all(Path(name))
     if machine is None:
         return list(model_file.reference_rig())
-    return list(equations_of(read_machine(Path(machine))))
+    return equations_of(Path(machine))
 
 
 def effects() -> dict[str, Effect]:

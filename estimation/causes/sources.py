@@ -159,6 +159,11 @@ class Source:
         return isinstance(self.effect, Pointwise) and not any(e.order for e in self.place.enters)
 
     @cached_property
+    def is_wave(self) -> bool:
+        """Whether it repeats with an angle or a position."""
+        return any(parameter.name == "order" for parameter in self.effect.shape)
+
+    @cached_property
     def _is_whole(self) -> bool:
         return self.parts == tuple(range(len(self.effect.amplitudes)))
 
@@ -189,7 +194,7 @@ class Source:
                 if found is not None and bends_first is not None:
                     found = _bent(found[:, chosen], bends_first)
                 if found is not None and not self.on_grid:
-                    found = _derived(found, run, entry.order)[run.grid]
+                    found = _derived(found, run, entry.order, self.is_wave)[run.grid]
                 run.memo[key] = found
             found = run.memo[key]
             if found is None:
@@ -451,14 +456,15 @@ def _passed(run: RunSignals, angle: str, order: float) -> FloatArray:
     return np.asarray(1.0 / (1.0 + relative ** (2 * low_pass.order)))
 
 
-def _derived(columns: FloatArray, run: RunSignals, order: int) -> FloatArray:
-    """Return the time derivative of columns of order 0 to 2, as that of the channels is.
+def _derived(columns: FloatArray, run: RunSignals, order: int, is_wave: bool) -> FloatArray:
+    """Return the time derivative of columns of order 0 to 2.
 
-    Their differentiator has an error near half the recording's rate. Where the series has fewer
-    samples than the recording, the channels have next to none of it.
+    A wave may be nearly as fast as half the recording's rate, where the channels' differentiator
+    takes much off. It is differentiated as they are, unless the series has fewer samples than the
+    recording: then the channels have next to none of that error.
     """
     for _ in range(order):
-        if run.step == 1:
+        if is_wave and run.step == 1:
             columns = holoborodko_derivative(columns, 1.0 / run.rate_hz)
         else:
             wide = np.pad(columns, ((2, 2), (0, 0)), mode="edge")

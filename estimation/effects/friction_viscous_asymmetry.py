@@ -1,4 +1,4 @@
-"""Viscous asymmetry: different viscous damping in closing and in opening."""
+"""Viscous asymmetry: viscous damping that differs between the two directions."""
 
 from typing import ClassVar
 
@@ -10,8 +10,8 @@ from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 class ViscousAsymmetry(Pointwise):
     """The part of viscous friction that does not change its sign with the direction of motion.
 
-    Equation: torque = b |speed|, speed in rad/s, b in N m s/rad: half the damping of closing minus
-    half that of opening.
+    Equation: torque = b |speed|, speed in rad/s, b in N m s/rad: half the damping at positive
+    speeds minus half that at negative ones.
 
     Check: run at several constant speeds in both directions.
 
@@ -22,7 +22,7 @@ class ViscousAsymmetry(Pointwise):
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (
-        Parameter("asymmetry", "target / speed", "half the damping of closing minus opening"),
+        Parameter("asymmetry", "target / speed", "half the damping at speed > 0 less at speed < 0"),
     )
     told_apart_by = "a staircase of constant speeds in both directions"
 

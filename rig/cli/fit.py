@@ -204,14 +204,14 @@ def declared_models(model: str | None, machine: Path | None) -> "list[Model]":
     Raises:
         ModelFileError: The model cannot be read.
         PlantFileError: The machine cannot be read.
+        UsageError: The machine's sensors allow no equation.
     """
-    from estimation.plant_models import declared
     from rig.live.estimator import models_in_use
-    from rig.machines.shipped import read_machine
+    from rig.machines.shipped import equations_of
 
     if machine is None:
         return models_in_use(Path(model or "grip"))
-    own = declared(read_machine(machine))
+    own = equations_of(machine)
     named = [one for one in own if model in (None, one.balance)]
     return named or models_in_use(Path(str(model)))
 

@@ -14,7 +14,7 @@ from rig.calibrate.declared import Declared, declared_by_folder, is_raw
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 from rig.machines.recordings import open_recordings, with_motion
-from rig.machines.shipped import read_machine
+from rig.machines.shipped import equations_of
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def subject(
         DataError: The recordings cannot be read.
     """
     if machine is not None:
-        own = declared_of(read_machine(machine))
+        own = equations_of(machine)
         models = _of(own, balance) if model is None else declared_models(model, balance)
         campaign = open_recordings(path, machine, format_name, skip_bad)
         return Subject(with_motion(campaign, models), models)

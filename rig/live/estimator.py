@@ -1,5 +1,6 @@
 """A fitted estimator as the stream of estimates the display shows."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -48,6 +49,7 @@ class ModelEstimator:
         """
         self.model: Model | None = None  # only a physical model has effects to watch
         self.usual_half_width: float | None = None
+        self._settles_s, self._began_s = 0.0, math.nan
         self.instrument = ""  # a physical model has none
         self.other_levels: Mapping[str, float] = {}  # conditions of the run that no run fitted had
         if path.suffix == ".npz":
@@ -64,6 +66,7 @@ class ModelEstimator:
             self.model = next((m for m in models if m.balance == balance), models[0])
             estimator = PhysicalEstimator(self.model)
             self.usual_half_width = usual_half_width(self.model)
+            self._settles_s = 2.0 * self.model.low_pass.reach_s  # as offline, at either end
         self.target_channel = estimator.target
         self._stream: Stepper = estimator.stepper(sample_rate_hz)
 
@@ -87,7 +90,9 @@ class ModelEstimator:
         return inside is not None and inside.size > 0 and not inside.mean() > 0.5
 
     def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
-        """Return the estimate of the next samples, shape (n,).
+        """Return the estimate of the next samples, shape (n,); NaN until the filters have settled.
+
+        A stream that begins in motion begins with a step in the derivatives.
 
         Raises:
             MissingChannelError: The stream lacks a channel that the model needs.
@@ -99,7 +104,10 @@ class ModelEstimator:
                 f"It has: {', '.join(columns) or 'none'}.",
                 "Choose a model that needs less.",
             )
-        return self._stream.step(time_s, columns)
+        estimate = self._stream.step(time_s, columns)
+        if math.isnan(self._began_s) and len(time_s):
+            self._began_s = float(time_s[0])
+        return np.where(time_s - self._began_s < self._settles_s, np.nan, estimate)
 
 
 def within_range(estimator: ModelEstimator, estimate: FloatArray) -> FloatArray:

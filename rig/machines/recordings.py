@@ -1,18 +1,24 @@
 """Recordings of a machine that a file describes, and which of them have it in motion."""
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from estimation.campaign import Campaign
 from estimation.derived import measured_channels
 from estimation.model import Model
+from estimation.plant import Plant
 from estimation.recording import Recording
 from rig.importers.log import LogImporter
 from rig.importers.registry import open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table
-from rig.machines.shipped import place_of
+from rig.machines.shipped import place_of, read_machine
 
 
 def open_recordings(
@@ -34,12 +40,39 @@ def open_recordings(
         DataError: The recordings cannot be read.
         NoPlantError: No such machine.
     """
-    if machine is None or format_name is not None or LogImporter().recognises(path):
+    if machine is None:
         return open_campaign(path, format_name, skip_bad)
     file = place_of(machine)
-    if not has_data(file):
-        return open_campaign(path, None, skip_bad)
-    return open_table(path, read_mapping(file, ()))
+    if format_name is not None or LogImporter().recognises(path) or not has_data(file):
+        campaign = open_campaign(path, format_name, skip_bad)
+    else:
+        campaign = open_table(path, read_mapping(file, ()))
+    return with_positions(campaign, read_machine(file))
+
+
+def with_positions(campaign: Campaign, plant: Plant) -> Campaign:
+    """Return a campaign with the position of each axis whose speed alone is read, 0 at the start.
+
+    Args:
+        campaign: The runs.
+        plant: The machine they were recorded on.
+    """
+    if not plant.integrals:
+        return campaign
+    return Campaign(
+        tuple(replace(r, load=partial(_positioned, r.load, plant.integrals)) for r in campaign.runs)
+    )
+
+
+def _positioned(load: Callable[[], Recording], integrals: Mapping[str, str]) -> Recording:
+    recording = load()
+    columns = {}
+    for position, speed in integrals.items():
+        if speed in recording and position not in recording:
+            known = np.isfinite(recording[speed])
+            values = np.interp(recording.time_s, recording.time_s[known], recording[speed][known])
+            columns[position] = cumulative_trapezoid(values, recording.time_s, initial=0)
+    return recording.with_columns(**columns)
 
 
 def has_data(file: Path) -> bool:

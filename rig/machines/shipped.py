@@ -2,10 +2,16 @@
 
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from estimation import plant_file
 from estimation.errors import nearest
 from estimation.plant import Plant
+from estimation.plant_equations import missing
+from rig.errors import UsageError
+
+if TYPE_CHECKING:
+    from estimation.model import Model
 
 
 def shipped() -> dict[str, Path]:
@@ -40,3 +46,25 @@ def read_machine(path: Path) -> Plant:
         PlantFileError: The file cannot be read.
     """
     return plant_file.read(place_of(path))
+
+
+def equations_of(path: Path) -> "list[Model]":
+    """Return the equations of a machine file, or of a shipped machine by its name.
+
+    Raises:
+        NoPlantError: No such file and no such name.
+        PlantFileError: The file cannot be read.
+        UsageError: The machine's sensors allow no equation.
+    """
+    from estimation.plant_models import declared  # loads numba, which help must not
+
+    plant = read_machine(path)
+    models = declared(plant)
+    if not models:
+        gaps = [f"{gap.what} Needed: {gap.needed}" for gap in missing(plant)]
+        raise UsageError(
+            f"No equation can be written for {plant.name}.",
+            " ".join(gaps),
+            f"`rig machine check {path}` lists what is needed.",
+        )
+    return models

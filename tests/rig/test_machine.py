@@ -11,6 +11,7 @@ from benchmarks.rigs import draw
 from estimation.plant_file import parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from rig.cli.main import main
+from rig.errors import ExitCode
 from rig.log.convert import write_recording
 from rig.machines.shipped import read_machine, shipped
 
@@ -140,7 +141,37 @@ def test_a_machine_without_any_equation_reports_what_is_needed(tmp_path, capsys)
     assert main(["machine", "check", str(file)]) == 1
     printed = capsys.readouterr().out
     assert "No equation can be written for slide." in printed
-    assert "Needed: A sensor of position on one of carriage." in printed
+    assert "Needed: A sensor of position or speed on one of carriage." in printed
+    assert main(["diagnose", str(tmp_path), "--machine", str(file)]) == ExitCode.USAGE
+    printed = capsys.readouterr().err
+    assert "No equation can be written for slide." in printed
+    assert f"rig machine check {file}" in printed
+
+
+def test_a_machine_with_a_sensor_of_speed_alone_is_fitted_and_diagnosed(tmp_path, capsys):
+    """Its position is the integral of the speed; friction that differs by direction is found."""
+    rows = np.loadtxt(slide_table(tmp_path), delimiter=",", skiprows=1)
+    speed = np.gradient(rows[:, 1], rows[:, 0])
+    force = 35.0 * rows[:, 2] + 0.06 * np.abs(speed)
+    rows = np.column_stack([rows[:, 0], speed, force / 35.0])
+    table = tmp_path / "slide.csv"
+    np.savetxt(table, rows, delimiter=",", header="t,v,volts", comments="", fmt="%.9g")
+    file = tmp_path / "slide.toml"
+    words = {"position_m": "velocity_m_s", "x:mm": "v:mm/s", '"position"': '"speed"'}
+    text = SLIDE
+    for old, new in words.items():
+        text = text.replace(old, new)
+    file.write_text(text)
+    assert main(["machine", "check", str(file), str(table)]) == 0
+    printed = capsys.readouterr().out
+    assert "carriage_position_m is the integral of carriage_velocity_m_s" in printed
+    assert "Read by no equation" not in printed
+    assert main(["fit", str(table), "--machine", str(file), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["parameters"]
+    words = ["diagnose", str(table), "--machine", str(file), "--quick", "--json"]
+    assert main(words) == 0
+    (finding,) = json.loads(capsys.readouterr().out)["findings"]
+    assert (finding["family"], finding["verdict"]) == ("friction.viscous_asymmetry", "identified")
 
 
 def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_terminal(

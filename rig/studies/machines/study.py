@@ -16,13 +16,12 @@ from estimation.diagnosis.result import Finding
 from estimation.effects import catalogue
 from estimation.errors import EstimationError
 from estimation.model import Model
-from estimation.plant_models import declared
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import run_diagnosis
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
 from rig.machines.recordings import with_motion
-from rig.machines.shipped import place_of, read_machine
+from rig.machines.shipped import equations_of, place_of
 from rig.output.provenance import Provenance
 from rig.reports.diagnosis_words import sentences
 from rig.studies.machines.cases import CASES, Case, unpacked
@@ -129,7 +128,7 @@ def _published(folder: Path) -> list[tuple[str, Published]]:
 
 def _rows(case: Case, campaign: Campaign, seed: int) -> list[Row]:
     """Return a row for each equation of a machine."""
-    models = declared(read_machine(Path(case.machine)))
+    models = equations_of(Path(case.machine))
     models = [model for model in models if case.equation in ("", model.balance)]
     campaign = with_motion(campaign, models)
     with tempfile.TemporaryDirectory(prefix="study-") as place:
