@@ -42,7 +42,8 @@ class LowPass:
                 f"A {self.cutoff_hz} Hz low-pass of order {self.order} cannot be made at"
                 f" {sample_rate_hz:.6g} samples a second.",
                 "The cutoff must lie between 0 and half the sample rate, the order at 1 or more.",
-                "Change cutoff_hz in the machine's file, or under [processing] of the model's.",
+                f"Write, for example, cutoff_hz = {sample_rate_hz / 5:.3g} under [machine] of the"
+                " machine's file, or under [processing] of the model's.",
             )
         sections: FloatArray = signal.butter(
             self.order, self.cutoff_hz, fs=sample_rate_hz, output="sos"

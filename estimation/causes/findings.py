@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from estimation.causes.candidates import Candidate
-from estimation.causes.functions import Function, name_of_angle, names
+from estimation.causes.functions import Function, name_of_channel, names
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Part
 from estimation.causes.refits import Refits
@@ -175,7 +175,7 @@ def _variables(candidate: Candidate) -> tuple[str, ...]:
     if isinstance(cause, Function):
         return names(cause.place, cause.variables)
     found = [
-        name_of_angle(channel) if role in ANGLES_OF_ROLE else VARIABLE_OF_ROLE[role]
+        name_of_channel(channel) if role in ANGLES_OF_ROLE else VARIABLE_OF_ROLE[role]
         for role, channel in cause.channels
         if role in ANGLES_OF_ROLE or role in VARIABLE_OF_ROLE
     ]

@@ -59,8 +59,7 @@ class Function:
     @property
     def reads(self) -> tuple[str, ...]:
         """Channels that its variables come from, before instruments."""
-        roles = [ROLE_OF_VARIABLE.get(v, v) for v in self.variables if v != "time"]
-        return tuple(self.place.roles[role][0] for role in roles)
+        return tuple(_read(self.place, v) for v in self.variables if v != "time")
 
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray]:
         """Return the tensor product of the variables' bases in every equation it enters."""
@@ -102,6 +101,10 @@ def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
         chosen += [
             ("velocity_sign", *pair) for pair in itertools.combinations(rest, 2) if "load" in pair
         ]
+    own = [v for v in ("position", "velocity", "acceleration") if v in known]
+    for others in place.others:  # a joint carries the joints behind it, and is carried
+        chosen += [(v,) for v in others]
+        chosen += [*itertools.product(own, others), *((others[0], v) for v in others[1:])]
     for variables in chosen:
         counts = _counts(variables)
         knots = tuple(_knots(layout, place, v, width, counts[v]) for v in variables)
@@ -134,12 +137,20 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
 
 def reported(place: Place, variable: str) -> str:
     """Return the name under which a variable of a place is reported."""
-    return name_of_angle(place.roles["position"][0]) if variable == "position" else variable
+    known = variable == "position" or variable in itertools.chain(*place.others)
+    return name_of_channel(_read(place, variable)) if known else variable
 
 
-def name_of_angle(channel: str) -> str:
-    """Return the name of an angle or a position in a finding: its channel without the unit."""
-    return channel.removesuffix("_rad").removesuffix("_m")
+def name_of_channel(channel: str) -> str:
+    """Return the name of an axis' motion in a finding: its channel without the unit."""
+    endings = ("_rad_s2", "_m_s2", "_rad_s", "_m_s", "_rad", "_m")
+    return channel.removesuffix(next((e for e in endings if channel.endswith(e)), ""))
+
+
+def _read(place: Place, variable: str) -> str:
+    """Return the channel that a variable of a place comes from; other axes' are channels."""
+    channels = place.roles.get(ROLE_OF_VARIABLE.get(variable, variable), (variable,))
+    return channels[0]
 
 
 def variable_of(
@@ -160,7 +171,7 @@ def _channel(run: RunSignals, place: Place, variable: str, equation: str) -> str
     """Return the channel that a variable's values come from in an equation."""
     if variable == "time":
         return CAMPAIGN_TIME
-    return signal(run, place.roles[ROLE_OF_VARIABLE.get(variable, variable)][0], equation)
+    return signal(run, _read(place, variable), equation)
 
 
 def _worked_out(run: RunSignals, variable: str, name: str, width: float) -> FloatArray:

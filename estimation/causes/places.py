@@ -47,6 +47,7 @@ class Place:
         roles: Role of an effect to the channels that can play it there.
         like: Equation of the reference rig with the same signs: `stretch` where an output's travel
             is the target, `gearbox` where the bend itself is.
+        others: Position, speed and acceleration of each axis that no equation relates to it.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Place:
     enters: tuple[Entry, ...]
     roles: Mapping[str, tuple[str, ...]]
     like: str = ""
+    others: tuple[tuple[str, ...], ...] = ()
 
 
 def places_of(layout: Layout) -> list[Place]:
@@ -222,7 +224,10 @@ def _own(
         enters = (Entry(equation.name, 1.0),)
         return Place(equation.name, "deflection", equation.name, enters, roles, like)
     sign = next((t.sign for t in equation.terms if t.effect.id.startswith("friction.")), 1)
-    return Place(equation.name, "loss", equation.name, (Entry(equation.name, float(sign)),), roles)
+    enters = (Entry(equation.name, float(sign)),)
+    apart = [_motion(a) for a in _unrelated(layout, equation, everywhere)]
+    others = tuple((*m["travel"], *m["speed"], *m["acceleration"]) for m in apart)
+    return Place(equation.name, "loss", equation.name, enters, roles, others=others)
 
 
 def _unrelated(layout: Layout, equation: Equation, angles: Sequence[str]) -> tuple[str, ...]:

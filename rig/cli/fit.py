@@ -104,7 +104,7 @@ def _learn(
         said.insert(0, f"{target} from {', '.join(learner.facts['inputs'])}: {STATE_NODES} nodes.")
     if error is not None:
         figures = {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
-        scale, unit = display(unit_of(target))
+        scale, unit = display(unit_of(target), error.rmse)
         said.append(
             f"{target}, closing samples of {len(kept)} runs, each held out once:"
             f" RMSE {scale * error.rmse:.3g} {unit}."

@@ -104,8 +104,9 @@ def noise_floors(
     """
     pairs = repeats(recordings)
     out = dict[str, float | None]()
-    for equation in refits.of:
-        both = [_difference(refits, equation, *pair) for pair in pairs]
+    for equation, refit in refits.of.items():
+        used = [pair for pair in pairs if {*pair} <= refit.recordings.keys()]  # some are left out
+        both = [_difference(refits, equation, *pair) for pair in used]
         centred = [x - x.mean() for x in both if x.size >= least]
         squares = sum(0.5 * float(np.sum(x**2)) for x in centred)
         samples = sum(map(len, centred))

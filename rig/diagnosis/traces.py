@@ -115,7 +115,8 @@ def with_cost_of_causal_filters(found: Answer) -> Answer:
     notes = []
     for model in found.models:
         zero_phase, causal = _held_out_errors(model, found.refits.of[model.balance])
-        scale, unit = (1e3, "mN m") if model.unit == "N m" else (1.0, model.unit)
+        small = model.unit == "N m" and causal < 1.0
+        scale, unit = (1e3, "mN m") if small else (1.0, model.unit)
         notes.append(
             f"{model.balance}: the written model has an error of {scale * zero_phase:.3g} {unit} on"
             f" the test runs with zero-phase filters and {scale * causal:.3g} {unit} with the"

@@ -135,7 +135,7 @@ def write(
 
 def card(finding: Finding, diagnosis: Diagnosis) -> Card:
     """Return a finding as the person at the bench needs it."""
-    scale, unit = display(diagnosis.unit[finding.balance])
+    scale, unit = display(diagnosis.unit[finding.balance], finding.rmse_before)
     named = finding.verdict in ("identified", "one_of")
     variables = " and ".join(v.replace("_", " ") for v in finding.depends_on)
     facts = []
@@ -176,7 +176,7 @@ def error_table(diagnosis: Diagnosis) -> TextTable:
     """Return the errors on the held-out test runs before and after."""
     rows = []
     for name, error in diagnosis.errors.items():
-        scale, unit = display(diagnosis.unit[name])
+        scale, unit = display(diagnosis.unit[name], error.with_means_before)
         low, high = error.ratio_ci95
         ratio = f"{error.after / error.before:.2f}" if error.before else ""
         if math.isfinite(low) and math.isfinite(high):
@@ -216,7 +216,7 @@ def _parameters(findings: Sequence[Finding]) -> TextTable | None:
 
 def _with_interval(known: Value) -> list[str]:
     """Return value, interval and unit, to the digits that the interval supports."""
-    scale, unit = display(known.unit)
+    scale, unit = display(known.unit, known.value)
     if known.ci95 is None or not known.ci95[1] > known.ci95[0]:
         return [f"{scale * known.value:.4g}", "", unit]
     low, high = (scale * end for end in known.ci95)
@@ -244,7 +244,7 @@ def _moved(diagnosis: Diagnosis, signals: Traces) -> list[TextTable]:
         units = _units(known.model) if known else {}
         rows = []
         for key, value in parameters.items():
-            scale, unit = display(units.get(key, ""))
+            scale, unit = display(units.get(key, ""), value["before"])
             cells = (f"{scale * value[side]:.4g}" for side in ("before", "after"))
             rows.append([key, *cells, unit])
         if rows:

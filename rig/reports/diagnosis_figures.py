@@ -42,7 +42,7 @@ def _profile(name: str, channel: str, finding: Finding, shown: EquationTraces) -
     label, x_unit = words(channel)
     runs = shown.runs
     periodic = "order" in finding.parameters
-    scale, unit = display(shown.model.unit)
+    scale, unit = display(shown.model.unit, max(float(np.max(np.abs(r.before))) for r in runs))
     lines: list[Line] = []
     rows: dict[float, list[str]] = {}
     height = {}
@@ -100,7 +100,7 @@ def _with_band(
 
 def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
     """Draw the error of each held-out test run before and after."""
-    scale, unit = display(diagnosis.unit[name])
+    scale, unit = display(diagnosis.unit[name], error.before)
     lines: list[Line] = []
     names = {"before": "declared model", "after": "with the findings"}
     by_side = {"before": error.by_run_before, "after": error.by_run_after}
@@ -160,7 +160,7 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
 
 def _over_time(name: str, shown: EquationTraces, sides: tuple[str, ...]) -> Chart:
     """Draw measured and estimated signal and the residual of one run, which a reader chooses."""
-    scale, unit = display(shown.model.unit)
+    scale, unit = display(shown.model.unit, float(np.max(np.abs(shown.runs[0].measured))))
     label, _ = words(shown.model.target)
     runs = sorted(shown.runs, key=_error_after)
     middle = runs.pop(len(runs) // 2)

@@ -30,7 +30,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def _sentence(finding: Finding, unit: str, which: str) -> str:
-    scale, shown = display(unit)
+    scale, shown = display(unit, finding.rmse_before)
     fall = (
         f"error on {finding.runs_total} {which}"
         f" {scale * finding.rmse_before:.3g} -> {scale * finding.rmse_after:.3g} {shown}"
@@ -115,11 +115,9 @@ def sizes_of(finding: Finding) -> dict[str, str]:
     sizes = {}
     if "sine" in left and "cosine" in left:
         sine, cosine = left.pop("sine"), left.pop("cosine")
-        scale, unit = display(sine.unit)
-        sizes["amplitude"] = _measured(scale * math.hypot(sine.value, cosine.value), unit)
+        sizes["amplitude"] = _measured(math.hypot(sine.value, cosine.value), sine.unit)
     for name, known in left.items():
-        scale, unit = display(known.unit)
-        sizes[name] = _measured(scale * known.value, unit)
+        sizes[name] = _measured(known.value, known.unit)
     along = next((v for v in finding.depends_on if v.endswith(("_angle", "_position"))), "")
     if "order" in left and along.endswith("_position"):
         del sizes["order"]
@@ -130,12 +128,13 @@ def sizes_of(finding: Finding) -> dict[str, str]:
 
 
 def _measured(value: float, unit: str) -> str:
-    return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
+    scale, shown = display(unit, value)
+    return f"{value:.3g}" if unit == "1" else f"{scale * value:.3g} {shown}"
 
 
-def display(unit: str) -> tuple[float, str]:
-    """Return the factor and the symbol that a unit is shown with."""
-    return (1e3, "mN m") if unit == "N m" else (1.0, unit)
+def display(unit: str, size: float = 0.0) -> tuple[float, str]:
+    """Return the factor and the symbol that a unit is shown with, for values of a size in it."""
+    return (1e3, "mN m") if unit == "N m" and abs(size) < 1.0 else (1.0, unit)
 
 
 def other_sentences(diagnosis: Diagnosis) -> list[str]:

@@ -19,7 +19,7 @@ def parameter_table(model: Model) -> TextTable:
     evidence = model.evidence
     note = ""
     if evidence is not None:
-        scale, unit = display(model.unit)
+        scale, unit = display(model.unit, evidence.rmse_with_means)
         note = (
             f"Fitted on {counted(len(evidence.runs), 'run')}, {evidence.samples:,} samples. RMSE"
             f" {scale * evidence.rmse:.3g} {unit} with each run's mean removed,"
@@ -31,7 +31,7 @@ def parameter_table(model: Model) -> TextTable:
 
 def held_out_sentence(model: Model, error: HeldOutError) -> str:
     """Return the error on runs not fitted on in words."""
-    scale, unit = display(model.unit)
+    scale, unit = display(model.unit, error.rmse_with_means)
     return (
         f"{model.target} on {error.runs} runs not fitted on: RMSE {scale * error.rmse:.3g} {unit}"
         f" with each run's mean removed, {scale * error.rmse_with_means:.3g} {unit} with means."

@@ -73,13 +73,13 @@ def _lines(run: Recording, points: int) -> list[dict[str, Any]]:
         drawn.append(line(time_s, thinned(values, points), name, meta, unit))
 
     for name, values in run.columns.items():
-        scale, unit = display(unit_of(name))
+        scale, unit = _shown(run, name)
         role = "after" if name.startswith(ESTIMATED) else ""
         add(words(name)[0], scale * values, unit, "ratio" if unit == "1" else unit, role)
     for name, values in run.columns.items():
         target = name.removeprefix(ESTIMATED)
         if target != name and target in run.columns:
-            scale, unit = display(unit_of(name))
+            scale, unit = _shown(run, name)
             left = scale * (run.columns[target] - values)
             label = f"{words(target)[0]}, measured - estimated"
             add(label, left, unit, f"residual, {unit}", "before")
@@ -117,3 +117,9 @@ def _row(run: Recording) -> list[str]:
         ", ".join(f"{mark.text} at {mark.time_s:g} s" for mark in run.marks),
         " ".join(filter(None, (run.notes, run.excluded and f"Left out: {run.excluded}"))),
     ]
+
+
+def _shown(run: Recording, name: str) -> tuple[float, str]:
+    """Return factor and unit of a channel; an estimate has those of what it estimates."""
+    like = run.columns.get(name.removeprefix(ESTIMATED), run.columns[name])
+    return display(unit_of(name), float(np.nanmax(np.abs(like), initial=0.0)))

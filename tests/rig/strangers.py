@@ -96,6 +96,52 @@ changes = ["trial"]
 """`RATIO` stands for the ratio."""
 
 
+ARM = """
+schema = "rig.machine/1"
+
+[machine]
+name = "two link arm"
+run_offsets = false
+cutoff_hz = 10.0
+
+[[axis]]
+name = "shoulder"
+unit = "rad"
+
+[[axis]]
+name = "elbow"
+unit = "rad"
+
+[[actuator]]
+name = "shoulder_torque_n_m"
+axis = "shoulder"
+
+[[actuator]]
+name = "elbow_torque_n_m"
+axis = "elbow"
+
+[[sensor]]
+name = "shoulder_angle_rad"
+axis = "shoulder"
+reads = "position"
+
+[[sensor]]
+name = "elbow_angle_rad"
+axis = "elbow"
+reads = "position"
+
+[data.columns]
+time_s = "t"
+shoulder_torque_n_m = "tau1"
+elbow_torque_n_m = "tau2"
+shoulder_angle_rad = "q1"
+elbow_angle_rad = "q2"
+
+[data.runs]
+changes = ["run"]
+"""
+
+
 def axis_table(
     file: Path, runs: int = 10, asymmetry: float = 0.0, cogging: float = 0.0, seed: int = 1
 ) -> None:
@@ -184,3 +230,27 @@ def warming_table(file: Path, runs: int = 10, seed: int = 1) -> None:
     warmth = warmth + random.normal(0.0, 0.05, time_s.size)
     rows = np.column_stack([1e3 * time_s, 255 * pwm, 1e3 * read, warmth])
     np.savetxt(file, rows, delimiter=",", header="t,pwm,x,warm", comments="", fmt="%.9g")
+
+
+def arm_table(file: Path, runs: int = 10, seed: int = 1) -> None:
+    """Write a table of two joints, 50 Hz; the second one's gravity depends on both angles."""
+    random = np.random.default_rng(seed)
+    time_s = np.arange(0.0, 10.0, 0.02)
+    parts = []
+    for k in range(runs):
+        phases, rates = random.uniform(0, 6, (2, 4)), random.uniform(0.1, 0.5, (2, 4))
+        q1, q2 = (
+            np.sum(
+                [np.sin(2 * np.pi * f * time_s + p) / 2 for f, p in zip(*own, strict=True)], axis=0
+            )
+            for own in zip(rates, phases, strict=True)
+        )
+        torques = []
+        for q, inertia, viscous in ((q1, 0.6, 1.5), (q2, 0.05, 0.8)):
+            speed = np.gradient(q, 0.02)
+            torque = inertia * np.gradient(speed, 0.02) + viscous * speed + np.tanh(speed / 0.05)
+            torques.append(torque + random.normal(0.0, 0.05, time_s.size))
+        torques[1] = torques[1] + 2.2 * np.cos(q1 + q2)
+        parts.append(np.column_stack([np.full(time_s.size, k), time_s, q1, q2, *torques]))
+    rows = np.concatenate(parts)
+    np.savetxt(file, rows, delimiter=",", header="run,t,q1,q2,tau1,tau2", comments="", fmt="%.9g")

@@ -88,6 +88,16 @@ def test_the_noise_floor_is_below_the_error_that_remains(
     assert floor < 1.2 * answered.diagnosis.errors["motor"].after
 
 
+def test_a_repeat_that_was_left_out_has_no_part_in_the_noise_floor(
+    answered: Answer, rippled: list[Recording]
+) -> None:
+    short = replace(rippled[6], name="left out")
+    assert (short.name, rippled[7].name) in repeats([short, *rippled])
+    assert noise_floors(answered.refits, [short, *rippled]) == noise_floors(
+        answered.refits, rippled
+    )
+
+
 def test_every_experiment_of_the_menu_is_a_protocol_within_the_limits(
     answered: Answer, rippled: list[Recording], tmp_path
 ) -> None:

@@ -7,7 +7,15 @@ import pytest
 
 from rig.cli.main import main
 from rig.diagnosis.schema import DiagnosisSchema
-from tests.rig.strangers import AXIS, DRIVE, axis_table, drive_table, warming_table
+from tests.rig.strangers import (
+    ARM,
+    AXIS,
+    DRIVE,
+    arm_table,
+    axis_table,
+    drive_table,
+    warming_table,
+)
 
 pytestmark = pytest.mark.integration
 
@@ -98,3 +106,12 @@ def test_friction_follows_a_temperature_that_the_machine_states(run, tmp_path):
     assert finding["depends_on"] == ["velocity_sign", "temperature"]
     assert finding["parameters"]["friction"]["value"] == pytest.approx(0.003, rel=0.1)
     assert "rail_temperature_k" in (tmp_path / "model.toml").read_text()
+
+
+def test_a_joint_may_depend_on_the_angle_of_another_joint(run, tmp_path):
+    (tmp_path / "arm.toml").write_text(ARM)
+    arm_table(tmp_path / "arm.csv")
+    told = json.loads(run("diagnose", "arm.csv", "--quick", "--machine", "arm.toml", "--json"))
+    (finding,) = told["findings"]
+    assert (finding["balance"], finding["verdict"]) == ("elbow", "depends_on")
+    assert sorted(finding["depends_on"]) == ["elbow_angle", "shoulder_angle"]
