@@ -15,6 +15,7 @@ from estimation.causes.folds import Folds
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import Numbers
+from estimation.derived import origin_of
 from estimation.recording import FloatArray
 
 MOST_CHANGE = 2.0
@@ -150,6 +151,8 @@ def _in_readings(
         if name in outcome.changes:
             change, channel = outcome.changes[name], joint.largest_linear[name][1]
             other = np.array([{*one.cause.reads} != {channel} for one in candidates])
+            if origin_of(channel)[1]:  # a speed or an acceleration: no motion reads the target
+                other &= np.array([_reads_effort(joint, name, one) for one in candidates])
             seen = np.where(other, np.minimum(seen, change), seen)
             replaces |= other & ((change < 1.0 / MOST_CHANGE) | (change > MOST_CHANGE))
         seen = np.where(moved, 1.0, seen)
@@ -158,6 +161,12 @@ def _in_readings(
             family[name, "within"][:] *= unit[outcome.promising]
     replaces[moved] = False
     return replaces
+
+
+def _reads_effort(joint: Joint, equation: str, candidate: Candidate) -> bool:
+    """Whether a cause reads an effort or the target, as such or predicted."""
+    target = joint.layout.equations[equation].target
+    return any(c == target or c.endswith(AMPLIFIED) for c in candidate.cause.reads)
 
 
 def _is_impossible(candidate: Candidate, amplitudes: FloatArray) -> bool:

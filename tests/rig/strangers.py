@@ -233,7 +233,7 @@ def warming_table(file: Path, runs: int = 10, seed: int = 1) -> None:
 
 
 def arm_table(file: Path, runs: int = 10, seed: int = 1) -> None:
-    """Write a table of two joints, 50 Hz; the second one's gravity depends on both angles."""
+    """Write a table of two joints under gravity, 50 Hz; the second one's depends on both angles."""
     random = np.random.default_rng(seed)
     time_s = np.arange(0.0, 10.0, 0.02)
     parts = []
@@ -250,6 +250,7 @@ def arm_table(file: Path, runs: int = 10, seed: int = 1) -> None:
             speed = np.gradient(q, 0.02)
             torque = inertia * np.gradient(speed, 0.02) + viscous * speed + np.tanh(speed / 0.05)
             torques.append(torque + random.normal(0.0, 0.05, time_s.size))
+        torques[0] = torques[0] + 10.0 * np.sin(q1)
         torques[1] = torques[1] + 2.2 * np.cos(q1 + q2)
         parts.append(np.column_stack([np.full(time_s.size, k), time_s, q1, q2, *torques]))
     rows = np.concatenate(parts)
