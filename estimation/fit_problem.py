@@ -1,7 +1,7 @@
 """A model laid out for fitting: its runs, its columns, and amplitudes by least squares."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,10 @@ from estimation.recording import FloatArray, Recording
 from estimation.within_bounds import solve_within
 
 OFFSET = "sensor.offset"
+
+WIDEST, NARROWEST = 0.2, 1e-3
+"""Speed over which friction changes its sign, of the usual most speed: beyond the first it is a
+form of the friction at speed. The second is searched where a slow axis needs it."""
 
 
 class FitError(EstimationError):
@@ -45,16 +49,12 @@ class Problem:
     free: NDArray[np.intp]  # columns that least squares solves for
     offset: int | None  # column of the model's own offset when run offsets replace it
     names: list[str]  # of all columns
+    shape_parameters: list[Parameter]  # of all terms, in order
     signs: FloatArray
     lower: FloatArray
     upper: FloatArray
     kept: dict[tuple[int, int], tuple[list[float], FloatArray]] = field(default_factory=dict)
     """Each run's and term's last shape and columns: a search moves one term's shape at a time."""
-
-    @property
-    def shape_parameters(self) -> list[Parameter]:
-        """Shape parameters of all terms, in order."""
-        return [p for term in self.model.terms for p in term.effect.shape]
 
     def columns(self, run: FitRun, shape: Sequence[float]) -> FloatArray:
         """Return all signed columns of a run, shape (n, columns)."""
@@ -122,10 +122,29 @@ def problem_of(model: Model, runs: list[FitRun]) -> Problem:
         free=free,
         offset=replaced,
         names=names,
+        shape_parameters=[p for term in model.terms for p in _shapes(term, runs)],
         signs=np.array([float(term.sign) for term, _ in parameters]),
         lower=np.array([p.lower for _, p in parameters])[free],
         upper=np.array([p.upper for _, p in parameters])[free],
     )
+
+
+def _shapes(term: Term, runs: Sequence[FitRun]) -> list[Parameter]:
+    """Return a term's shape parameters, a width of a change of sign within that of these runs."""
+    speed = term.channels.get("speed")
+    if speed is None:
+        return [*term.effect.shape]
+    usual = float(np.percentile(np.concatenate([np.abs(run.thin[speed]) for run in runs]), 95))
+    return [
+        replace(
+            p,
+            lower=min(p.lower, NARROWEST * usual),
+            upper=min(p.upper, max(WIDEST * usual, p.lower)),
+        )
+        if p.name == "width" and usual > 0.0
+        else p
+        for p in term.effect.shape
+    ]
 
 
 def solve(problem: Problem, gram: FloatArray) -> FloatArray:

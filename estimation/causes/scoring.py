@@ -174,8 +174,13 @@ def _is_impossible(candidate: Candidate, amplitudes: FloatArray) -> bool:
     if isinstance(cause, Function):
         return False
     count = len(cause.parts)  # a bend comes after them
-    total = float(np.sum(amplitudes[:count] / candidate.size[:count]))
-    return abs(total) < cause.least or (cause.is_bounded and total < 0.0)
+    sizes = amplitudes[:count] / candidate.size[:count]
+    total = float(np.sum(sizes))
+    return (
+        abs(total) < cause.least
+        or float(np.linalg.norm(sizes)) > cause.most
+        or (cause.is_bounded and total < 0.0)
+    )
 
 
 def _price(candidate: Candidate, joint: Joint) -> Price:

@@ -13,6 +13,8 @@ from estimation.fit_problem import FitError
 from estimation.fitting import fit
 from estimation.model import Model, NotFittedError, Term, predict
 from estimation.model_file import read
+from estimation.plant_file import parse
+from estimation.plant_models import declared
 from estimation.recording import Flag, MissingChannelError, Recording, Stretch
 from estimation.shape_search import descended
 from estimation.within_bounds import solve_within
@@ -170,3 +172,34 @@ def outside(model: Model) -> list[str]:
 @pytest.mark.parametrize("recordings", [negative_friction(), campaigns.runs(count=3, seconds=2.0)])
 def test_every_interval_of_a_fit_holds_its_value(recordings) -> None:
     assert outside(fit(read(Path("motor")), Campaign.of(recordings))) == []
+
+
+@pytest.mark.parametrize("speed_m_s", [1e-3, 1.0])
+def test_the_change_of_sign_of_friction_is_narrow_next_to_the_speeds_of_the_axis(speed_m_s):
+    time_s = np.arange(2000) / 500
+    turns = 2 * np.pi * time_s
+    position = speed_m_s * np.sin(0.7 * turns)
+    speed = np.gradient(position, time_s)
+    force = 5 * speed / speed_m_s + np.tanh(speed / (0.02 * speed_m_s))
+    recording = Recording("x", time_s, {"stage_position_m": position, "drive_force_n": force})
+    (model,) = declared(parse(STAGE))
+    values = numbers(fit(model, Campaign.of([recording]), bootstrap=0))
+    assert 0.01 * speed_m_s < values["width"] < 0.06 * speed_m_s  # the filter widens it
+
+
+STAGE = """
+schema = "rig.machine/1"
+[machine]
+name = "stage"
+run_offsets = false
+[[axis]]
+name = "stage"
+unit = "m"
+[[actuator]]
+name = "drive_force_n"
+axis = "stage"
+[[sensor]]
+name = "stage_position_m"
+axis = "stage"
+reads = "position"
+"""

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from estimation import model_file
+from estimation import model_file, plant_file
 from estimation.model import Model
+from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
 
 RATE_HZ, SECONDS = 250.0, 8.0
@@ -160,3 +161,57 @@ def _lagging(values: FloatArray, time_s: float) -> FloatArray:
     share = 1.0 - np.exp(-1.0 / (RATE_HZ * time_s))
     start = signal.lfiltic([share], [1.0, share - 1.0], [values[0]])
     return np.asarray(signal.lfilter([share], [1.0, share - 1.0], values, zi=start)[0])
+
+
+AXIS = """
+schema = "rig.machine/1"
+[machine]
+name = "linkage"
+run_offsets = false
+[[axis]]
+name = "crank"
+unit = "rad"
+[[actuator]]
+name = "crank_torque_n_m"
+axis = "crank"
+[[sensor]]
+name = "crank_angle_rad"
+axis = "crank"
+reads = "position"
+"""
+"""A machine of one axis, driven by a torque."""
+
+
+def axis() -> Model:
+    """Return the equation of `AXIS`."""
+    (model,) = declared(plant_file.parse(AXIS))
+    return model
+
+
+def turning(
+    torque: Effect, *, runs: int = 10, always_ahead: bool = False, size: float = 1.0
+) -> list[Recording]:
+    """Return runs of one axis with inertia and friction; angle, speed and acceleration add torque.
+
+    Args:
+        torque: Further torque of angle, speed and acceleration.
+        runs: How many.
+        always_ahead: Whether the speed is never negative.
+        size: Of the motion, rad.
+    """
+    random = np.random.default_rng(0)
+    time = np.arange(int(RATE_HZ * SECONDS)) / RATE_HZ
+    out = []
+    for k in range(runs):
+        waves = zip(random.uniform(0.1, 0.7, 4), random.uniform(0, 2 * np.pi, 4), strict=True)
+        angle = size * sum(np.sin(2 * np.pi * f * time + p) for f, p in waves) / 2
+        if always_ahead:
+            angle = np.cumsum(np.abs(angle) + 0.1 * size) / RATE_HZ
+        speed = np.gradient(angle, time)
+        acceleration = np.gradient(speed, time)
+        lost = 0.02 * acceleration + 0.05 * speed + 0.15 * size * np.tanh(speed / (0.02 * size))
+        lost = lost + torque(angle, speed, acceleration)
+        lost += random.normal(0, 0.01 * np.std(lost), len(time))
+        columns = {"crank_torque_n_m": lost, "crank_angle_rad": angle}
+        out.append(Recording(f"{k:02d}", time, columns, started_at_ns=int(1e10 * k) + 1))
+    return out

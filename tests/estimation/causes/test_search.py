@@ -30,12 +30,14 @@ from estimation.diagnosis.split import split
 from estimation.recording import FloatArray, Recording
 from tests.estimation.causes.synthetic import (
     RATIO,
+    axis,
     cable,
     cabled,
     gearbox,
     geared,
     motor,
     recordings,
+    turning,
 )
 
 
@@ -45,6 +47,27 @@ def _asymmetric(angle: FloatArray, speed: FloatArray, load: FloatArray) -> Float
 
 def _rippled(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArray:
     return 0.01 * np.sin(3 * angle)
+
+
+def test_drag_is_found_where_the_speed_never_changes_its_sign() -> None:
+    """The friction that the fit declares there must not take the form of the drag."""
+    runs = turning(lambda angle, speed, _: 0.02 * speed**2, always_ahead=True, size=3.0)
+    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    assert finding.family == "friction.drag"
+    assert finding.parameters["drag"].value == pytest.approx(0.02, rel=0.05)
+
+
+def test_an_inertia_that_follows_the_angle_is_no_error_of_the_encoder() -> None:
+    """The error would be of half the motion, and an encoder has none of that size."""
+
+    def linkage(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+        return 0.01 * (np.cos(angle) * acceleration - 0.5 * np.sin(angle) * speed**2)
+
+    runs = turning(linkage)
+    findings = diagnose(runs, [axis()], split(runs)).findings
+    assert findings
+    assert "sensor.encoder_inl" not in {finding.family for finding in findings}
+    assert {"crank_angle", "acceleration"} <= {*findings[0].depends_on}
 
 
 def _searched(runs: list[Recording]) -> Found:
