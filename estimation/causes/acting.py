@@ -10,7 +10,7 @@ from estimation.causes.candidates import (
     Claim,
 )
 from estimation.causes.joint import Joint
-from estimation.causes.scoring import Scored
+from estimation.causes.scoring import ByRun
 from estimation.recording import FloatArray
 
 PARTIAL, CHOICES = 24, 6
@@ -20,34 +20,39 @@ TURNS = 4
 """Turns of fitting an effect to the runs that have it, and of choosing these runs."""
 
 
-def on_some_runs(joint: Joint, everything: Sequence[Scored]) -> list[Claim]:
-    """Return named effects that act in some of the runs, as promising as there are."""
+def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, ByRun]]) -> list[Claim]:
+    """Return named effects that act in some of the runs, as promising as there are.
+
+    Args:
+        joint: The regression.
+        everything: Causes, each with its products by run.
+    """
     count = len(joint.runs)
     if count < 6:
         return []
     inverse = joint.left_out([[]]).inverse[0]
-    named: dict[int, list[Scored]] = {}
-    for one in everything:
-        if not one.candidate.is_function:
-            named.setdefault(len(one.amplitudes), []).append(one)
-    promise: list[tuple[float, Candidate, NDArray[np.bool_]]] = []
+    named: dict[int, list[tuple[Claim, ByRun]]] = {}
+    for claim, by_run in everything:
+        if not claim.is_function:
+            named.setdefault(by_run[0].shape[1], []).append((claim, by_run))
+    promise: list[tuple[float, Claim, NDArray[np.bool_]]] = []
     for group in named.values():
-        products = tuple(np.stack([s.by_run[i] for s in group]) for i in range(3))
+        products = tuple(np.stack([by_run[i] for _, by_run in group]) for i in range(3))
         for acts in _acting(inverse, products):
             gains = _removed(inverse, *(_over(acts, x) for x in products))
             acting = acts.sum(axis=1)
             some = np.flatnonzero((acting > 1) & (acting < count))
-            promise += [(float(gains[k]), group[k].candidate, acts[k]) for k in some]
+            promise += [(float(gains[k]), group[k][0], acts[k]) for k in some]
     promise.sort(key=lambda p: -p[0])
     tried, seen = [], dict[object, set[tuple[bool, ...]]]()
-    for _, candidate, runs in promise:
-        if candidate.name not in seen and len(seen) == PARTIAL:
+    for _, claim, runs in promise:
+        if claim.name not in seen and len(seen) == PARTIAL:
             continue
-        known = seen.setdefault(candidate.name, set())
+        known = seen.setdefault(claim.name, set())
         chosen = tuple(runs.tolist())
         if len(known) < CHOICES and chosen not in known:
             known.add(chosen)
-            tried.append(Claim(candidate.cause, chosen, candidate.choices))
+            tried.append(Claim(claim.cause, chosen, claim.choices))
     return tried
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from estimation.causes.candidates import Candidate
+from estimation.causes.declared import Moved
 from estimation.causes.functions import Function, name_of_channel, names
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Part
@@ -140,6 +141,10 @@ def parameters_of(kept: Kept, home: str, written: Sequence[Model]) -> Mapping[st
     if isinstance(cause, Function):
         return {}
     model = next(m for m in written if m.balance == home)
+    if isinstance(cause, Moved):  # by how much it differs in the runs in which it acts
+        p, scored = cause.effect.amplitudes[cause.parts[0]], kept.scored
+        unit = Term(cause.effect, channels=dict(cause.channels)).unit(p, model.target)
+        return {"change": Value(float(scored.amplitudes[0] / scored.candidate.size[0]), unit, None)}
     own = kept.part.term if kept.part is not None else None
     for term in model.terms if own is not None else ():
         if own is not None and _same(term, own):

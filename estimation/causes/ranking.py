@@ -12,10 +12,11 @@ from estimation.causes.candidates import (
     Group,
     groups_of,
 )
+from estimation.causes.declared import moved_terms
 from estimation.causes.folds import Folds
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
-from estimation.causes.scoring import Scored, assessed, best_of_each
+from estimation.causes.scoring import ByRun, Scored, assessed, best_of_each
 from estimation.causes.sources import RELATIVE, Bend, Source
 from estimation.causes.weights import reweighted
 from estimation.effects import Parameter
@@ -30,7 +31,10 @@ REFINED = 8
 def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
     """Return the best of each name: on the grid, on some of the runs, refined, and relaxed."""
     everything = assessed(joint, pool, folds)
-    some = best_of_each(assessed(joint, groups_of(joint, on_some_runs(joint, everything)), folds))
+    known: list[tuple[Claim, ByRun]] = [(s.candidate, s.by_run) for s in everything]
+    forms = min((claim.choices for claim, _ in known), default=1)
+    known += [(replace(claim, choices=forms), by_run) for claim, by_run in moved_terms(joint)]
+    some = best_of_each(assessed(joint, groups_of(joint, on_some_runs(joint, known)), folds))
     climbing = some[:REFINED]
     for _ in range(TURNS):
         flipped = [c for s in climbing for c in one_run_changed(s.candidate)]

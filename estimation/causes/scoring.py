@@ -18,6 +18,9 @@ from estimation.causes.numbers import Numbers
 from estimation.derived import origin_of
 from estimation.recording import FloatArray
 
+ByRun = tuple[FloatArray, FloatArray, FloatArray]
+"""Products of columns with the base's residual, with themselves and with the base, of each run."""
+
 MOST_CHANGE = 2.0
 """Factor by which the largest linear term of an equation may change next to a cause."""
 
@@ -69,7 +72,7 @@ class Scored:
     gain: float
     price: Price
     amplitudes: FloatArray
-    by_run: tuple[FloatArray, FloatArray, FloatArray]
+    by_run: ByRun
 
 
 def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:

@@ -10,7 +10,7 @@ from estimation.causes.joint import Joint
 from estimation.causes.numbers import Numbers
 from estimation.causes.scoring import Scored, probabilities
 from estimation.causes.sources import Source
-from estimation.changes.candidates import Moved, SensorGain
+from estimation.changes.candidates import Changed, SensorGain
 from estimation.changes.difference import Change
 from estimation.fit_problem import OFFSET
 from estimation.model import Term
@@ -25,13 +25,13 @@ def prior_of_moved(pool: Sequence[Group], numbers: Numbers) -> float:
     names: dict[bool, set[tuple[str, str]]] = {True: set(), False: set()}
     for group in pool:
         for one in group.candidates:
-            names[isinstance(one.cause, Moved)].add((one.cause.place.name, one.cause.family))
+            names[isinstance(one.cause, Changed)].add((one.cause.place.name, one.cause.family))
     return float(np.log(max(1, len(names[False])) / max(1, len(names[True]))) / numbers.sharpness)
 
 
 def shares(ranked: Sequence[Scored], prior: float, numbers: Numbers) -> dict[str, float]:
     """Return the probability of each name, the likeliest first."""
-    more = [prior if isinstance(_source(one), Moved) else 0.0 for one in ranked]
+    more = [prior if isinstance(_source(one), Changed) else 0.0 for one in ranked]
     scores, gains = np.array([(s.score + m, s.gain) for s, m in zip(ranked, more, strict=True)]).T
     each = probabilities(scores, gains, numbers.sharpness)
     found = {_name(_source(one)): float(p) for one, p in zip(ranked, each, strict=True)}
@@ -58,7 +58,7 @@ def stated(
     assert acts is not None  # noqa: S101 - every candidate acts in the runs of one campaign
     name = _name(source)
     sure = probability[name] >= SURE
-    verdict = "moved" if isinstance(source, Moved) else ("came" if acts[-1] else "went")
+    verdict = "moved" if isinstance(source, Changed) else ("came" if acts[-1] else "went")
     term = Term(source.effect, channels=dict(source.channels))
     chosen = [source.effect.amplitudes[k] for k in source.parts]
     labels = [p.name for p in chosen]
@@ -72,7 +72,7 @@ def stated(
         verdict=verdict if sure else "one_of",
         name=name,
         equation=source.place.home,
-        family=source.effect.id if isinstance(source, Moved) else source.family,
+        family=source.effect.id if isinstance(source, Changed) else source.family,
         alternatives=tuple(others_in_set(name, probability)),
         confidence=round(probability[name], 4),
         parameters=dict(zip(labels, values, strict=True)),
@@ -98,7 +98,7 @@ def _before(source: Source, joint: Joint, base: FloatArray, shared: float) -> fl
         base: All parameters.
         shared: What an offset of all runs has of one of some, which are laid out apart.
     """
-    if not isinstance(source, Moved):
+    if not isinstance(source, Changed):
         return None
     if isinstance(source.effect, SensorGain):
         return 1.0
@@ -129,4 +129,4 @@ def _source(one: Scored) -> Source:
 
 def _name(source: Source) -> str:
     """Return the name of a change in a report."""
-    return source.key if isinstance(source, Moved) else f"{source.family} at {source.place.name}"
+    return source.key if isinstance(source, Changed) else f"{source.family} at {source.place.name}"

@@ -6,6 +6,7 @@ import sys
 
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.effects import catalogue
+from estimation.plant_models import WORDS
 
 NO_NEXT = "None is proposed: no named hypotheses compete, or none was searched for (--quick)."
 
@@ -68,15 +69,22 @@ def _named(finding: Finding) -> str:
         sizes.append(f"confidence {finding.confidence:.0%}")
     plain = meaning(finding.family)
     size = f", {', '.join(sizes)}" if sizes else ""
+    if finding.family in WORDS:
+        term = _first_line(finding.family).partition(": ")[0].lower()
+        return f"declared term that differs between runs: {term} [{finding.family}]{size}"
     return f"unmodelled effect identified: {plain or finding.family} [{finding.family}]{size}"
 
 
 def meaning(family: str) -> str:
     """Return the meaning of a family in plain words; empty for no such family."""
+    return _first_line(family).partition(": ")[2].removesuffix(".")
+
+
+def _first_line(family: str) -> str:
+    """Return the title and the meaning of a family; empty for no such family."""
     known = catalogue().get(family)
     lines = known and sys.modules[type(known).__module__].__doc__
-    first = (lines or "").partition("\n")[0]
-    return first.partition(": ")[2].removesuffix(".")
+    return (lines or "").partition("\n")[0]
 
 
 def check_of(finding: Finding) -> str:

@@ -70,6 +70,26 @@ def test_an_inertia_that_follows_the_angle_is_no_error_of_the_encoder() -> None:
     assert {"crank_angle", "acceleration"} <= {*findings[0].depends_on}
 
 
+def _nothing(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+    return np.zeros(len(angle))
+
+
+def _loaded(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+    return 0.008 * acceleration
+
+
+def test_an_inertia_that_some_of_the_runs_have_is_a_declared_term_that_differs() -> None:
+    """A payload; over the frequencies of a run its torque is nearly that of a spring."""
+    plain, loaded = turning(_nothing), turning(_loaded)
+    has = [k in (1, 2, 5, 8, 9) for k in range(len(plain))]
+    runs = [two if with_it else one for one, two, with_it in zip(plain, loaded, has, strict=True)]
+    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    assert (finding.family, finding.verdict) == ("inertia.missing", "identified")
+    assert finding.parameters["change"].value == pytest.approx(0.008, rel=0.1)
+    names = {run.name for run, with_it in zip(runs, has, strict=True) if with_it}
+    assert len(names ^ {*finding.runs_affected}) <= 1
+
+
 def _searched(runs: list[Recording]) -> Found:
     sealed = split(runs)
     layout = lay_out([motor()], runs, sealed.discover)
