@@ -77,8 +77,8 @@ def _places_of(layout: Layout) -> list[Place]:
     for equation in layout.equations.values():
         own = _related(layout, equation, angles)
         found.append(_own(layout, equation, own, angles))
-        if any(t.effect.id == "motor.torque_constant" for t in equation.terms):
-            found.append(_actuator(equation, own))
+        if (actuator := _actuator(equation, own)) is not None:
+            found.append(actuator)
     sensors = [n for n in layout.measured if n not in _computed(layout)]
     found += [
         p for n in sensors for p in (*_behind(layout, n, angles), *_levers(layout, n, angles))
@@ -238,16 +238,19 @@ def _unrelated(layout: Layout, equation: Equation, angles: Sequence[str]) -> tup
     return tuple(a for a in angles if a not in related)
 
 
-def _actuator(equation: Equation, angles: Sequence[str]) -> Place:
-    term = next(t for t in equation.terms if t.effect.id == "motor.torque_constant")
-    current = term.channels["source"]
+def _actuator(equation: Equation, angles: Sequence[str]) -> Place | None:
+    """Return the place of the actuator that an equation reads as a term or as its target."""
+    read = [t.channels["source"] for t in equation.terms if t.effect.id == "motor.torque_constant"]
+    current = next(iter(read), equation.target)
+    if not read and current.endswith((*ANGLES, "_n_m", "_n")):
+        return None
     roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
         "current": (current,),
         "drive": (current,),
         "reading": (current,),
     }
     share = abs(equation.channels.get(current, 0.0)) or 1.0  # amplitudes are of the constant's
-    enters = (Entry(equation.name, share),)
+    enters = (Entry(equation.name, share if read else -1.0),)
     return Place(f"actuator {current}", "actuator", equation.name, enters, roles)
 
 

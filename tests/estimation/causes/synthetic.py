@@ -172,19 +172,19 @@ run_offsets = false
 name = "crank"
 unit = "rad"
 [[actuator]]
-name = "crank_torque_n_m"
+name = "DRIVE"
 axis = "crank"
 [[sensor]]
 name = "crank_angle_rad"
 axis = "crank"
 reads = "position"
 """
-"""A machine of one axis, driven by a torque."""
+"""A machine of one axis; `DRIVE` stands for the channel of what drives it."""
 
 
-def axis() -> Model:
+def axis(drive: str = "crank_torque_n_m") -> Model:
     """Return the equation of `AXIS`."""
-    (model,) = declared(plant_file.parse(AXIS))
+    (model,) = declared(plant_file.parse(AXIS.replace("DRIVE", drive)))
     return model
 
 

@@ -90,6 +90,18 @@ def test_an_inertia_that_some_of_the_runs_have_is_a_declared_term_that_differs()
     assert len(names ^ {*finding.runs_affected}) <= 1
 
 
+def test_a_drive_that_saturates_is_found_where_it_is_the_target() -> None:
+    """Nothing but the drive reads an effort, so it is what the equation explains."""
+    runs = []
+    for run in turning(lambda angle, speed, acceleration: 0.0 * speed, size=3.0):
+        torque = run["crank_torque_n_m"]
+        current = torque / 0.8 * (1.0 + 0.05 * (torque / 0.5) ** 2)
+        runs.append(Recording(run.name, run.time_s, run.columns | {"crank_current_a": current}))
+    (finding,) = diagnose(runs, [axis("crank_current_a")], split(runs)).findings
+    assert finding.family == "motor.saturation"
+    assert "sensor.gain_nonlinear" in finding.alternatives  # of the current: the same column
+
+
 def _searched(runs: list[Recording]) -> Found:
     sealed = split(runs)
     layout = lay_out([motor()], runs, sealed.discover)
