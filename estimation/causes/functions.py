@@ -1,6 +1,7 @@
 """Causes of unknown form: smooth functions of one or two variables and the direction of motion."""
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -28,8 +29,13 @@ ROLE_OF_VARIABLE = {
     "velocity": "speed",
     "history": "travel",
     "dwell": "speed",
+    "turn": "position",
 }
 """Variable to the role of an effect that its channel plays, where the names differ."""
+
+TURN = 2.0 * math.pi
+LEAST_TURNS = 1.5
+"""Turns of an angle in some run from which a function may repeat with every turn of it."""
 
 MOST_VARIABLES = 3
 """Variables of one function, direction included."""
@@ -119,6 +125,10 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
         found += ["velocity_sign", "velocity"]
     if "position" in roles:
         found.append("position")
+        angle = roles["position"][0]
+        turns = max(float(np.ptp(run.channels[angle])) for run in layout.runs) / TURN
+        if angle.endswith("_angle_rad") and turns > LEAST_TURNS:
+            found.append("turn")
     if "load" in roles:
         found.append("load")
     if "current" in roles:
@@ -137,7 +147,7 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
 
 def reported(place: Place, variable: str) -> str:
     """Return the name under which a variable of a place is reported."""
-    known = variable == "position" or variable in itertools.chain(*place.others)
+    known = variable in ("position", "turn", *itertools.chain(*place.others))
     return name_of_channel(_read(place, variable)) if known else variable
 
 
@@ -186,6 +196,8 @@ def _worked_out(run: RunSignals, variable: str, name: str, width: float) -> Floa
         usual = float(np.percentile(np.abs(whole), 95))
         resting = (np.abs(whole) < max(width, 0.05 * usual)).astype(np.float64)
         return np.asarray(_rested(resting, 1.0 / run.rate_hz)[run.grid])
+    if variable == "turn":
+        return np.asarray(np.mod(run.on_grid(name), TURN))
     return run.on_grid(name)
 
 

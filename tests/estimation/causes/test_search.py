@@ -102,6 +102,17 @@ def test_a_drive_that_saturates_is_found_where_it_is_the_target() -> None:
     assert "sensor.gain_nonlinear" in finding.alternatives  # of the current: the same column
 
 
+def test_a_tight_spot_in_every_turn_depends_on_the_angle_and_the_direction() -> None:
+    def rubs(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+        spot = np.exp(-(((np.mod(angle, 2 * np.pi) - 3.0) / 0.4) ** 2))
+        return 1.5 * spot * np.tanh(speed / 0.2)
+
+    runs = turning(rubs, size=12.0)
+    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    assert finding.verdict == "depends_on"
+    assert {*finding.depends_on} == {"velocity_sign", "crank_angle"}
+
+
 def _searched(runs: list[Recording]) -> Found:
     sealed = split(runs)
     layout = lay_out([motor()], runs, sealed.discover)
