@@ -225,7 +225,7 @@ def _own(
         return Place(equation.name, "deflection", equation.name, enters, roles, like)
     sign = next((t.sign for t in equation.terms if t.effect.id.startswith("friction.")), 1)
     enters = (Entry(equation.name, float(sign)),)
-    apart = [_motion(a) for a in _unrelated(layout, equation, everywhere)]
+    apart = [_motion(a) for a in everywhere if a not in angles]
     others = tuple((*m["travel"], *m["speed"], *m["acceleration"]) for m in apart)
     return Place(equation.name, "loss", equation.name, enters, roles, others=others)
 

@@ -40,6 +40,9 @@ from estimation.recording import Recording
 LEAST_SHARE = 0.001
 """Probability from which a family is held against the test runs."""
 
+MOST_NOISE = 0.3
+"""Share of a channel that may be noise of its reading: a term of it is too small by its square."""
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -309,4 +312,21 @@ def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> 
         " be distinguished from one that does not."
         for condition in unvaried(layout.select(sealed.discover))
     ]
+    return found + _noisy(layout)
+
+
+def _noisy(layout: Layout) -> list[str]:
+    """Return the terms that a reading's noise makes too small, one sentence each."""
+    found = []
+    for equation in layout.equations.values():
+        for channel in equation.channels:
+            runs = [r for r in layout.runs if channel in r.noise]
+            sizes = [(r.noise[channel][r.grid].std(), r.on_grid(channel).std()) for r in runs]
+            share = float(np.median([noise / (size or 1.0) for noise, size in sizes] or [0.0]))
+            cutoff = equation.model.low_pass.cutoff_hz
+            if share > MOST_NOISE:
+                found.append(
+                    f"{equation.name}: {share:.0%} of {channel} is noise of its reading, so its"
+                    f" term comes out too small. A cutoff_hz below {cutoff:g} removes more of it."
+                )
     return found

@@ -79,6 +79,7 @@ def test_an_axis_driven_by_pwm_is_diagnosed_in_units_of_its_drive(run, tmp_path)
     (finding,) = told["findings"]
     assert finding["family"] == "friction.viscous_asymmetry"
     assert finding["parameters"]["asymmetry"]["value"] == pytest.approx(0.03, rel=0.1)
+    assert any("gantry_acceleration_m_s2 is noise of its reading" in note for note in told["notes"])
 
 
 def test_a_force_that_repeats_along_an_axis_has_a_period(run, tmp_path):

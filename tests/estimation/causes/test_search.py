@@ -113,6 +113,13 @@ def test_a_tight_spot_in_every_turn_depends_on_the_angle_and_the_direction() -> 
     assert {*finding.depends_on} == {"velocity_sign", "crank_angle"}
 
 
+def test_no_axis_of_the_reference_rig_is_apart_from_another() -> None:
+    """The equations relate its shafts one after the other, so none is an axis of its own."""
+    runs = list(draw(1_000_000, "clean").recordings)[:6]
+    layout = lay_out(model_file.reference_rig(), runs, [run.name for run in runs])
+    assert not any(place.others for place in places_of(layout))
+
+
 def _searched(runs: list[Recording]) -> Found:
     sealed = split(runs)
     layout = lay_out([motor()], runs, sealed.discover)
