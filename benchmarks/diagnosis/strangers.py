@@ -257,7 +257,7 @@ NAMED = {
     "drag": Effect(("friction.drag",), lambda _, run: run.speed * np.abs(run.speed)),
     "cogging": Effect(WAVES, _wave),
     "spring": Effect(SPRINGS, lambda _, run: run.position, of_gear=False),
-    "step": Effect(("change.step",), _step),
+    "step": Effect(("change.step", "friction.coulomb"), _step),
     "fading": Effect(("friction.warmup",), _fading),
     "presliding": Effect(LOOPS, _presliding),
     "load friction": Effect(

@@ -97,13 +97,13 @@ CATALOGUED: dict[str, Truth] = {
     "distal_drift": _of("sensor.drift", "cable stretch", "sensor.creep"),
     "distal_crosstalk": _of("sensor.crosstalk", "cable stretch"),
     "jaw_delay": _of("sensor.delay", "stretch", "sensor.lag"),
-    "friction_step": _of("change.step", "cable"),
+    "friction_step": _of("change.step", "cable", "friction.coulomb"),
     "jaw_mass": _of("inertia.missing", "stretch cable"),
     # losses that take speed, load, rest, age or another axis to show
     "motor_viscous_asymmetry": _of("friction.viscous_asymmetry", "motor"),
     "gear_load_viscous": _of("friction.load_viscous", "motor"),
     "grease_warmup": _of("friction.warmup", "motor"),
-    "gear_wear": _of("change.step", "motor", course="comes"),
+    "gear_wear": _of("change.step", "motor", "friction.coulomb", course="comes"),
     "cable_stiff": _of("friction.warmup", "cable", course="fades"),
     "cable_dwell": _of("friction.dwell", "cable", needs="rests"),
     # at one angle of wrap the two directions differ by what the ratio takes up

@@ -36,6 +36,10 @@ def level(plant: Plant, place: str) -> float:
     return torque / plant.ratio if place == "motor" else torque
 
 
+SAME = {"change.step": ("friction.coulomb",)}
+"""Family to others with the same columns: declared friction may have another level in some runs."""
+
+
 def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: Drawer) -> Recipe:
     """Return a recipe of friction whose level is a product of tables drawn by functions."""
 
@@ -43,7 +47,8 @@ def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: Drawer
         made = tuple(table(random, ranges) for table in tables)
         dwell = over(random, 0.2, 1.5), over(random, 0.02, 0.3)
         part = Hidden(place, "table", made, friction=True, dwell_s=dwell)
-        return Drawn(WORDS[place], family, variables, part, level(plant, place))
+        same = SAME.get(family, ())
+        return Drawn(WORDS[place], family, variables, part, level(plant, place), same)
 
     return recipe
 
