@@ -16,9 +16,8 @@ from estimation.within_bounds import solve_within
 
 OFFSET = "sensor.offset"
 
-WIDEST, NARROWEST = 0.2, 1e-3
-"""Speed over which friction changes its sign, of the usual most speed: beyond the first it is a
-form of the friction at speed. The second is searched where a slow axis needs it."""
+NARROWEST = 1e-3
+"""Speed over which friction changes its sign that is searched, of the usual most speed."""
 
 
 class FitError(EstimationError):
@@ -130,21 +129,25 @@ def problem_of(model: Model, runs: list[FitRun]) -> Problem:
 
 
 def _shapes(term: Term, runs: Sequence[FitRun]) -> list[Parameter]:
-    """Return a term's shape parameters, a width of a change of sign within that of these runs."""
-    speed = term.channels.get("speed")
-    if speed is None:
+    """Return a term's shape parameters, a width of a change of sign within that of these runs.
+
+    Where the speed never changes its sign nothing shows the width: it is then below every speed,
+    since a wider one takes the form of what friction does at speed.
+    """
+    channel = term.channels.get("speed")
+    if channel is None:
         return [*term.effect.shape]
-    usual = float(np.percentile(np.concatenate([np.abs(run.thin[speed]) for run in runs]), 95))
-    return [
-        replace(
-            p,
-            lower=min(p.lower, NARROWEST * usual),
-            upper=min(p.upper, max(WIDEST * usual, p.lower)),
-        )
-        if p.name == "width" and usual > 0.0
-        else p
-        for p in term.effect.shape
-    ]
+    speed = np.concatenate([run.thin[channel] for run in runs])
+    least, usual = np.percentile(np.abs(speed), [1.0, 95.0]).tolist()
+    widest = usual if speed.min() < 0.0 < speed.max() else least
+    out = []
+    for p in term.effect.shape:
+        if p.name == "width" and widest > 0.0:
+            low = min(p.lower, NARROWEST * widest)
+            out.append(replace(p, lower=low, upper=min(p.upper, max(widest, p.lower))))
+        else:
+            out.append(p)
+    return out
 
 
 def solve(problem: Problem, gram: FloatArray) -> FloatArray:

@@ -8,6 +8,9 @@ import numpy as np
 from estimation.recording import FloatArray, Recording
 from estimation.signals import Reading, Signals
 
+WHOLE = 0.05
+"""Part of a count that changes may differ from whole counts by, in the middle of them."""
+
 
 def white_noise(recording: Recording, measured: Sequence[str], signals: Signals) -> Recording:
     """Return a recording of white noise, as wide in each channel as that channel's own.
@@ -47,6 +50,19 @@ def noise_width(values: FloatArray, known: Reading) -> float:
         usual = float(np.nanmean(np.sort(blocks)[: max(1, round(0.9 * len(blocks)))]))
     else:
         usual = known.noise**2
+    step = _count(values) if known.step is None else known.step
+    return math.sqrt(max(usual, step**2 / 12.0))
+
+
+def _count(values: FloatArray) -> float:
+    """Return the step that every change of a reading is a multiple of; 0 where there is none.
+
+    A shaft that never stands still shows a least change that no count of its encoder is behind.
+    """
     steps = np.abs(np.diff(values))
-    step = float(steps[steps > 0.0].min(initial=np.inf)) if known.step is None else known.step
-    return math.sqrt(max(usual, step**2 / 12.0 if math.isfinite(step) else 0.0))
+    steps = steps[steps > 0.0]
+    least = float(steps.min(initial=np.inf))
+    if not math.isfinite(least):
+        return 0.0
+    counts = steps / least
+    return least if float(np.median(np.abs(counts - np.round(counts)))) < WHOLE else 0.0

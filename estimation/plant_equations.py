@@ -5,6 +5,7 @@ Along the chain of axes that an actuator drives:
 - from the actuator to the first sensor of effort: effort = gain x drive - inertia - friction;
 - between two sensors of effort: effort = ratio x effort behind + inertia + friction;
 - without a sensor of effort: drive = weights + inertia + friction, in the unit of the drive;
+  a second drive of the axis is taken off, times the ratio of their gains;
 - across a compliant transmission with its travel read at both ends and its effort at one: the bend
   of known ratio, or the output's travel where the ratio is fitted, = compliance x effort.
 
@@ -14,7 +15,7 @@ turns fastest.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from estimation.channels import unit_of
@@ -57,11 +58,13 @@ class Chain:
         actuator: What drives the first.
         axes: Names of the axes.
         joints: The transmissions between them, one fewer.
+        also: Further actuators of the first axis, such as the second motor of a gantry.
     """
 
     actuator: Actuator
     axes: tuple[str, ...]
     joints: tuple[Transmission, ...]
+    also: tuple[Actuator, ...] = ()
 
 
 def equations(plant: Plant) -> tuple[Written, ...]:
@@ -131,9 +134,10 @@ def signals(plant: Plant) -> Signals:
 
 
 def chains(plant: Plant) -> Iterator[Chain]:
-    """Yield the chain of every actuator; where it branches, one chain an end."""
-    for actuator in plant.actuators:
-        yield from _onward(plant, Chain(actuator, (actuator.axis,), ()))
+    """Yield the chain of every driven axis; where it branches, one chain an end."""
+    for axis in dict.fromkeys(actuator.axis for actuator in plant.actuators):
+        first, *also = (a for a in plant.actuators if a.axis == axis)
+        yield from _onward(plant, Chain(first, (axis,), (), tuple(also)))
 
 
 def _onward(plant: Plant, chain: Chain) -> Iterator[Chain]:
@@ -145,8 +149,8 @@ def _onward(plant: Plant, chain: Chain) -> Iterator[Chain]:
     if not further:
         yield chain
     for joint in further:
-        longer = Chain(chain.actuator, (*chain.axes, joint.output), (*chain.joints, joint))
-        yield from _onward(plant, longer)
+        axes, joints = (*chain.axes, joint.output), (*chain.joints, joint)
+        yield from _onward(plant, replace(chain, axes=axes, joints=joints))
 
 
 def bend_channel(plant: Plant, joint: Transmission) -> Combination | None:
@@ -204,17 +208,20 @@ def _efforts(plant: Plant, chain: Chain) -> Iterator[Written]:
             for load in plant.loads
             if load.axis in chain.axes
         ]
+        others = [Part("transmission.ratio", -1, {"load": one.name}) for one in chain.also]
         parts = (*weights, *_motion(plant, driven, driven, 1))
         if parts:
-            yield Written(_drive_name(chain), drive, (*parts, OFFSET))
+            yield Written(_drive_name(chain), drive, (*others, *parts, OFFSET))
         return
-    if unit_of(drive) in EFFORT.values():
-        gain = Part("transmission.ratio", 1, {"load": drive})
-    else:
-        gain = Part("motor.torque_constant", 1, {"source": drive})
+    gains = [
+        Part("transmission.ratio", 1, {"load": one.name})
+        if unit_of(one.name) in EFFORT.values()
+        else Part("motor.torque_constant", 1, {"source": one.name})
+        for one in (chain.actuator, *chain.also)
+    ]
     at, first = reading[0]
     own = _driven(plant, chain.axes[: at + 1]) or driven
-    yield Written(_drive_name(chain), first.name, (gain, *_motion(plant, own, own, -1), OFFSET))
+    yield Written(_drive_name(chain), first.name, (*gains, *_motion(plant, own, own, -1), OFFSET))
     for (near, here), (far, there) in pairwise(reading):
         ratio = Part("transmission.ratio", 1, {"load": there.name})
         speed_of = _driven(plant, chain.axes[near : far + 1])

@@ -12,7 +12,7 @@ from estimation.campaign import Campaign
 from estimation.derived import measured_channels, zero_phase_channels
 from estimation.estimators.model import Stream
 from estimation.fitting import fit
-from estimation.noise import white_noise
+from estimation.noise import noise_width, white_noise
 from estimation.plant import (
     Actuator,
     Axis,
@@ -27,7 +27,7 @@ from estimation.plant_equations import equations, missing, signals, unused
 from estimation.plant_file import PlantFileError, parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from estimation.recording import Recording
-from estimation.signals import Combination, Direction, Share
+from estimation.signals import Combination, Direction, Reading, Share
 
 REFERENCE = to_toml(shipped_plant("reference"))
 
@@ -57,10 +57,13 @@ def plants(draw):
         )
         for k in range(count - 1)
     ]
-    ends = {"rad": ("_angle_rad", "_torque_n_m"), "m": ("_position_m", "_force_n")}
+    ends = {
+        "rad": ("_angle_rad", "_velocity_rad_s", "_torque_n_m"),
+        "m": ("_position_m", "_velocity_m_s", "_force_n"),
+    }
     sensors = []
     for axis in axes:
-        for reads, end in zip(("position", "effort"), ends[axis.unit], strict=True):
+        for reads, end in zip(("position", "speed", "effort"), ends[axis.unit], strict=True):
             if draw(st.booleans()):
                 counts, noise = draw(st.none() | positive), draw(st.none() | positive)
                 sensors.append(Sensor(f"{axis.name}{end}", axis.name, reads, counts, noise=noise))
@@ -96,6 +99,7 @@ def test_a_machine_file_gives_the_machine_back(plant):
 @given(plants())
 def test_every_equation_is_one_that_the_sensors_can_feed(plant):
     known = {"time_s", "drive_a", *(part.name for part in (*plant.sensors, *plant.loads))}
+    known |= plant.integrals.keys()  # the recordings of such a machine are opened with them
     own = {equation.name for equation in plant.equations}
     for model in declared(plant):
         needed = measured_channels([*model.channels, model.target], model.signals)
@@ -267,3 +271,23 @@ def test_the_bend_of_a_gear_follows_its_ratio_offline_and_live(ratio, sign):
     fitted = fit(model, Campaign.of([run]), bootstrap=0)
     assert fitted.terms[0].values["compliance"].value == pytest.approx(0.02, rel=1e-2)
     assert Stream(fitted, 1000.0).channels == ("proximal_torque_n_m",)
+
+
+def test_two_drives_of_one_axis_are_in_one_equation():
+    drives = tuple(Actuator(f"{side}_current_a", "carriage") for side in ("left", "right"))
+    (equation,) = equations(replace(SLIDE, actuators=drives))
+    assert equation.target == "left_current_a"
+    assert (equation.parts[0].sign, equation.parts[0].channels) == (-1, {"load": "right_current_a"})
+    cell = Sensor("carriage_force_n", "carriage", "effort")
+    (equation,) = equations(replace(SLIDE, actuators=drives, sensors=(*SLIDE.sensors, cell)))
+    sources = [p.channels["source"] for p in equation.parts if p.id == "motor.torque_constant"]
+    assert sources == ["left_current_a", "right_current_a"]
+
+
+@pytest.mark.parametrize("count", [0.0, 1e-3])
+def test_the_least_change_of_a_moving_axis_is_a_count_only_if_all_changes_are_multiples(count):
+    time_s = np.arange(2000) / 500
+    position = 10.0 * time_s + np.sin(time_s)
+    read = np.round(position / count) * count if count else position
+    noise = noise_width(read, Reading())
+    assert noise == pytest.approx(count / np.sqrt(12.0), rel=0.2, abs=1e-6)
