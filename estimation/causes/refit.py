@@ -36,12 +36,14 @@ class Part:
         acts: Names of the runs in which the term acts; in all when None.
         unwritten: The columns if the term is None.
         precision: Prior precision of an amplitude of these, in units of the inverse squared column.
+        is_change: Whether the term is a declared one whose factor differs, to either side.
     """
 
     term: Term | None = None
     acts: frozenset[str] | None = None
     unwritten: Unwritten | None = None
     precision: float = 0.0
+    is_change: bool = False
 
     @property
     def is_written(self) -> bool:
@@ -217,9 +219,11 @@ class Refit:
 
     def _limits(self, parts: Sequence[Part]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the penalty and the bounds of every amplitude, shape (k,) each."""
+        of_terms = [(term, False) for term in self._declared]
+        of_terms += [(part.term, part.is_change) for part in parts if part.term is not None]
         rows = [
-            (0.0, p.lower, p.upper)
-            for term in [*self._declared, *(p.term for p in parts if p.term is not None)]
+            (0.0, -np.inf, np.inf) if is_change else (0.0, p.lower, p.upper)
+            for term, is_change in of_terms
             for p in term.effect.amplitudes
         ]
         for part in parts:

@@ -99,7 +99,7 @@ class Refits:
             if term is not None:
                 if set(term.channels.values()) - {channel for _, channel in cause.channels}:
                     term = self.of[name].refined(self.parts[name], term)
-                return Part(term, acts)
+                return Part(term, acts, is_change=cause.is_declared)
             if name != cause.place.home:
                 return None
         gain = sum(abs(e.gain) for e in cause.place.enters if e.equation == name)
