@@ -133,7 +133,7 @@ def _likely(kept: Kept, joint: Joint) -> list[tuple[float, Scored]]:
         label = _label(scored)
         shares[label] = shares.get(label, 0.0) + float(weight)
         best.setdefault(label, scored)
-    ordered = sorted(shares, key=lambda label: -shares[label])
+    ordered = sorted((x for x in shares if shares[x] > 0.0), key=lambda label: -shares[label])
     covered, out = 0.0, []
     for label in ordered[:MOST]:
         out.append((shares[label], best[label]))

@@ -35,7 +35,7 @@ ROLE_OF_VARIABLE = {
 
 TURN = 2.0 * math.pi
 LEAST_TURNS = 1.5
-"""Turns of an angle in some run from which a function may repeat with every turn of it."""
+"""Turns of an angle in some run from which friction may repeat with every turn of it."""
 
 MOST_VARIABLES = 3
 """Variables of one function, direction included."""
@@ -85,6 +85,8 @@ class Function:
         """Return a variable's hat functions on the run's grid, or one and the direction."""
         values = variable_of(run, self.place, variable, equation, self.width)
         if variable == "velocity_sign":
+            if "turn" in self.variables:  # what repeats in both directions is a ripple
+                return values[:, None]
             return np.column_stack([np.ones(len(values)), values])
         channel = _channel(run, self.place, variable, equation)
         key = ("hats", variable, channel, knots)
@@ -103,6 +105,7 @@ def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
     chosen: list[tuple[str, ...]] = [(v,) for v in known]
     chosen += list(itertools.combinations(known, 2))
     if "velocity_sign" in known:
+        chosen += [("velocity_sign", "turn")] * turns(layout, place)
         rest = [v for v in known if v not in ("velocity_sign", "velocity", "time")]
         chosen += [
             ("velocity_sign", *pair) for pair in itertools.combinations(rest, 2) if "load" in pair
@@ -125,10 +128,6 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
         found += ["velocity_sign", "velocity"]
     if "position" in roles:
         found.append("position")
-        angle = roles["position"][0]
-        turns = max(float(np.ptp(run.channels[angle])) for run in layout.runs) / TURN
-        if angle.endswith("_angle_rad") and turns > LEAST_TURNS:
-            found.append("turn")
     if "load" in roles:
         found.append("load")
     if "current" in roles:
@@ -143,6 +142,14 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
         found.append("temperature")
     found.append("time")
     return found
+
+
+def turns(layout: Layout, place: Place) -> bool:
+    """Return whether a place has a shaft that turns often enough to repeat anything."""
+    angle = place.roles.get("position", ("",))[0]
+    return angle.endswith("_angle_rad") and any(
+        float(np.ptp(run.channels[angle])) > LEAST_TURNS * TURN for run in layout.runs
+    )
 
 
 def reported(place: Place, variable: str) -> str:

@@ -177,13 +177,8 @@ def _is_impossible(candidate: Candidate, amplitudes: FloatArray) -> bool:
     if isinstance(cause, Function):
         return False
     count = len(cause.parts)  # a bend comes after them
-    sizes = amplitudes[:count] / candidate.size[:count]
-    total = float(np.sum(sizes))
-    return (
-        abs(total) < cause.least
-        or float(np.linalg.norm(sizes)) > cause.most
-        or (cause.is_bounded and total < 0.0)
-    )
+    total = float(np.sum(amplitudes[:count] / candidate.size[:count]))
+    return abs(total) < cause.least or (cause.is_bounded and total < 0.0)
 
 
 def _price(candidate: Candidate, joint: Joint) -> Price:

@@ -72,9 +72,6 @@ ANGLE_STEP_RAD = 1e-4
 """Step of a derivative by an angle."""
 
 LATE = ("sensor.delay", "sensor.lag", "motor.electrical")
-MOST_SLOPE = 0.05
-"""Share of the motion that an encoder's error may add to its reading or hide in places."""
-
 LEAST_LATE = 0.3
 """Share of a reading that a delay or a lag makes late, at least: a small slow share is creep."""
 
@@ -146,14 +143,6 @@ class Source:
     def least(self) -> float:
         """Size that its amplitude has at least: a reading is late as a whole."""
         return LEAST_LATE if self.effect.id in LATE else 0.0
-
-    @property
-    def most(self) -> float:
-        """Size that its amplitudes have at most: a reading rises with what it reads."""
-        if self.family != "sensor.encoder_inl":
-            return math.inf
-        orders = zip(self.effect.shape, self.shape, strict=True)
-        return MOST_SLOPE / next((x for p, x in orders if p.name == "order"), 1.0)
 
     @property
     def is_bounded(self) -> bool:

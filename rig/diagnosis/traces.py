@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from estimation.causes.findings import VARIABLE_OF_ROLE, Kept
+from estimation.causes.findings import ANGLES_OF_ROLE, VARIABLE_OF_ROLE, Kept
 from estimation.causes.functions import Function
 from estimation.causes.refit import Refit
 from estimation.causes.verdict import Answer
@@ -102,7 +102,8 @@ def _channels(kept: Kept, most: int = 2) -> tuple[str, ...]:
     if isinstance(cause, Function):
         read: Sequence[str] = cause.reads
     else:
-        read = [channel for role, channel in cause.channels if role in VARIABLE_OF_ROLE]
+        named = (*ANGLES_OF_ROLE, *VARIABLE_OF_ROLE)
+        read = [channel for role, channel in cause.channels if role in named]
     return tuple(dict.fromkeys(c for c in read if c != "time_s"))[:most]
 
 

@@ -70,6 +70,15 @@ def test_a_sure_name_needs_no_experiment(answered: Answer, rippled: list[Recordi
     assert propose(answered, rippled) is None
 
 
+def test_a_name_without_a_likely_alternative_needs_no_experiment(
+    doubtful: Answer, rippled: list[Recording]
+) -> None:
+    kept = doubtful.kept[0]
+    alone = [kept.ranked[0], *(replace(other, score=-1e9) for other in kept.ranked[1:])]
+    single = replace(doubtful, kept=(replace(kept, ranked=alone), *doubtful.kept[1:]))
+    assert propose(single, rippled) is None
+
+
 def test_repeats_are_found_by_what_was_asked(rippled: list[Recording]) -> None:
     names = [r.name for r in rippled]
     assert repeats(rippled) == [

@@ -58,19 +58,6 @@ def test_drag_is_found_where_the_speed_never_changes_its_sign() -> None:
     assert finding.parameters["drag"].value == pytest.approx(0.02, rel=0.05)
 
 
-def test_an_inertia_that_follows_the_angle_is_no_error_of_the_encoder() -> None:
-    """The error would be of half the motion, and an encoder has none of that size."""
-
-    def linkage(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-        return 0.01 * (np.cos(angle) * acceleration - 0.5 * np.sin(angle) * speed**2)
-
-    runs = turning(linkage)
-    findings = diagnose(runs, [axis()], split(runs)).findings
-    assert findings
-    assert "sensor.encoder_inl" not in {finding.family for finding in findings}
-    assert {"crank_angle", "acceleration"} <= {*findings[0].depends_on}
-
-
 def _nothing(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
     return np.zeros(len(angle))
 
