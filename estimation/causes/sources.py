@@ -290,7 +290,7 @@ def _acts(effect: Effect, place: Place) -> bool:
                     "transmission.",
                     "hysteresis.bouc_wen.twist",
                     "change.step.offset",
-                    "inertia.",
+                    "inertia.missing",
                 )
             )
 

@@ -58,6 +58,16 @@ def test_drag_is_found_where_the_speed_never_changes_its_sign() -> None:
     assert finding.parameters["drag"].value == pytest.approx(0.02, rel=0.05)
 
 
+def test_an_inertia_that_follows_the_angle_is_named_with_its_size() -> None:
+    def linkage(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+        return 0.01 * (np.cos(angle) * acceleration - 0.5 * np.sin(angle) * speed**2)
+
+    runs = turning(linkage)
+    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    assert (finding.family, finding.verdict) == ("inertia.position", "identified")
+    assert finding.parameters["cosine"].value == pytest.approx(0.01, rel=0.05)
+
+
 def _nothing(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
     return np.zeros(len(angle))
 
