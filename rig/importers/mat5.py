@@ -1,8 +1,8 @@
-"""Read MATLAB files of versions 5 to 7: numbers, text and scalar structs, every length checked.
+"""Read MATLAB files of versions 5 to 7: numbers, text, structs and cells, every length checked.
 
 After the layout in MathWorks, "MAT-File Format" (version 5). This small reader is here because
 `scipy.io.loadmat` ends the whole process with a segmentation fault on some damaged files. Values of
-other kinds (cells, sparse matrices, objects, function handles) are named, not read.
+other kinds (sparse matrices, objects, function handles) are named, not read.
 """
 
 import math
@@ -33,8 +33,8 @@ NUMBERS = {
 }
 TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
 NAMES = (1, 2)
-STRUCT, CHAR, FIRST_NUMERIC, LAST_NUMERIC = 2, 4, 6, 15
-KINDS = {1: "cell", 3: "object", 5: "sparse", 16: "function handle", 17: "object"}
+CELL, STRUCT, CHAR, FIRST_NUMERIC, LAST_NUMERIC = 1, 2, 4, 6, 15
+KINDS = {3: "object", 5: "sparse", 16: "function handle", 17: "object"}
 COMPLEX_FLAG = 0x08
 
 
@@ -60,7 +60,8 @@ def read_mat5(content: bytes) -> dict[str, Value]:
 
     Returns:
         Numeric arrays without their axes of length one, text as str, scalar structs as
-        dictionaries; anything else as `Unread`.
+        dictionaries, arrays of structs and cells as dictionaries by their number, from "1";
+        anything else as `Unread`.
 
     Raises:
         Mat5Error: The bytes are damaged or truncated, or of another version.
@@ -135,6 +136,8 @@ def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Value]:
     if min(shape) < 0:
         raise Mat5Error(f"an array of shape {shape}")
     name = _expect(elements, "name", lambda kind, _: kind in NAMES)[1].decode("latin-1")
+    if array_class == CELL:
+        return name, _cells(elements, math.prod(shape), order, depth)
     if array_class == STRUCT:
         return name, _struct(elements, shape, order, depth)
     if array_class == CHAR:
@@ -186,16 +189,36 @@ def _text(elements: Iterator[tuple[int, bytes]], shape: tuple[int, ...], order: 
 def _struct(
     elements: Iterator[tuple[int, bytes]], shape: tuple[int, ...], order: str, depth: int
 ) -> Value:
-    if math.prod(shape) != 1:
-        return Unread("struct array")
     length_bytes = _expect(elements, "field length", lambda k, size: k == INT32 and size == 4)[1]
     length = struct.unpack(order + "i", length_bytes)[0]
     names = _expect(elements, "field names", lambda kind, _: kind == INT8)[1]
     if length < 1 or len(names) % length:
         raise Mat5Error(f"{len(names)} bytes of field names of {length} each")
+    fields = [
+        names[start : start + length].split(b"\0", 1)[0].decode("latin-1")
+        for start in range(0, len(names), length)
+    ]
+    count = math.prod(shape)
+    if count == 1:
+        return _fields(elements, fields, order, depth)
+    return {str(k + 1): _fields(elements, fields, order, depth) for k in range(count)}
+
+
+def _fields(
+    elements: Iterator[tuple[int, bytes]], names: list[str], order: str, depth: int
+) -> dict[str, Value]:
     fields: dict[str, Value] = {}
-    for start in range(0, len(names), length):
-        name = names[start : start + length].split(b"\0", 1)[0].decode("latin-1")
+    for name in names:
         data = _expect(elements, f"field {name!r}", lambda kind, _: kind == MATRIX)[1]
         fields[name] = _matrix(data, order, depth + 1)[1]
     return fields
+
+
+def _cells(
+    elements: Iterator[tuple[int, bytes]], count: int, order: str, depth: int
+) -> dict[str, Value]:
+    cells: dict[str, Value] = {}
+    for number in range(1, count + 1):
+        data = _expect(elements, f"cell {number}", lambda kind, _: kind == MATRIX)[1]
+        cells[str(number)] = _matrix(data, order, depth + 1)[1]
+    return cells

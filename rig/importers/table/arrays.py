@@ -1,5 +1,6 @@
 """Tables in files of arrays: Parquet, `.mat` of versions 5 to 7, and `.npz`."""
 
+import fnmatch
 import io
 import zipfile
 import zlib
@@ -13,6 +14,9 @@ from rig.errors import DataError, MissingExtraError
 from rig.importers.matlab import read_variables
 from rig.importers.table.data import Layout
 from rig.importers.table.raw import Raw, Values, nested
+
+TRIAL = "trial"
+"""Column with the number of the trial, from 1."""
 
 
 def read_parquet(path: Path, layout: Layout) -> Raw:
@@ -59,13 +63,12 @@ def read_npz(path: Path, layout: Layout) -> Raw:
     Raises:
         DataError: It is damaged, or holds objects.
     """
-    del layout
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as archive:
             values = {name: archive[name] for name in archive.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, KeyError) as error:
         raise _damaged(path, "NumPy", error) from error
-    return _of_arrays(path, values)
+    return _of_trials(path, values, layout.trials)
 
 
 def read_mat(path: Path, layout: Layout) -> Raw:
@@ -74,9 +77,54 @@ def read_mat(path: Path, layout: Layout) -> Raw:
     Raises:
         DataError: It is damaged, or of version 7.3.
     """
-    del layout
     values = nested(read_variables(path))
-    return _of_arrays(path, {n: v for n, v in values if isinstance(v, np.ndarray | str)})
+    arrays = {n: v for n, v in values if isinstance(v, np.ndarray | str)}
+    return _of_trials(path, arrays, layout.trials)
+
+
+def _of_trials(path: Path, values: Mapping[str, Any], pattern: str) -> Raw:
+    """Put the columns of all trials one after the other, with their number in the column `trial`.
+
+    Args:
+        path: The file.
+        values: Arrays by name.
+        pattern: Of the names that hold one trial each, such as `test*` or `trial.*`; empty for a
+            file that is one table.
+
+    Raises:
+        DataError: No name fits the pattern, or no column is in all trials.
+    """
+    if not pattern:
+        return _of_arrays(path, values)
+    depth = pattern.count(".") + 1
+    trials: dict[str, dict[str, Any]] = {}
+    for name, value in values.items():
+        words = name.split(".")
+        owner = ".".join(words[:depth])
+        if len(words) >= depth and fnmatch.fnmatchcase(owner, pattern):
+            trials.setdefault(owner, {})[".".join(words[depth:])] = value
+    if not trials:
+        known = ", ".join(values) or "none"
+        raise DataError(
+            f"{path} has no variable {pattern!r}.", f"Its variables are {known}.",
+            "Correct trials under [data].",
+        )  # fmt: skip
+    tables = [_with_fields(_of_arrays(path, own)) for own in trials.values()]
+    shared = [n for n in tables[0] if all(n in table for table in tables)]
+    if not shared:
+        raise DataError(
+            f"The trials {pattern!r} of {path} have no column in common.",
+            fix="Correct trials under [data].",
+        )
+    columns = {n.lstrip("."): np.concatenate([table[n] for table in tables]) for n in shared}
+    numbers = [np.full(len(table[shared[0]]), k + 1.0) for k, table in enumerate(tables)]
+    return Raw(path, {**columns, TRIAL: np.concatenate(numbers)})
+
+
+def _with_fields(raw: Raw) -> dict[str, Values]:
+    """Return the columns of a trial, its single values among them."""
+    fields = {name: np.full(len(raw), value) for name, value in raw.fields.items()}
+    return {**raw.columns, **fields}
 
 
 def _of_arrays(path: Path, values: Mapping[str, Any]) -> Raw:
@@ -105,7 +153,8 @@ def _longest(raw: Raw) -> Raw:
     others = [name for name, values in raw.columns.items() if len(values) != common]
     if not others:
         return raw
-    remark = f"{', '.join(others)} have another length than {common} and are not columns"
+    remark = f"{', '.join(others)} have another length than {common} and are not columns;"
+    remark += " where each is a run, state trials = PATTERN under [data]"
     kept = {name: values for name, values in raw.columns.items() if name not in others}
     return Raw(raw.path, kept, raw.fields, (*raw.remarks, remark))
 

@@ -130,19 +130,21 @@ class Layout(Section):
         files: Pattern of the files of a folder, such as `*.csv`.
         header: Whether the first line of a text table names the columns; None follows it.
         separator: Of a text table; found in the first line if none.
-        decimal: Decimal sign of a text table.
+        decimal: Decimal sign of a text table; None follows the first numbers.
         comment: What a line to be skipped begins with.
         skip_lines: Lines before the head.
         rows: Key of a JSON object that holds the samples.
+        trials: Pattern of the variables of a `.mat` or `.npz` that hold one run each.
     """
 
     files: str = ""
     header: bool | None = None
     separator: Annotated[str, Field(max_length=1)] = ""
-    decimal: Literal[".", ","] = "."
+    decimal: Literal[".", ","] | None = None
     comment: str = ""
     skip_lines: Annotated[int, Field(ge=0)] = 0
     rows: str = ""
+    trials: str = ""
 
 
 class Data(Layout):

@@ -41,19 +41,26 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
         raise DataError(f"{path} cannot be read as a text table: {error}.") from error
     if not text.endswith(("\n", "\r")):
         remarks.append("the last line has no line end, so it may be cut off")
+    decimal = layout.decimal or _decimal(rows, separator)
+    if decimal == "," and not layout.decimal:
+        remarks.append("numbers have a decimal comma")
     has_head = layout.header
     if has_head is None:
-        has_head = any(not _is_number(cell, layout.decimal) for cell in rows[0][1])
+        has_head = any(not _is_number(cell, decimal) for cell in rows[0][1])
         if not has_head:
             remarks.append("the first line holds numbers, so columns are named 1, 2, 3 and so on")
     names = _unique([c.strip() for c in rows[0][1]]) if has_head else _numbered(len(rows[0][1]))
     body = rows[1:] if has_head else rows
+    if has_head and _holds_units(body, decimal):
+        line, cells = body.pop(0)
+        held = ", ".join(cell.strip() or "nothing" for cell in cells)
+        remarks.append(f"line {line} below the head is left out: it holds {held}")
     _check_widths(path, body, len(names))
     columns = {}
     for place, name in enumerate(names):
         cells = [TRUTHS.get(cells[place].strip().lower(), cells[place]) for _, cells in body]
-        if layout.decimal != ".":
-            cells = [cell.replace(layout.decimal, ".") for cell in cells]
+        if decimal != ".":
+            cells = [cell.replace(decimal, ".") for cell in cells]
         columns[name] = numbers_or_text(cells)
     first_line = body[0][0] if body else 0
     return Raw(path, columns, remarks=tuple(remarks), first_line=first_line)
@@ -113,6 +120,20 @@ def _is_number(cell: str, decimal: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def _decimal(rows: list[tuple[int, list[str]]], separator: str) -> str:
+    """Return the decimal sign of the first numbers below a head and a line of units."""
+    cells = [cell for _, cells in rows[1:4] for cell in cells]
+    with_comma = any(_is_number(cell, ",") and not _is_number(cell, ".") for cell in cells)
+    with_point = any("." in cell and _is_number(cell, ".") for cell in cells)
+    return "," if separator != "," and with_comma and not with_point else "."
+
+
+def _holds_units(body: list[tuple[int, list[str]]], decimal: str) -> bool:
+    """Return whether the first line below the head has no number and the second one has."""
+    has_number = [any(_is_number(cell, decimal) for cell in cells) for _, cells in body[:2]]
+    return has_number == [False, True]
 
 
 def _numbered(count: int) -> list[str]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.recording import Flag, FloatArray, Recording, RecordingError, Stretch
 from rig.errors import DataError
+from rig.importers.table.arrays import TRIAL
 from rig.importers.table.channels import Samples, find
 from rig.importers.table.formula import FormulaError, evaluate
 from rig.importers.table.mapping import Mapping
@@ -52,7 +53,7 @@ def _edges(samples: Samples, mapping: Mapping) -> list[int]:
         begins[1:] |= steps > rules.gap_s
     if rules.resets:
         begins[1:] |= steps < 0
-    for name in rules.changes:
+    for name in (*rules.changes, *([TRIAL] if mapping.data.trials else [])):
         values = _cutting(samples, mapping, "changes", name)
         begins[1:] |= values[1:] != values[:-1]
     if rules.falls:

@@ -122,6 +122,8 @@ def test_damaged_files_read_or_raise(save, where, junk, cut):
 
 def agree(ours, theirs):
     if isinstance(ours, dict):
+        if isinstance(theirs, list):  # an array of structs
+            theirs = {str(k + 1): one for k, one in enumerate(theirs)}
         return all(agree(value, theirs[name]) for name, value in ours.items())
     if isinstance(ours, Unread | str):
         return isinstance(ours, Unread) or ours == theirs

@@ -9,6 +9,7 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from estimation.filters import LowPass, filter_recording
+from rig.errors import DataError
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
 
@@ -124,6 +125,15 @@ def test_a_decimal_comma_lines_before_the_head_and_names_that_are_channels(tmp_p
     (run,) = open_table(path, machine('[data]\ndecimal = ","\nskip_lines = 1\ncomment = "#"\n'))
     assert set(run.columns) == {"motor_angle_rad"}
     assert run["motor_angle_rad"].tolist() == [1.5, 2.5]
+
+
+def test_a_line_of_units_and_a_decimal_comma_are_read_and_remarked_on(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    path.write_text("Zeit;Winkel\n[ms];[rad]\n0,00;1,5\n100,00;2,5\n")
+    mapping = machine('[data.columns]\ntime_s = "Zeit:ms"\nmotor_angle_rad = "Winkel"\n')
+    (run,) = open_table(path, mapping)
+    assert run["motor_angle_rad"].tolist() == [1.5, 2.5]
+    assert run.time_s.tolist() == [0.0, 0.1]
 
 
 def test_samples_that_do_not_count_are_flagged_with_the_reason(tmp_path, machine):
@@ -289,3 +299,47 @@ def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path, machine):
     (run,) = open_table(path, machine(text))
     np.testing.assert_allclose(np.diff(run.time_s), 0.01)
     np.testing.assert_allclose(run["motor_angle_rad"], 10 * (run.time_s + time_s[0]), atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["matrices", "array of structs", "cells", "npz"])
+def test_each_trial_of_a_file_is_a_run(tmp_path, machine, kind):
+    """Trials of different lengths, as variables, structs or cells, with a single value each."""
+    times = [np.arange(n) / 10.0 for n in (4, 6, 5)]
+    matrices = [np.column_stack([t, 2.0 * t]) for t in times]
+    names = "1", "2"
+    path, trials = tmp_path / "lab.mat", "test*"
+    match kind:
+        case "matrices":
+            savemat(path, {f"test{k}": m for k, m in enumerate(matrices)} | {"note": "x"})
+        case "npz":
+            path = tmp_path / "lab.npz"
+            np.savez(path, **{f"test{k}": m for k, m in enumerate(matrices)})
+        case "array of structs":
+            names, trials = ("t", "q"), "trial.*"
+            fields = np.array(
+                [(t, 2.0 * t, k) for k, t in enumerate(times)],
+                dtype=[("t", object), ("q", object), ("mass", object)],
+            )
+            savemat(path, {"trial": fields})
+        case "cells":
+            trials = "data.*"
+            cells = np.empty(3, object)
+            cells[:] = matrices
+            savemat(path, {"data": cells})
+    text = f'[data]\ntrials = "{trials}"\n\n[data.columns]\ntime_s = "{names[0]}"\n'
+    text += f'motor_angle_rad = "{names[1]}"\n'
+    if kind == "array of structs":
+        text += '\n[data.conditions]\nload_mass_kg = "mass"\n'
+    runs = list(open_table(path, machine(text)))
+    assert [len(run.time_s) for run in runs] == [4, 6, 5]
+    for run, time_s in zip(runs, times, strict=True):
+        np.testing.assert_allclose(run["motor_angle_rad"], 2.0 * time_s)
+    if kind == "array of structs":
+        assert [run.conditions["load_mass_kg"] for run in runs] == [0.0, 1.0, 2.0]
+
+
+def test_a_pattern_of_trials_that_nothing_fits_names_what_there_is(tmp_path, machine):
+    savemat(tmp_path / "lab.mat", {"run1": np.eye(4)})
+    text = '[data]\ntrials = "test*"\n\n[data.columns]\ntime_s = "1"\nmotor_angle_rad = "2"\n'
+    with pytest.raises(DataError, match=r"no variable 'test\*'\. Its variables are run1\."):
+        open_table(tmp_path / "lab.mat", machine(text))
