@@ -3,7 +3,8 @@
 No function of the signals predicts such an effect in a run that was left out, so it is looked for
 within runs: a declared friction term with an amplitude that varies over time is fitted to every
 other block of a run and judged on the blocks between them. An offset that varies likewise is part
-of both fits, so a drifting zero is not taken for friction.
+of both fits, so a drifting zero is not taken for friction. A slow disturbance is followed by any
+smooth column, so the same column at other times is a rival: friction explains more than it does.
 """
 
 from collections.abc import Mapping
@@ -93,15 +94,19 @@ def _errors(held_out: HeldOut) -> Mapping[tuple[str, str], FloatArray]:
 
 
 def _judged(time_s: FloatArray, residual: FloatArray, column: FloatArray) -> tuple[float, float]:
-    """Return the squared error of one run's blocks, with a slow offset alone and with the term."""
+    """Return the squared error of one run's blocks, without the term at its times and with it."""
     size = float(np.sqrt(np.mean(column**2)))
     if len(time_s) < 4 * KNOTS or size == 0.0:
         return 0.0, 0.0
     place = (time_s - time_s[0]) / (time_s[-1] - time_s[0]) * (KNOTS - 1)
     hats = np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(KNOTS)))
     is_odd = np.floor(2.0 * place) % 2 == 1
+    half = len(column) // 2
+    rivals = [column[::-1], np.roll(column, half), np.roll(column[::-1], half)]
+    with_rivals = [np.hstack([hats, hats * (other / size)[:, None]]) for other in rivals]
+    without = min(_left_out(columns, residual, is_odd) for columns in (hats, *with_rivals))
     with_term = np.hstack([hats, hats * (column / size)[:, None]])
-    return _left_out(hats, residual, is_odd), _left_out(with_term, residual, is_odd)
+    return without, _left_out(with_term, residual, is_odd)
 
 
 def _left_out(columns: FloatArray, target: FloatArray, is_odd: NDArray[np.bool_]) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.rigs import draw
 from estimation import model_file
@@ -335,6 +336,18 @@ def test_friction_that_jumps_at_random_times_is_found_without_a_name() -> None:
     assert finding.family == "unknown"
     assert finding.depends_on == ("velocity_sign",)
     assert any("changes within runs" in note for note in answer.notes)
+
+
+@pytest.mark.parametrize("width", [30, 100, 200])
+def test_a_disturbance_of_random_course_is_no_friction_that_changes(width: int) -> None:
+    random = np.random.default_rng(8)
+
+    def pushed(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+        course = gaussian_filter1d(random.normal(size=len(angle)), width)
+        return 0.04 * course / course.std()
+
+    runs = turning(pushed)
+    assert not diagnose(runs, [axis()], split(runs)).findings
 
 
 def test_the_test_runs_do_not_reach_the_choice(found: Found) -> None:
