@@ -12,12 +12,13 @@ from estimation.channels import unit_of
 from estimation.derived import measured_channels
 from estimation.errors import EstimationError, nearest
 from estimation.fitting import fit
-from estimation.model import Model, balance_channels, settled
+from estimation.model import Model
 from estimation.noise import noise_width
+from estimation.opposed import opposed, size_of_target
 from estimation.plant import Plant
 from estimation.plant_equations import Missing, missing, unused
 from estimation.plant_models import declared
-from estimation.recording import FloatArray, Recording, shared_columns
+from estimation.recording import Recording, shared_columns
 from estimation.signals import Reading
 from estimation.travel import FOLLOWS, slope
 
@@ -151,19 +152,13 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
     found = _described(fitted, values=True)
     evidence = fitted.evidence
     assert evidence is not None  # noqa: S101  a fit sets its evidence
-    size = float(np.sqrt(np.mean([float(np.mean(r**2)) for r in _targets(fitted, campaign)])))
+    size = size_of_target(fitted, campaign)
+    if contradicted := opposed(fitted, campaign):
+        found = replace(found, trouble=f"{contradicted} Correct its sign, or that of the position.")
     if not fitted.run_offsets:
         return replace(found, relative_error=evidence.rmse_with_means / size)
     means = np.sqrt(max(evidence.rmse_with_means**2 - evidence.rmse**2, 0.0))
     return replace(found, relative_error=evidence.rmse / size, between_runs=float(means) / size)
-
-
-def _targets(model: Model, campaign: Campaign) -> Iterator[FloatArray]:
-    for recording in campaign.evidence:
-        channels = balance_channels(model, recording)
-        target = channels[model.target][settled(model, channels)]
-        if target.size:
-            yield target - target.mean() if model.run_offsets else target
 
 
 def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) -> Iterator[str]:

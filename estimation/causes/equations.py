@@ -29,6 +29,7 @@ from estimation.fit_problem import OFFSET
 from estimation.fitting import fit
 from estimation.model import Model, Term, balance_channels
 from estimation.noise import white_noise
+from estimation.opposed import opposed
 from estimation.predicted import with_prediction
 from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.rest import in_motion
@@ -285,7 +286,14 @@ def lay_out(
                     "A deflection from another ratio is mostly travel.",
                     "Correct the ratio in the machine file, or the counts of one of the sensors.",
                 )
-            equations[model.balance] = equation_of(fit(model, campaign, bootstrap=0, every=None))
+            fitted = fit(model, campaign, bootstrap=0, every=None)
+            if contradicted := opposed(fitted, campaign):
+                raise LayoutError(
+                    contradicted,
+                    "A drive that seems to brake the motion has no equation with this friction.",
+                    "Correct its sign, or that of the position: gain = -1 in the machine file.",
+                )
+            equations[model.balance] = equation_of(fitted)
         except EstimationError as error:
             undecided[model.balance] = error
     if not equations:

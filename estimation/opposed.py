@@ -1,0 +1,78 @@
+"""A channel whose sign contradicts the other channels of its equation."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.campaign import Campaign
+from estimation.channels import unit_of
+from estimation.errors import EstimationError
+from estimation.fitting import fit
+from estimation.model import Model, balance_channels, settled
+from estimation.recording import shared_columns
+
+UNEXPLAINED, FALLS = 0.5, 0.5
+"""Share of the target that a wrong sign leaves unexplained, and what the right one leaves of it."""
+
+MOTION = ("rad", "m", "rad/s", "m/s", "rad/s^2", "m/s^2")
+"""Units of motion: the sign of a drive is stated instead of theirs."""
+
+
+def opposed(fitted: Model, campaign: Campaign) -> str:
+    """Return a sentence where a channel of an equation has the opposite sign, else nothing.
+
+    An actuator that is mounted or counted the other way gives a motion that gains energy from
+    friction. Inertia and friction then stay at zero.
+
+    Args:
+        fitted: The equation, fitted on the campaign.
+        campaign: The recordings.
+    """
+    evidence = fitted.evidence
+    at_zero = [
+        term.effect.id
+        for term in fitted.terms
+        for p in term.effect.amplitudes
+        if p.lower == 0.0 and term.values[p.name].value <= 0.0
+    ]
+    if (
+        evidence is None
+        or not at_zero
+        or evidence.rmse < UNEXPLAINED * size_of_target(fitted, campaign)
+    ):
+        return ""
+    recorded = shared_columns(list(campaign.evidence))
+    errors = {}
+    for channel in {fitted.target, *fitted.channels} & {*recorded}:
+        if unit_of(channel) in MOTION:
+            continue
+        runs = [
+            replace(run, columns={**run.columns, channel: -run[channel]})
+            for run in campaign.evidence
+        ]
+        try:
+            turned = fit(fitted, Campaign.of(runs), bootstrap=0)
+        except EstimationError:
+            continue
+        if turned.evidence is not None:
+            errors[channel] = turned.evidence.rmse
+    best = min(errors, key=lambda name: errors[name], default="")
+    if not best or errors[best] > FALLS * evidence.rmse:
+        return ""
+    left = 100.0 * errors[best] / evidence.rmse
+    return (
+        f"{best} has the opposite sign of what the motion needs: negated, it leaves"
+        f" {left:.2g} % of the residual."
+    )
+
+
+def size_of_target(model: Model, campaign: Campaign) -> float:
+    """Return the root mean square of an equation's target, without means where a fit has none."""
+    squares = []
+    for recording in campaign.evidence:
+        channels = balance_channels(model, recording)
+        target = channels[model.target][settled(model, channels)]
+        if target.size:
+            centred = target - target.mean() if model.run_offsets else target
+            squares.append(float(np.mean(centred**2)))
+    return float(np.sqrt(np.mean(squares)))
