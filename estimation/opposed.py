@@ -12,7 +12,7 @@ from estimation.model import Model, balance_channels, settled
 from estimation.recording import shared_columns
 
 UNEXPLAINED, FALLS = 0.5, 0.5
-"""Share of the target that a wrong sign leaves unexplained, and what the right one leaves of it."""
+"""Residual with a wrong sign over the target, at least; with the right sign over that, at most."""
 
 MOTION = ("rad", "m", "rad/s", "m/s", "rad/s^2", "m/s^2")
 """Units of motion: the sign of a drive is stated instead of theirs."""
@@ -61,8 +61,8 @@ def opposed(fitted: Model, campaign: Campaign) -> str:
         return ""
     left = 100.0 * errors[best] / evidence.rmse
     return (
-        f"{best} has the opposite sign of what the motion needs: negated, it leaves"
-        f" {left:.2g} % of the residual."
+        f"{best} has the opposite sign of what the motion needs: with it negated, the residual is"
+        f" {left:.2g} % of what it was."
     )
 
 

@@ -4,7 +4,7 @@ No function of the signals predicts such an effect in a run that was left out, s
 within runs: a declared friction term with an amplitude that varies over time is fitted to every
 other block of a run and judged on the blocks between them. An offset that varies likewise is part
 of both fits, so a drifting zero is not taken for friction. A slow disturbance is followed by any
-smooth column, so the same column at other times is a rival: friction explains more than it does.
+smooth column, so friction must explain more than the same column at other times of the run.
 """
 
 from collections.abc import Mapping
@@ -102,9 +102,9 @@ def _judged(time_s: FloatArray, residual: FloatArray, column: FloatArray) -> tup
     hats = np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(KNOTS)))
     is_odd = np.floor(2.0 * place) % 2 == 1
     half = len(column) // 2
-    rivals = [column[::-1], np.roll(column, half), np.roll(column[::-1], half)]
-    with_rivals = [np.hstack([hats, hats * (other / size)[:, None]]) for other in rivals]
-    without = min(_left_out(columns, residual, is_odd) for columns in (hats, *with_rivals))
+    shifted = [column[::-1], np.roll(column, half), np.roll(column[::-1], half)]
+    with_shifted = [np.hstack([hats, hats * (other / size)[:, None]]) for other in shifted]
+    without = min(_left_out(columns, residual, is_odd) for columns in (hats, *with_shifted))
     with_term = np.hstack([hats, hats * (column / size)[:, None]])
     return without, _left_out(with_term, residual, is_odd)
 
