@@ -3,7 +3,8 @@
 `python -m benchmarks.results` lists them: commit, day, and the commits to the page's code since.
 `--remake NAME,...` runs the commands of these pages one after the other (`old`: of all that are
 older than their code, the quickest first). A page that is not older is skipped, so an interrupted
-call resumes. RIG_DATA names the folder of the measured data.
+call resumes. RIG_DATA names the folder of the measured data, RIG_OTHERLAB that of the other
+simulator, RIG_ANSWERS that of the answers kept on its cases.
 """
 
 import argparse
@@ -14,12 +15,15 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs/results"
-DATA = "{data}"
+FOLDERS = {"data": "RIG_DATA", "otherlab": "RIG_OTHERLAB", "answers": "RIG_ANSWERS"}
+"""Word of a command to the variable with its folder."""
+
 CHANGES = "+changes"
 COMMIT = re.compile(rf"(?:commit |^\| )([0-9a-f]{{7,40}}(?:\{CHANGES})?)\b", re.MULTILINE)
 """A page's commit in a sentence, or at the start of a table's row; the last is the newest."""
@@ -31,8 +35,8 @@ class Page:
 
     Attributes:
         name: Name of its file, without the ending.
-        command: Command that makes it, from the project's folder; `{data}` is the folder of the
-            measured data, `{state}` one where the command keeps finished parts.
+        command: Command that makes it, from the project's folder; `{data}` and so on are those of
+            `FOLDERS`, `{state}` a folder where the command keeps finished parts.
         code: Paths of the code it speaks of.
         minutes: Processor time, roughly.
     """
@@ -60,10 +64,14 @@ class Page:
         )
         return int(found.stdout) if found.returncode == 0 else None
 
-    def words(self, data: str) -> list[str]:
-        """Return the words of its command, with this interpreter and its programs."""
-        state = ROOT / f"build/results/{self.name}"
-        program, *rest = shlex.split(self.command.format(data=data, state=state))
+    def words(self, folders: Mapping[str, str]) -> list[str]:
+        """Return the words of its command, with this interpreter and its programs.
+
+        Raises:
+            KeyError: The command needs a folder that is not stated.
+        """
+        known = {**folders, "state": str(ROOT / f"build/results/{self.name}")}
+        program, *rest = shlex.split(self.command.format_map(known))
         python = Path(sys.executable)
         return [str(python if program == "python" else python.with_name(program)), *rest]
 
@@ -142,7 +150,7 @@ PAGES = (
     Page("hunt", "python -m benchmarks.hunt", _CORE, 60),
     Page(
         "isolability",
-        "python -m benchmarks.diagnosis.isolability",
+        "python -m benchmarks.diagnosis.isolability {otherlab} {answers}",
         f"benchmarks/diagnosis/isolability.py {_DIAGNOSIS}",
         2,
     ),
@@ -237,14 +245,14 @@ def main() -> int:
 
 
 def _remake(page: Page, since: int | None) -> int:
-    data = os.environ.get("RIG_DATA", "")
     if since == 0 and not page.made()[1].endswith(CHANGES):
         return _note(page, "not older than its code")
-    if DATA in page.command and not data:
-        _note(page, "left out: needs the measured data, set RIG_DATA to its folder")
-        return 1
     begun = time.monotonic()
-    words = page.words(data)
+    try:
+        words = page.words({k: os.environ[v] for k, v in FOLDERS.items() if v in os.environ})
+    except KeyError as error:
+        _note(page, f"left out: set {FOLDERS[error.args[0]]} to the folder that it needs")
+        return 1
     _note(page, shlex.join(words))
     code = subprocess.run(words, cwd=ROOT, check=False).returncode  # noqa: S603 - of the table
     _note(page, f"exit code {code} after {(time.monotonic() - begun) / 60:.1f} min")

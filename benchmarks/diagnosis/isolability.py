@@ -53,6 +53,8 @@ def main() -> int:
         pairs += [(p, family in reported) for family, p in chance.items()]
         likely = [f for f, p in sorted(chance.items(), key=lambda q: -q[1])[:3] if p > 0.0]
         rows.append((name, ", ".join(sorted(reported)) or "-", ", ".join(likely) or "-"))
+    if not rows:
+        parser.error(f"{options.answers} has no answer on a case with one effect")
     area = area_under_curve([p for p, _ in pairs], [there for _, there in pairs])
     paragraphs = [
         "Expected and reported confusions of effects",
