@@ -119,6 +119,11 @@ CHANNELS: dict[str, Channel] = {
 """Registered channels of the grasper rig by name. Other names are allowed if they carry a unit."""
 
 
+def plain_name(name: str) -> str:
+    """Return the words of a channel's name without its unit."""
+    return name.removesuffix(f"_{ending_of(name)}").replace("_", " ")
+
+
 def describe(name: str) -> Channel:
     """Return the registered channel of that name, or one derived from the name's unit suffix."""
-    return CHANNELS.get(name) or Channel(name, unit_of(name), name.replace("_", " "))
+    return CHANNELS.get(name) or Channel(name, unit_of(name), plain_name(name))

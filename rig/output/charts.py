@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from estimation.channels import ending_of, unit_of
+from estimation.channels import plain_name, unit_of
 from estimation.recording import FloatArray
 from rig.output.table import TextTable
 
@@ -83,7 +83,7 @@ def binned(
 
 def words(channel: str) -> tuple[str, str]:
     """Return a channel's name without its unit's suffix, and that unit."""
-    return channel.removesuffix(f"_{ending_of(channel)}").replace("_", " "), unit_of(channel)
+    return plain_name(channel), unit_of(channel)
 
 
 def axis(title: str, unit: str) -> dict[str, Any]:
