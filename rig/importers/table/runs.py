@@ -96,8 +96,13 @@ def _run(
     samples: Samples, mapping: Mapping, part: slice, name: str, remarks: list[Remark]
 ) -> Recording:
     time_s = samples.time_s[part]
-    _check_clock(samples, part, time_s)
     channels = {key: values[part] for key, values in samples.channels.items()}
+    twice = _is_twice(time_s, channels)
+    _check_clock(samples, part, time_s, twice)
+    if twice.any():
+        remarks.append((name, f"{int(twice.sum())} samples that are there twice left out"))
+        time_s = time_s[~twice]
+        channels = {key: values[~twice] for key, values in channels.items()}
     conditions = {
         key: _constant(samples, mapping, key, value, part, name)
         for key, value in samples.conditions.items()
@@ -125,7 +130,17 @@ def _run(
     return _even(run, mapping)
 
 
-def _check_clock(samples: Samples, part: slice, time_s: FloatArray) -> None:
+def _is_twice(time_s: FloatArray, channels: dict[str, FloatArray]) -> NDArray[np.bool_]:
+    """Return which samples are those before them again, with the same time."""
+    columns = np.column_stack([time_s, *channels.values()])
+    same = (columns[1:] == columns[:-1]) | (np.isnan(columns[1:]) & np.isnan(columns[:-1]))
+    same[:, 0] &= np.isfinite(time_s[1:])  # a time that is empty is refused
+    return np.concatenate([[False], same.all(axis=1)])
+
+
+def _check_clock(
+    samples: Samples, part: slice, time_s: FloatArray, twice: NDArray[np.bool_]
+) -> None:
     where, is_there = part.start or 0, np.isfinite(time_s)
     if not is_there.all():
         raise DataError(
@@ -133,15 +148,15 @@ def _check_clock(samples: Samples, part: slice, time_s: FloatArray) -> None:
             " empty.",
             fix="Correct the file, or state a sample rate in place of the time column.",
         )
-    steps = np.diff(time_s)
-    if (steps > 0).all():
+    is_back = (np.diff(time_s) <= 0) & ~twice[1:]
+    if not is_back.any():
         return
-    back = int(np.argmax(steps <= 0)) + 1
+    back = int(np.argmax(is_back)) + 1
     before, after = float(time_s[back - 1]), float(time_s[back])
     raise DataError(
         f"{samples.raw.path}, {samples.raw.row(where + back)}: time goes from {before:.6g} s to"
         f" {after:.6g} s.",
-        f"{int((steps <= 0).sum())} samples do not come after the one before them.",
+        f"{int(is_back.sum())} samples do not come after the one before them.",
         "If the clock starts again with each trial, write resets = true under [data.runs]"
         " (--runs resets=true); if the column is not a clock, state --rate HZ.",
     )

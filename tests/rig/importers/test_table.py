@@ -136,6 +136,18 @@ def test_a_line_of_units_and_a_decimal_comma_are_read_and_remarked_on(tmp_path, 
     assert run.time_s.tolist() == [0.0, 0.1]
 
 
+def test_a_sample_that_is_there_twice_counts_once(tmp_path, machine):
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,motor_angle_rad\n0,1\n0.1,2\n0.1,2\n0.2,3\n")
+    remarks = []
+    (run,) = read_runs(path, machine("[data]\n"), remarks)
+    assert run["motor_angle_rad"].tolist() == [1, 2, 3]
+    assert any("1 samples that are there twice" in remark for _, remark in remarks)
+    path.write_text("time_s,motor_angle_rad\n0,1\n0.1,2\n0.1,2.5\n0.2,3\n")
+    with pytest.raises(DataError, match="line 4: time goes from"):
+        open_table(path, machine("[data]\n"))
+
+
 def test_samples_that_do_not_count_are_flagged_with_the_reason(tmp_path, machine):
     path = tmp_path / "run.csv"
     path.write_text("time_s,motor_angle_rad,drive_ratio\n0,1,1\n0.1,,1\n0.2,3,0\n0.3,4,0\n")
