@@ -112,8 +112,11 @@ def _starts(ranked: Sequence[Scored]) -> list[Scored]:
     other = next(
         (s for s in ranked if s.candidate.is_function != ranked[0].candidate.is_function), None
     )
-    worth = other is not None and other.score > 0.5 * ranked[0].score
-    return [ranked[0], other] if other is not None and worth else [ranked[0]]
+    if other is None:
+        return [ranked[0]]
+    # a function explains several named causes of its variables at once, better than each of them
+    worth = 0.0 if ranked[0].candidate.is_function else 0.5 * ranked[0].score
+    return [ranked[0], other] if other.score > worth else [ranked[0]]
 
 
 def _chain(ranking: Ranking, start: Scored) -> list[Scored]:

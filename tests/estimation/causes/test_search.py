@@ -69,6 +69,27 @@ def test_an_inertia_that_follows_the_angle_is_named_with_its_size() -> None:
     assert finding.parameters["cosine"].value == pytest.approx(0.01, rel=0.05)
 
 
+def test_three_causes_of_two_variables_keep_their_names() -> None:
+    """One function of the angle explains more than each of the two causes that act over it."""
+    random, runs = np.random.default_rng(6), []
+    for k in range(12):
+        drawn, time = np.random.default_rng(300 + k), np.arange(4000) / 400.0
+        angle = np.zeros(len(time))
+        for _ in range(5):
+            size, pace, phase = drawn.normal(), drawn.uniform(0.3, 1.0), drawn.uniform(0.0, 6.3)
+            angle += size * np.sin(np.pi * pace * time + phase)
+        angle *= 2.0 / np.abs(angle).max()
+        speed = np.gradient(angle, time)
+        torque = 0.02 * np.gradient(speed, time) + 0.1 * speed + 0.2 * angle
+        torque += 0.12 * np.sin(6.0 * angle)
+        torque += (0.3 + 0.15 * np.exp(-((speed / 0.5) ** 2))) * np.tanh(speed / 0.03)
+        torque += random.normal(0.0, 0.004, len(time))
+        columns = {"crank_torque_n_m": torque, "crank_angle_rad": angle}
+        runs.append(Recording(f"{k:02d}", time, columns))
+    families = {finding.family for finding in diagnose(runs, [axis()], split(runs)).findings}
+    assert families == {"spring.position", "ripple.motor", "friction.stribeck"}
+
+
 def _nothing(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
     return np.zeros(len(angle))
 
