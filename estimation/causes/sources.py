@@ -327,6 +327,8 @@ def _axis(
         return [direction_width(layout, place) or usual or 1.0]
     if parameter.name == "middle":
         return [0.0]  # play is crossed where the load changes its side
+    if parameter.name == "harmonic":
+        return _harmonics(layout, parameter, channels["position"])
     if parameter.name == "order":
         role = next(r for r in TURNING if r in channels)
         return _orders(layout, effect, channels[role])
@@ -373,6 +375,14 @@ RELATIVE: Mapping[object, Sequence[float]] = {
     "wrap": (0.2, 1.0),
 }
 """Shape parameter to the values tried, shares of the range of the channel that its unit names."""
+
+
+def _harmonics(layout: Layout, parameter: Parameter, angle: str) -> list[float]:
+    """Return the harmonics that some run turns a quarter of: over less, an inertia is constant."""
+    if not angle.endswith("_angle_rad"):
+        return []
+    travel = max(float(np.ptp(r.channels[angle])) for r in layout.runs)
+    return [float(x) for x in parameter.grid() if x * travel > 0.5 * math.pi]
 
 
 def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:

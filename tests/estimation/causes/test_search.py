@@ -69,6 +69,13 @@ def test_an_inertia_that_follows_the_angle_is_named_with_its_size() -> None:
     assert finding.parameters["cosine"].value == pytest.approx(0.01, rel=0.05)
 
 
+def test_an_inertia_over_a_small_angle_is_constant() -> None:
+    runs = turning(lambda angle, speed, acc: angle * acc + 0.5 * speed**2, size=0.15)
+    families = {finding.family for finding in diagnose(runs, [axis()], split(runs)).findings}
+    assert families
+    assert "inertia.position" not in families
+
+
 def test_three_causes_of_two_variables_keep_their_names() -> None:
     """One function of the angle explains more than each of the two causes that act over it."""
     random, runs = np.random.default_rng(6), []
