@@ -128,6 +128,7 @@ NOT_HIDDEN = {
     "friction.coulomb": "declared",
     "friction.viscous": "declared",
     "compliance.link": "declared",
+    "inertia.position": "needs a linkage, and the rig's shafts are round",
     "coupling.torque": "needs another axis with a torque of its own",
     "unknown": "the answer to what no catalogue holds",
 }
