@@ -65,6 +65,9 @@ CLOCKS = ("clock", "elapsed", "campaign_clock")
 KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
 """Equations of the reference rig that effects name."""
 
+OF_FEW = ("friction.capstan", "inertia.position")
+"""Families that the reference rig has in the equations that their effects name, and in no other."""
+
 NARROW = 0.02
 """Speed over which friction changes its sign where none is declared, share of the usual most."""
 
@@ -267,8 +270,8 @@ def _acts(effect: Effect, place: Place) -> bool:
     kind = place.home.partition(".")[0]
     if (place.home, place.kind) == ("calibration.encoder", "deflection"):
         return False  # slower than a count a sample, the pattern of the counts passes for a bend
-    if effect.family == "friction.capstan" and kind in KNOWN and kind not in effect.balances:
-        return False  # a cable that is wrapped, not a shaft in its bearings
+    if effect.family in OF_FEW and kind in KNOWN and kind not in effect.balances:
+        return False  # a wrapped cable or a linkage, not a shaft in its bearings
     if (place.kind == "lever") != (effect.id == "eccentric.load.pulley"):
         return False
     match place.kind:

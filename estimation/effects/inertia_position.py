@@ -21,11 +21,11 @@ class InertiaPosition(Pointwise):
     """
 
     id = "inertia.position"
-    balances: ClassVar = {"motor": -1, "gearbox": -1, "cable": 1, "grasp": -1}
+    balances: ClassVar = {"joint": 1}  # the shafts of the reference rig and the grasper are round
     roles: ClassVar = {
-        "position": "spindle_angle_rad",
-        "speed": "spindle_velocity_rad_s",
-        "acceleration": "spindle_acceleration_rad_s2",
+        "position": "joint_angle_rad",
+        "speed": "joint_velocity_rad_s",
+        "acceleration": "joint_acceleration_rad_s2",
     }
     amplitudes: ClassVar[Parameters] = (
         Parameter("sine", "target / acceleration", "inertia that follows the sine"),
