@@ -10,7 +10,7 @@ import numpy as np
 
 from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.instruments import signal
-from estimation.causes.places import Place, direction_width
+from estimation.causes.places import Place, direction_width, travel_of
 from estimation.derived import CAMPAIGN_TIME
 from estimation.recording import FloatArray
 
@@ -147,9 +147,7 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
 def turns(layout: Layout, place: Place) -> bool:
     """Return whether a place has a shaft that turns often enough to repeat anything."""
     angle = place.roles.get("position", ("",))[0]
-    return angle.endswith("_angle_rad") and any(
-        float(np.ptp(run.channels[angle])) > LEAST_TURNS * TURN for run in layout.runs
-    )
+    return angle.endswith("_angle_rad") and travel_of(layout, angle) > LEAST_TURNS * TURN
 
 
 def reported(place: Place, variable: str) -> str:

@@ -87,6 +87,11 @@ def _places_of(layout: Layout) -> list[Place]:
     return found
 
 
+def travel_of(layout: Layout, position: str) -> float:
+    """Return the largest travel of a position in any run."""
+    return max(float(np.ptp(run.channels[position])) for run in layout.runs)
+
+
 def direction_width(layout: Layout, place: Place) -> float:
     """Return the speed over which friction changes its sign at a place."""
     equation = layout.equations[place.home]
@@ -103,7 +108,7 @@ def _angles(layout: Layout) -> list[str]:
     read = [n for e in layout.equations.values() for n in (e.target, *e.model.channels)]
     names = [n for n in measured_channels(read, _signals(layout)) if n.endswith(ANGLES)]
     names = [n for n in names if n in layout.measured]
-    return sorted(names, key=lambda n: -max(float(np.ptp(r.channels[n])) for r in layout.runs))
+    return sorted(names, key=lambda n: -travel_of(layout, n))
 
 
 def groups_apart(layout: Layout) -> int:

@@ -14,7 +14,7 @@ import numpy as np
 
 from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
-from estimation.causes.places import Place, direction_width
+from estimation.causes.places import Place, direction_width, travel_of
 from estimation.effects import Effect, Parameter, Pointwise, catalogue
 from estimation.filters import holoborodko_derivative
 from estimation.recording import FloatArray
@@ -384,7 +384,7 @@ def _harmonics(layout: Layout, parameter: Parameter, angle: str) -> list[float]:
     """Return the harmonics that some run turns a quarter of: over less, an inertia is constant."""
     if not angle.endswith("_angle_rad"):
         return []
-    travel = max(float(np.ptp(r.channels[angle])) for r in layout.runs)
+    travel = travel_of(layout, angle)
     return [float(x) for x in parameter.grid() if x * travel > 0.5 * math.pi]
 
 
@@ -393,7 +393,7 @@ def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:
 
     A harmonic repeats with the shaft that makes it, so its order there is a whole number.
     """
-    travel = max(float(np.ptp(r.channels[angle])) for r in layout.runs)
+    travel = travel_of(layout, angle)
     resolved = 2 * math.pi / travel
     if not angle.endswith("_angle_rad"):  # nothing turns: any period
         return list(np.arange(LEAST_PERIODS, MOST_PERIODS, 1.0 / 3.0) * resolved)
