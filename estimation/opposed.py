@@ -14,6 +14,8 @@ from estimation.recording import shared_columns
 UNEXPLAINED, FALLS = 0.5, 0.5
 """Residual with a wrong sign over the target, at least; with the right sign over that, at most."""
 
+FIX = "Correct its sign, or that of the position: gain = -1 in the machine file."
+
 MOTION = ("rad", "m", "rad/s", "m/s", "rad/s^2", "m/s^2")
 """Units of motion: the sign of a drive is stated instead of theirs."""
 

@@ -14,7 +14,7 @@ from estimation.errors import EstimationError, nearest
 from estimation.fitting import fit
 from estimation.model import Model
 from estimation.noise import noise_width
-from estimation.opposed import opposed, size_of_target
+from estimation.opposed import FIX, opposed, size_of_target
 from estimation.plant import Plant
 from estimation.plant_equations import Missing, missing, unused
 from estimation.plant_models import declared
@@ -59,7 +59,7 @@ class CheckedEquation:
             None without recordings.
         between_runs: The same of the runs' means, where the fit ignores them (`run_offsets`); None
             where it does not.
-        trouble: Why it cannot be fitted on the recordings; empty where it can.
+        trouble: Why the recordings do not fit it, or contradict it; empty where they do neither.
     """
 
     name: str
@@ -154,7 +154,7 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
     assert evidence is not None  # noqa: S101  a fit sets its evidence
     size = size_of_target(fitted, campaign)
     if contradicted := opposed(fitted, campaign):
-        found = replace(found, trouble=f"{contradicted} Correct its sign, or that of the position.")
+        found = replace(found, trouble=f"{contradicted} {FIX}")
     if not fitted.run_offsets:
         return replace(found, relative_error=evidence.rmse_with_means / size)
     means = np.sqrt(max(evidence.rmse_with_means**2 - evidence.rmse**2, 0.0))

@@ -29,7 +29,7 @@ from estimation.fit_problem import OFFSET
 from estimation.fitting import fit
 from estimation.model import Model, Term, balance_channels
 from estimation.noise import white_noise
-from estimation.opposed import opposed
+from estimation.opposed import FIX, opposed
 from estimation.predicted import with_prediction
 from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.rest import in_motion
@@ -291,7 +291,7 @@ def lay_out(
                 raise LayoutError(
                     contradicted,
                     "A drive that seems to brake the motion has no equation with this friction.",
-                    "Correct its sign, or that of the position: gain = -1 in the machine file.",
+                    FIX,
                 )
             equations[model.balance] = equation_of(fitted)
         except EstimationError as error:

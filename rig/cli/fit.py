@@ -153,7 +153,7 @@ def fit(
     `--model grasper` fits the force at each axis of a 3-DOF grasper, in one file.
     """
     from estimation import model_file
-    from estimation.opposed import opposed
+    from estimation.opposed import FIX, opposed
     from estimation.travel import off_ratio
     from rig.machines.recordings import open_recordings
     from rig.reports.fit import held_out_sentence, parameter_table
@@ -172,7 +172,7 @@ def fit(
         if contradicted := off_ratio(fitted, list(campaign.evidence)):
             said.append(f"{contradicted} The values above describe that: correct the ratio first.")
         if contradicted := opposed(fitted, campaign):
-            said.append(f"{contradicted} Correct its sign, or that of the position, first.")
+            said.append(f"{contradicted} {FIX}")
     if out is not None:
         model_file.write_all([fitted for fitted, _ in done], out)
         said.append(f"Model: {out}")

@@ -100,7 +100,9 @@ def _parameter_lines(equation: "CheckedEquation") -> list[str]:
                 " run: without its differences gain and friction may be confused."
             )
     if equation.trouble:
-        lines.append(f"  Cannot be fitted: {equation.trouble}")
+        is_fitted = equation.relative_error is not None
+        lead = "Contradicted by the recordings" if is_fitted else "Cannot be fitted"
+        lines.append(f"  {lead}: {equation.trouble}")
     return lines
 
 
