@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rig.errors import ExitCode
 from rig.log.container import LIBRARY, MAGIC
+from rig.log.order import by_number
 from rig.log.reader import LogFile, Topic, read_log
 from rig.log.scan import Damage
 from rig.log.writer import PART_SUFFIX
@@ -135,7 +136,8 @@ def logs_in(path: Path) -> list[Path]:
     """Return the logs at a path: the file itself, or all logs of a folder, unfinished ones too."""
     if not path.is_dir():
         return [path]
-    return sorted([*path.glob("*.mcap"), *path.glob(f"*.mcap{PART_SUFFIX}")])
+    found = [*path.glob("*.mcap"), *path.glob(f"*.mcap{PART_SUFFIX}")]
+    return sorted(found, key=lambda log: by_number(log.name))
 
 
 def looks_like_log(path: Path) -> bool:

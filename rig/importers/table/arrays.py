@@ -14,6 +14,7 @@ from rig.errors import DataError, MissingExtraError
 from rig.importers.matlab import read_variables
 from rig.importers.table.data import Layout
 from rig.importers.table.raw import Raw, Values, nested
+from rig.log.order import by_number
 
 TRIAL = "trial"
 """Column with the number of the trial, from 1."""
@@ -109,7 +110,7 @@ def _of_trials(path: Path, values: Mapping[str, Any], pattern: str) -> Raw:
             f"{path} has no variable {pattern!r}.", f"Its variables are {known}.",
             "Correct trials under [data].",
         )  # fmt: skip
-    tables = [_with_fields(_of_arrays(path, own)) for own in trials.values()]
+    tables = [_with_fields(_of_arrays(path, trials[n])) for n in sorted(trials, key=by_number)]
     shared = [n for n in tables[0] if all(n in table for table in tables)]
     if not shared:
         raise DataError(

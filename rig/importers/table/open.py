@@ -18,6 +18,7 @@ from rig.importers.table.mapping import Mapping as ColumnMapping
 from rig.importers.table.raw import Raw, Remark, to_number
 from rig.importers.table.raw import checked as with_samples
 from rig.importers.table.runs import recordings
+from rig.log.order import by_number
 
 READERS: Mapping[str, Callable[[Path, Layout], Raw]] = {
     ".csv": read_delimited,
@@ -68,7 +69,7 @@ def read_runs(path: Path, mapping: ColumnMapping, remarks: list[Remark]) -> Iter
 
 
 def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:
-    """Return the files of a table in the order of their names.
+    """Return the files of a table in the order of their names, numbers in them by value.
 
     Raises:
         UsageError: The path does not exist, or holds no such file.
@@ -79,14 +80,14 @@ def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:
         return [path]
     pattern = mapping.data.files
     if pattern:
-        found = sorted(file for file in path.glob(pattern) if file.is_file())
+        found = [file for file in path.glob(pattern) if file.is_file()]
     else:
         side = mapping.data.side_file
-        found = sorted(
+        found = [
             file
             for file in path.iterdir()
             if file.suffix.lower() in READERS and file.name != Path(side).name
-        )
+        ]
     if not found:
         raise UsageError(
             f"{path} has no file {pattern or 'of a known kind'}.",
@@ -95,7 +96,7 @@ def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:
             else f"The pattern is files, {mapping.where('files')}.",
             "Name a file, or state files in [data].",
         )
-    return found
+    return sorted(found, key=lambda file: by_number(str(file.relative_to(path))))
 
 
 def read_raw(file: Path, mapping: ColumnMapping) -> Raw:

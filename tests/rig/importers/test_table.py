@@ -10,8 +10,10 @@ from scipy.io import savemat
 
 from estimation.filters import LowPass, filter_recording
 from rig.errors import DataError
+from rig.importers.registry import open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
+from rig.log.convert import write_recording
 
 N = 100
 TIME_MS = np.arange(N) * 10.0
@@ -348,6 +350,29 @@ def test_each_trial_of_a_file_is_a_run(tmp_path, machine, kind):
         np.testing.assert_allclose(run["motor_angle_rad"], 2.0 * time_s)
     if kind == "array of structs":
         assert [run.conditions["load_mass_kg"] for run in runs] == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize("kind", ["files", "logs", "trials"])
+def test_numbers_in_the_names_of_runs_count_by_their_value(tmp_path, machine, kind):
+    numbers = [*range(1, 12)]
+    text, path = MAPPED, tmp_path / "data"
+    path.mkdir()
+    if kind == "trials":
+        text = '[data]\ntrials = "test*"\n\n[data.columns]\ntime_s = "1"\nmotor_angle_rad = "2"\n'
+        rows = {f"test{k}": np.column_stack([np.arange(4.0), np.full(4, k)]) for k in numbers}
+        path = path / "lab.mat"
+        savemat(path, dict(sorted(rows.items())))
+    else:
+        for k in numbers:
+            columns = {"t": TIME_MS.tolist(), "enc": [float(k)] * N, "i": [0.1] * N}
+            text_table(path / f"test {k}.csv", columns)
+    runs = open_table(path, machine(text))
+    if kind == "logs":
+        for run in runs:
+            write_recording(tmp_path / f"{run.name}.mcap", run)
+        runs = open_campaign(tmp_path)
+    angles = [float(run["motor_angle_rad"][0]) for run in runs]
+    assert angles == sorted(angles)
 
 
 def test_a_pattern_of_trials_that_nothing_fits_names_what_there_is(tmp_path, machine):
