@@ -1,4 +1,4 @@
-"""Import MATLAB `.mat` files of versions 5 to 7.
+"""Import MATLAB `.mat` files of versions 5 to 7.3.
 
 Mapping rules. A *run* is either the file itself, where it has a variable `time_s`, or each scalar
 struct with a field `time_s` (a table saved with `table2struct(t, 'ToScalar', true)`); a file may
@@ -38,7 +38,7 @@ class MatlabImporter:
     """Importer of MATLAB files."""
 
     name = "matlab"
-    description = "MATLAB .mat (v5 to v7): vectors or structs named as channels"
+    description = "MATLAB .mat (v5 to v7.3): vectors or structs named as channels"
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is a `.mat` file, or a folder of nothing but these.
@@ -57,7 +57,7 @@ class MatlabImporter:
         Each file is read and checked once here to find its runs, and again when a run is loaded.
 
         Raises:
-            DataError: A file is damaged, of version 7.3, or contains names that are not channels.
+            DataError: A file is damaged, or contains names that are not channels.
                 The message lists the found and the expected names.
         """
         files = _files(path)
@@ -111,10 +111,11 @@ def _contents(path: Path) -> dict[str, dict[str, Any]]:
 
 
 def read_variables(path: Path) -> dict[str, Value]:
-    """Return the variables of a MATLAB file of versions 5 to 7 by name.
+    """Return the variables of a MATLAB file by name.
 
     Raises:
-        DataError: It cannot be read, is damaged, or is of version 7.3.
+        DataError: It cannot be read, or is damaged.
+        MissingExtraError: It is of version 7.3, and the library h5py is not installed.
     """
     try:
         if path.stat().st_size > MAX_BYTES:
@@ -123,11 +124,9 @@ def read_variables(path: Path) -> dict[str, Value]:
     except OSError as error:
         raise DataError(f"{path} cannot be read: {error.strerror}.") from error
     if content.startswith(HDF5_VERSION) or content[512:520] == HDF5_SIGNATURE:
-        raise DataError(
-            f"{path} is a MATLAB file of version 7.3 (HDF5), which is not read.",
-            "Versions 5 to 7 are.",
-            "Save it again in MATLAB: save(name, '-struct', 'data', '-v7').",
-        )
+        from rig.importers.mat73 import read_mat73
+
+        return read_mat73(path)
     try:
         return read_mat5(content)
     except Mat5Error as error:

@@ -76,7 +76,8 @@ def read_mat(path: Path, layout: Layout) -> Raw:
     """Read variables of a MATLAB file; a field of a struct is called `struct.field`.
 
     Raises:
-        DataError: It is damaged, or of version 7.3.
+        DataError: It is damaged.
+        MissingExtraError: It is of version 7.3, and the library h5py is not installed.
     """
     values = nested(read_variables(path))
     arrays = {n: v for n, v in values if isinstance(v, np.ndarray | str)}

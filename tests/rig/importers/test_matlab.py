@@ -88,14 +88,6 @@ def test_names_that_cannot_be_understood_are_listed(save, variables, message):
     assert "run.mat" in error.value.what
 
 
-@pytest.mark.parametrize("header", [b"MATLAB 7.3 MAT-file, Platform: GLNXA64", b"MATLAB 7.0"])
-def test_version_7_3_reports_how_to_save_again(tmp_path, header):
-    path = tmp_path / "run.mat"
-    path.write_bytes(header.ljust(512) + b"\x89HDF\r\n\x1a\n")
-    with pytest.raises(DataError, match=r"version 7\.3.*'-v7'"):
-        IMPORTER.open(path)
-
-
 def test_a_folder_of_other_files_is_not_claimed(save, tmp_path):
     save({"time_s": TIME, "motor_current_a": CURRENT})
     assert IMPORTER.recognises(tmp_path)
