@@ -1,10 +1,12 @@
-"""How the cost of a diagnosis grows with samples and effects; `docs/figures/diagnosis_cost.py`.
+"""What a diagnosis costs, and how that grows; `docs/figures/diagnosis_cost.py`.
 
-Timed are the parts of a search: filter the runs, fit the declared equation, lay out the columns of
-every candidate, and score each on every run and condition left out. It is processor time: other
-work on the machine changes wall-clock times.
+Timed is a whole diagnosis of a campaign, and how the parts of a search grow with samples and
+effects: filter the runs, fit the declared equation, lay out the columns of every candidate, and
+score each on every run and condition left out. It is processor time: other work on the machine
+changes wall-clock times.
 """
 
+import tempfile
 import time
 from dataclasses import dataclass
 from functools import cache
@@ -14,6 +16,7 @@ import numpy as np
 
 from benchmarks.ratio import Ratio
 from estimation import model_file
+from estimation.campaign import Campaign
 from estimation.causes.candidates import every_claim, pool_of
 from estimation.causes.equations import lay_out
 from estimation.causes.folds import folds_of
@@ -21,13 +24,20 @@ from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.scoring import assessed
 from estimation.recording import Recording
+from rig.diagnosis.ledger import Ledger
+from rig.diagnosis.run import run_diagnosis
+from rig.diagnosis.subject import declared_models
 from rig.simulation.campaign import simulate_reference_campaign
+from rig.simulation.hidden import HiddenEffect
 
 SECONDS = (3.5, 7.0, 14.0)
 """Length of each run."""
 
 SHARES = (0.25, 0.5, 1.0)
 """Of the catalogue."""
+
+MOST_S = 10.0
+"""Processor time that a diagnosis of some 15 runs of 14 s may take, on one core."""
 
 TWICE = 2.5
 """Twice as much may cost so many times as much: linear, within a quarter."""
@@ -62,7 +72,31 @@ def costs_over_effects() -> list[Cost]:
 
 
 def measure() -> list[Ratio]:
-    """Return the cost ratios of twice the samples and of twice the effects."""
+    """Return the cost of a whole diagnosis, and of twice the samples and twice the effects."""
+    return [_whole(), *_twice()]
+
+
+def _whole() -> Ratio:
+    campaign = Campaign.of(
+        simulate_reference_campaign(0, "diagnosis", (HiddenEffect("motor_ripple", 1.0),)).evidence
+    )
+    models = declared_models(None, None)
+    with tempfile.TemporaryDirectory() as folder:
+        ledger = Ledger(Path(folder) / "looks.jsonl")
+        began = time.process_time()
+        answer, _ = run_diagnosis(campaign, models, ledger, quick=True)
+        seconds = time.process_time() - began
+    found = ", ".join(f.family for f in answer.diagnosis.findings) or "nothing"
+    return Ratio(
+        "10 s over the processor time of a diagnosis",
+        MOST_S / seconds,
+        1.0,
+        detail=f"{seconds:.1f} s for {len(campaign)} runs of 14 s, {len(models)} equations;"
+        f" found {found}; no next experiment",
+    )
+
+
+def _twice() -> list[Ratio]:
     named = [("samples", costs_over_samples()), ("effects", costs_over_effects())]
     return [
         Ratio(
