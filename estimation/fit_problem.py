@@ -14,7 +14,7 @@ from estimation.model import Model, Term, balance_channels, settled
 from estimation.recording import FloatArray, Recording
 from estimation.within_bounds import solve_within
 
-OFFSET = "sensor.offset"
+OFFSET, VISCOUS = "sensor.offset", "friction.viscous"
 
 NARROWEST = 1e-3
 """Speed over which friction changes its sign that is searched, of the usual most speed."""
@@ -121,21 +121,23 @@ def problem_of(model: Model, runs: list[FitRun]) -> Problem:
         free=free,
         offset=replaced,
         names=names,
-        shape_parameters=[p for term in model.terms for p in _shapes(term, runs)],
+        shape_parameters=[p for term in model.terms for p in _shapes(term, model, runs)],
         signs=np.array([float(term.sign) for term, _ in parameters]),
         lower=np.array([p.lower for _, p in parameters])[free],
         upper=np.array([p.upper for _, p in parameters])[free],
     )
 
 
-def _shapes(term: Term, runs: Sequence[FitRun]) -> list[Parameter]:
+def _shapes(term: Term, model: Model, runs: Sequence[FitRun]) -> list[Parameter]:
     """Return a term's shape parameters, a width of a change of sign within that of these runs.
 
     Where the speed never changes its sign nothing shows the width: it is then below every speed,
-    since a wider one takes the form of what friction does at speed.
+    since a wider one takes the form of what friction does at speed. In a model without viscous
+    friction that form is the width's own.
     """
     channel = term.channels.get("speed")
-    if channel is None:
+    viscous = {t.channels["speed"] for t in model.terms if t.effect.id == VISCOUS}
+    if channel is None or channel not in viscous:
         return [*term.effect.shape]
     speed = np.concatenate([run.thin[channel] for run in runs])
     least, usual = np.percentile(np.abs(speed), [1.0, 95.0]).tolist()

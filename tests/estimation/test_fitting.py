@@ -187,6 +187,17 @@ def test_the_change_of_sign_of_friction_is_narrow_next_to_the_speeds_of_the_axis
     assert values["width"] < 0.06 * speed_m_s
 
 
+def test_friction_has_the_form_of_its_change_of_sign_where_no_viscous_friction_is_declared():
+    time_s = np.arange(4000) / 500
+    position = np.cumsum(1.5 + np.sin(0.7 * 2 * np.pi * time_s)) / 500
+    force = np.tanh(np.gradient(position, time_s) / 1.2)
+    recording = Recording("x", time_s, {"stage_position_m": position, "drive_force_n": force})
+    (model,) = declared(parse(STAGE))
+    terms = tuple(term for term in model.terms if term.effect.id != "friction.viscous")
+    found = fit(replace(model, terms=terms), Campaign.of([recording]), bootstrap=0)
+    assert numbers(found)["width"] == pytest.approx(1.2, rel=0.05)
+
+
 STAGE = """
 schema = "rig.machine/1"
 [machine]
