@@ -153,7 +153,7 @@ class Data(Layout):
     Attributes:
         sample_rate_hz: Rate of the samples where no column holds their time.
         even_rate_hz: Rate of an even clock onto which the samples are interpolated, or None.
-        file_name: Regular expression of a file's name; each named group is a single value.
+        file_name: Regular expression of NAME or FOLDER/NAME; each named group is a single value.
         side_file: CSV next to the data with a column `file` and one for each single value.
         columns: Channel to its source.
         conditions: Condition to its source.

@@ -53,17 +53,24 @@ def open_table(path: Path, mapping: ColumnMapping) -> Campaign:
 def read_runs(path: Path, mapping: ColumnMapping, remarks: list[Remark]) -> Iterator[Recording]:
     """Yield the runs of a table, one file in memory at a time, without the check of derivatives.
 
+    Of files in several folders, the name of a run begins with those of its file: `monday-run1`.
+
     Args:
         path: A file, or a folder of files.
         mapping: The mapping.
         remarks: Gets a sentence on everything that was assumed, left out or filled in.
     """
     taken: set[str] = set()
-    for file in files_at(path, mapping):
+    files = files_at(path, mapping)
+    several = len({file.parent for file in files}) > 1
+    for file in files:
+        folders = file.relative_to(path).parts[:-1] if several else ()
         raw = read_raw(file, mapping)
         remarks += [(file.name, remark) for remark in raw.remarks]
         for run in recordings(to_samples(raw, mapping), mapping, remarks):
-            name = run.name if run.name not in taken else f"{run.name}{file.suffix.lower()}"
+            name = "-".join([*folders, run.name])
+            if name in taken:
+                name += file.suffix.lower()
             taken.add(name)
             yield replace(run, name=name)
 
@@ -94,7 +101,7 @@ def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:
             f"Known kinds are {', '.join(READERS)}."
             if not pattern
             else f"The pattern is files, {mapping.where('files')}.",
-            "Name a file, or state files in [data].",
+            'Name a file, or state files in [data]; of files in folders, files = "*/*.csv".',
         )
     return sorted(found, key=lambda file: by_number(str(file.relative_to(path))))
 
@@ -115,13 +122,14 @@ def read_raw(file: Path, mapping: ColumnMapping) -> Raw:
 
 
 def _named_in(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
-    """Return the named groups of a file's name."""
+    """Return the named groups of a file's name, or of that with its folder's before it."""
     pattern = mapping.data.file_name
     if not pattern:
         return {}
     where = mapping.where("file_name")
     try:
-        found = re.search(pattern, file.name)
+        names = file.name, f"{file.parent.name}/{file.name}"
+        found = next((m for name in names if (m := re.search(pattern, name))), None)
     except re.error as error:
         raise UsageError(f"{where}: {pattern!r} is not a regular expression: {error}.") from error
     if found is None:

@@ -9,7 +9,7 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from estimation.filters import LowPass, filter_recording
-from rig.errors import DataError
+from rig.errors import DataError, UsageError
 from rig.importers.registry import open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
@@ -373,6 +373,21 @@ def test_numbers_in_the_names_of_runs_count_by_their_value(tmp_path, machine, ki
         runs = open_campaign(tmp_path)
     angles = [float(run["motor_angle_rad"][0]) for run in runs]
     assert angles == sorted(angles)
+
+
+def test_files_of_one_name_in_several_folders_are_runs_of_their_own(tmp_path, machine):
+    columns = {name: values.tolist() for name, values in COLUMNS.items()}
+    for k in (1, 2, 10):
+        (tmp_path / "data" / f"run{k}").mkdir(parents=True)
+        text_table(tmp_path / "data" / f"run{k}" / "log.csv", columns)
+    text = '[data]\nfiles = "*/*.csv"\nfile_name = "run(?P<load>[0-9]+)/"\n' + MAPPED
+    text += '[data.conditions]\nload_mass_kg = "load:g"\n'
+    with pytest.raises(UsageError, match="no file of a known kind") as error:
+        open_table(tmp_path / "data", machine())
+    assert 'files = "*/*.csv"' in error.value.fix
+    runs = open_table(tmp_path / "data", machine(text))
+    assert runs.names == ("run1-log", "run2-log", "run10-log")
+    assert [run.conditions["load_mass_kg"] for run in runs] == pytest.approx([1e-3, 2e-3, 1e-2])
 
 
 def test_a_pattern_of_trials_that_nothing_fits_names_what_there_is(tmp_path, machine):
