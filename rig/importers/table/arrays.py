@@ -72,6 +72,22 @@ def read_npz(path: Path, layout: Layout) -> Raw:
     return _of_trials(path, values, layout.trials)
 
 
+def read_npy(path: Path, layout: Layout) -> Raw:
+    """Read one array of NumPy, which holds no objects; its columns have numbers, or field names.
+
+    Raises:
+        DataError: It is damaged, or holds objects.
+    """
+    try:
+        array = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise _damaged(path, "NumPy", error) from error
+    if array.dtype.names:
+        return _of_arrays(path, {name: array[name] for name in array.dtype.names})
+    columns = _of_arrays(path, {"": array if array.ndim > 1 else array[:, None]}).columns
+    return Raw(path, {name.lstrip("."): values for name, values in columns.items()})
+
+
 def read_mat(path: Path, layout: Layout) -> Raw:
     """Read variables of a MATLAB file; a field of a struct is called `struct.field`.
 

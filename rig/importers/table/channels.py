@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from rig.importers.table.formula import FormulaError, evaluate, names_in
 from rig.importers.table.mapping import Mapping
 from rig.importers.table.raw import Raw, Values
 from rig.importers.table.units import BASE, conversion
+
+DAY_S, NO_DATE = 86_400.0, date(1970, 1, 1)
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,9 @@ def _channel(
         raise DataError(
             f"{mapping.where(*path)}: column {source.column!r} of {raw.path.name} is not numbers:"
             f" {bad_cell(raw, source.column) if source.column in raw.columns else found[0]}.",
-            fix="Correct the file, or map another column.",
+            fix=f"Write {name} = '{source.column}:{DATE}'."
+            if name == TIME and _date(str(found[0])) is not None
+            else "Correct the file, or map another column.",
         )
     values = _in_si(raw, mapping, path, name, source, found.astype(np.float64))
     if not np.isfinite(values).any():
@@ -192,21 +196,33 @@ def _condition(raw: Raw, mapping: Mapping, name: str, source: Source) -> float |
     return str(many[0]) if many.dtype.kind in "US" else float(many[0])
 
 
-def _dates(raw: Raw, mapping: Mapping, source: Source) -> tuple[FloatArray, int]:
+def _dates(raw: Raw, mapping: Mapping, source: Source) -> tuple[FloatArray, int | None]:
     cells = find(raw, mapping, ("columns", TIME), source.column)
     assert isinstance(cells, np.ndarray)  # noqa: S101  a single value has no clock
     at = []
     for index, cell in enumerate(cells):
-        try:
-            date = datetime.fromisoformat(str(cell))
-        except ValueError as error:
+        found = _date(str(cell))
+        if found is None:
             raise DataError(
                 f"{raw.path}, {raw.row(index)}: {str(cell)!r} is not a date.",
                 "The time is mapped with the unit iso8601, such as 2024-05-01T12:00:00.25.",
-            ) from error
-        at.append(date if date.tzinfo else date.replace(tzinfo=UTC))
-    since = [(date - at[0]).total_seconds() for date in at]
-    return np.array(since), round(at[0].timestamp() * 1e6) * 1000
+            )
+        at.append(found)
+    since = np.array([(one - at[0]).total_seconds() for one in at])
+    if at[0].date() == NO_DATE:  # a time of the day alone: a run may go past midnight
+        return since + DAY_S * np.cumsum(np.diff(since, prepend=0.0) < -0.5 * DAY_S), None
+    return since, round(at[0].timestamp() * 1e6) * 1000
+
+
+def _date(cell: str) -> datetime | None:
+    """Return a date, or a time of the day on the date of none; None for anything else."""
+    for text in (cell, f"{NO_DATE}T{cell}"):
+        try:
+            found = datetime.fromisoformat(text)
+        except ValueError:
+            continue
+        return found if found.tzinfo else found.replace(tzinfo=UTC)
+    return None
 
 
 def _in_order(mapping: Mapping) -> list[tuple[str, str]]:

@@ -1,6 +1,8 @@
 """Text tables: CSV, TSV and other separators."""
 
 import csv
+import gzip
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +10,12 @@ import numpy as np
 from rig.errors import DataError
 from rig.importers.table.data import Layout
 from rig.importers.table.raw import Raw, numbers_or_text, to_number
+
+COMPRESSED = b"\x1f\x8b"
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+MAX_BYTES = 1 << 31
+MARKS = ("#", "%")
+"""What lines before a head begin with, where no comment sign is stated."""
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "space"}
 TRUTHS = {"true": "1", "false": "0"}
@@ -28,9 +36,15 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
     start = layout.skip_lines
     while start < len(lines) and _is_blank(lines[start], layout.comment):
         start += 1
+    if start < len(lines) and lines[start].startswith("sep=") and len(lines[start]) == 5:
+        sign = layout.separator or lines[start][4]  # stated by a spreadsheet
+        layout = layout.model_copy(update={"separator": sign})
+        start += 1
+    start, remarks = _after_notes(path, lines, start, layout)
     if start >= len(lines):
         raise DataError(f"{path} has no rows.", fix="Name a file with a head and samples.")
-    separator, remarks = _separator(path, lines[start], layout)
+    separator, more = _separator(path, lines[start], layout)
+    remarks += more
     try:
         rows = [
             (number, cells)
@@ -68,9 +82,13 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
 
 def _text(path: Path) -> str:
     content = path.read_bytes()
+    if content.startswith(COMPRESSED):
+        content = _inflated(path)
     if not content.strip():
         raise DataError(f"{path} is empty.", fix="Name a file with a head and samples.")
     try:
+        if content.startswith(UTF_16):
+            return content.decode("utf-16")
         if b"\0" in content[:4096]:
             raise ValueError
         return content.decode("utf-8-sig")
@@ -83,8 +101,46 @@ def _text(path: Path) -> str:
     raise DataError(
         f"{path} is not a text table.",
         f"It begins with the bytes {content[:8]!r}.",
-        "Name a CSV, TSV, Parquet, .mat, .npz or JSON file.",
+        "Name a CSV, TSV, Parquet, .mat, .npy, .npz or JSON file.",
     )
+
+
+def _inflated(path: Path) -> bytes:
+    try:
+        with gzip.open(path) as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise DataError(f"{path} cannot be decompressed: {error}.") from error
+    if len(content) > MAX_BYTES:
+        raise DataError(f"{path} has more than {MAX_BYTES >> 30} GB when it is decompressed.")
+    return content
+
+
+def _after_notes(path: Path, lines: list[str], start: int, layout: Layout) -> tuple[int, list[str]]:
+    """Return the line of the head, below lines that begin with a mark, and remarks on these.
+
+    The last of them is the head where it has as many fields as the samples, with the mark or
+    without it.
+    """
+    below = start
+    while below < len(lines) and (not lines[below].strip() or lines[below].startswith(MARKS)):
+        below += 1
+    if below in (start, len(lines)) or layout.comment or layout.header is not None:
+        return start, []
+    separator = _separator(path, lines[below], layout)[0]
+    last = max(k for k in range(start, below) if lines[k].strip())
+    count, head = len(_fields(lines[below], separator)), lines[last]
+    left_out = "lines that begin with # or % are left out"
+    if len(_fields(head, separator)) == count:
+        return last, [left_out] if last > start else []
+    if len(_fields(head.lstrip("".join(MARKS)), separator)) == count:
+        lines[last] = head.lstrip("".join(MARKS)).lstrip()
+        return last, [f"line {last + 1} is the head"]
+    return below, [left_out]
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    return line.split() if separator == " " else next(csv.reader([line], delimiter=separator))
 
 
 def _is_blank(line: str, comment: str) -> bool:

@@ -9,7 +9,7 @@ from estimation.campaign import Campaign
 from estimation.recording import Recording
 from rig.errors import DataError, UsageError
 from rig.importers.derivatives import checked
-from rig.importers.table.arrays import read_mat, read_npz, read_parquet
+from rig.importers.table.arrays import read_mat, read_npy, read_npz, read_parquet
 from rig.importers.table.channels import to_samples
 from rig.importers.table.data import Layout
 from rig.importers.table.delimited import read_delimited
@@ -25,9 +25,11 @@ READERS: Mapping[str, Callable[[Path, Layout], Raw]] = {
     ".tsv": read_delimited,
     ".txt": read_delimited,
     ".dat": read_delimited,
+    ".gz": read_delimited,
     ".parquet": read_parquet,
     ".mat": read_mat,
     ".npz": read_npz,
+    ".npy": read_npy,
     ".json": read_json,
     ".jsonl": read_json,
     ".ndjson": read_json,

@@ -1,5 +1,6 @@
 """Tables of any layout: what is mapped arrives in SI units, cut into runs, with its conditions."""
 
+import gzip
 import json
 
 import numpy as np
@@ -350,6 +351,59 @@ def test_each_trial_of_a_file_is_a_run(tmp_path, machine, kind):
         np.testing.assert_allclose(run["motor_angle_rad"], 2.0 * time_s)
     if kind == "array of structs":
         assert [run.conditions["load_mass_kg"] for run in runs] == [0.0, 1.0, 2.0]
+
+
+TEXT = "t,enc,i\n0,0,100\n10,45,200\n20,90,300\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("utf-16", TEXT.encode("utf-16")),
+        ("a spreadsheet's sign", ("sep=;\n" + TEXT.replace(",", ";")).encode()),
+        ("notes", ("# log of a bench\n% 3 samples\n" + TEXT).encode()),
+        ("notes and a head", ("# log of a bench\n# " + TEXT.replace(",", " ")).encode()),
+        ("compressed", gzip.compress(TEXT.encode())),
+    ],
+)
+def test_a_text_table_of_another_writer_is_read(tmp_path, machine, name, content):
+    path = tmp_path / ("run.csv.gz" if name == "compressed" else "run.csv")
+    path.write_bytes(content)
+    (run,) = open_table(path, machine())
+    np.testing.assert_allclose(run.time_s, [0.0, 0.01, 0.02])
+    np.testing.assert_allclose(run["motor_current_a"], [0.1, 0.2, 0.3])
+
+
+def test_a_head_whose_first_name_begins_with_a_mark_keeps_it(tmp_path, machine):
+    (tmp_path / "run.csv").write_text(TEXT.replace("t,", "%time,"))
+    (run,) = open_table(tmp_path / "run.csv", machine(MAPPED.replace('"t:ms"', '"%time:ms"')))
+    assert len(run.time_s) == 3
+
+
+@pytest.mark.parametrize("kind", ["matrix", "fields"])
+def test_one_array_of_numpy_is_a_table(tmp_path, machine, kind):
+    rows = np.column_stack([*COLUMNS.values()])
+    text = MAPPED
+    if kind == "fields":
+        rows = np.array([(*row,) for row in rows], dtype=[(name, float) for name in COLUMNS])
+    else:
+        for k, name in enumerate(COLUMNS):
+            text = text.replace(f'"{name}:', f'"{k + 1}:')
+    np.save(tmp_path / "run.npy", rows)
+    (run,) = open_table(tmp_path / "run.npy", machine(text))
+    np.testing.assert_allclose(run["motor_current_a"], CURRENT_MA / 1000)
+
+
+def test_a_time_of_the_day_is_a_clock_that_may_pass_midnight(tmp_path, machine):
+    at = "23:59:59.500", "23:59:59.750", "00:00:00.000"
+    rows = "".join(f"{t},{k},{k}\n" for k, t in enumerate(at))
+    (tmp_path / "run.csv").write_text("t,enc,i\n" + rows)
+    (run,) = open_table(tmp_path / "run.csv", machine(MAPPED.replace("t:ms", "t:iso8601")))
+    np.testing.assert_allclose(run.time_s, [0.0, 0.25, 0.5])
+    assert run.started_at_ns is None
+    with pytest.raises(DataError) as error:
+        open_table(tmp_path / "run.csv", machine())
+    assert error.value.fix == "Write time_s = 't:iso8601'."
 
 
 @pytest.mark.parametrize("kind", ["files", "logs", "trials"])

@@ -1,5 +1,6 @@
 """Bad mappings and bad files: one sentence with the line of the file, and what to write instead."""
 
+import gzip
 import json
 import re
 
@@ -149,3 +150,8 @@ def test_a_velocity_that_contradicts_its_angle(refused):
     said = refused("time,angle,speed\n" + "\n".join(rows) + "\n", mapping=mapping)
     assert "motor_angle_rad changes" in said
     assert "motor_velocity_rad_s" in said
+
+
+def test_a_compressed_table_that_is_cut_is_refused(refused):
+    cut = gzip.compress(TABLE.encode())[:-9]
+    assert "cannot be decompressed" in refused(cut, name="run.csv.gz")
