@@ -20,6 +20,10 @@ NARROWEST = 1e-3
 """Speed over which friction changes its sign that is searched, of the usual most speed."""
 
 
+MANY_FLAGGED = 0.1
+"""Share of flagged samples in a run from which they may be why none counts."""
+
+
 class FitError(EstimationError):
     """The model's parameters are not identifiable from the campaign."""
 
@@ -99,11 +103,15 @@ def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list
         if places.size:
             runs.append(FitRun(whole, places, whole.at(places)))
     if not runs:
+        flagged = [1.0 - float(recording.valid.mean()) for recording in campaign.evidence]
         raise FitError(
             f"No valid samples to fit model {model.name!r}.",
-            f"{len(campaign)} runs, {len(campaign.evidence)} of them not excluded; static samples"
-            " do not count where friction is fitted.",
-            "Record runs in which the rig moves.",
+            f"{len(campaign)} runs, {len(campaign.evidence)} of them not excluded, with"
+            f" {float(np.mean(flagged or [0.0])):.0%} of their samples flagged; static samples do"
+            " not count where friction is fitted, nor those near flagged ones.",
+            "Record runs in which the rig moves."
+            if max(flagged, default=0.0) < MANY_FLAGGED
+            else "Look at why samples are flagged: rig import DATA --machine FILE --preview.",
         )
     return runs
 

@@ -1,6 +1,8 @@
 """From the columns of a file to channels and conditions in SI units."""
 
+import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
@@ -14,7 +16,10 @@ from rig.importers.table.delimited import bad_cell
 from rig.importers.table.formula import FormulaError, evaluate, names_in
 from rig.importers.table.mapping import Mapping
 from rig.importers.table.raw import Raw, Values
-from rig.importers.table.units import BASE, conversion
+from rig.importers.table.units import BASE, NotAUnitError, conversion
+
+IN_NAME = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
+"""A unit at the end of a column's name: `speed (rpm)`, `q [deg]`."""
 
 DAY_S, NO_DATE = 86_400.0, date(1970, 1, 1)
 
@@ -168,9 +173,31 @@ def _in_si(
     if source.sign_bit is not None:
         values = np.where(values >= source.sign_bit, source.sign_bit - values, values)
     unit = conversion(source.unit, name) if source.unit else None
+    if unit is None and gain == 1.0:
+        _check_name(mapping, path, name, source.column)
     if unit is None:
         return np.asarray(gain * (values - source.zero))
     return np.asarray(unit.factor * gain * (values - source.zero) + unit.shift)
+
+
+def _check_name(mapping: Mapping, path: tuple[str, str], name: str, column: str) -> None:
+    """Refuse a column whose name states another unit than the channel's, where none is stated."""
+    found = IN_NAME.search(column)
+    if found is None:
+        return
+    for stated in (found[1], found[1].lower()):
+        with suppress(NotAUnitError, UnknownUnitError, DataError):
+            unit = conversion(stated, name)
+            if unit is not None and (unit.factor, unit.shift) != (1.0, 0.0):
+                break
+    else:
+        return
+    raise DataError(
+        f"{mapping.where(*path)}: the name of the column {column!r} states {found[1]}, and the"
+        f" mapping states no unit for {name}.",
+        "Without one, values are taken as SI units.",
+        f"Write {name} = '{column}:{stated}'; if they are in SI units, that unit in its place.",
+    )
 
 
 def _condition(raw: Raw, mapping: Mapping, name: str, source: Source) -> float | str | Values:

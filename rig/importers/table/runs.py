@@ -15,6 +15,9 @@ from rig.importers.table.formula import FormulaError, evaluate
 from rig.importers.table.mapping import Mapping
 from rig.importers.table.raw import Remark
 
+SPARSE = 0.1
+"""Share of samples with an empty cell from which the rate of a channel may be the reason."""
+
 KEPT_OF_A_LAP = 0.5
 """A last lap that is shorter is left out where no shortest run is stated."""
 
@@ -108,6 +111,7 @@ def _run(
         for key, value in samples.conditions.items()
     }
     empty = ~np.all([np.isfinite(values) for values in channels.values()], axis=0)
+    interpolated = mapping.data.even_rate_hz is not None  # each channel from its own samples
     start_ns = samples.started_at_ns
     if start_ns is not None:
         start_ns += round(float(time_s[0] - samples.time_s[0]) * 1e9)
@@ -116,7 +120,7 @@ def _run(
             name=name,
             time_s=time_s - time_s[0],
             columns=channels,
-            flags=np.where(empty, np.uint8(Flag.MISSING), np.uint8(0)),
+            flags=np.where(empty & ~interpolated, np.uint8(Flag.MISSING), np.uint8(0)),
             conditions=conditions,
             rig=mapping.name,
             started_at_ns=start_ns,
@@ -125,9 +129,23 @@ def _run(
     except RecordingError as error:
         raise DataError(f"{samples.raw.path}: {error.what}", error.why, error.fix) from error
     if empty.any():
-        remarks.append((name, f"{int(empty.sum())} samples with an empty cell flagged"))
+        remarks.append((name, _emptiness(time_s, channels, empty, interpolated)))
     run = _without_invalid(run, mapping)
     return _even(run, mapping)
+
+
+def _emptiness(
+    time_s: FloatArray, channels: dict[str, FloatArray], empty: NDArray[np.bool_], filled: bool
+) -> str:
+    """Return a remark on the samples with an empty cell."""
+    if filled:
+        return f"{int(empty.sum())} samples have an empty cell; each channel is interpolated"
+    remark = f"{int(empty.sum())} samples with an empty cell flagged"
+    fewest = min(int(np.isfinite(values).sum()) for values in channels.values())
+    if empty.mean() < SPARSE or fewest < 2:
+        return remark
+    rate_hz = fewest / float(time_s[-1] - time_s[0])
+    return f"{remark}; where a channel has a lower rate, even_rate_hz = {rate_hz:.3g} interpolates"
 
 
 def _is_twice(time_s: FloatArray, channels: dict[str, FloatArray]) -> NDArray[np.bool_]:
@@ -203,15 +221,29 @@ def _without_invalid(run: Recording, mapping: Mapping) -> Recording:
 
 
 def _even(run: Recording, mapping: Mapping) -> Recording:
-    """Interpolate a run onto an even clock; a sample next to a flagged one is flagged."""
+    """Interpolate a run onto an even clock, each channel from the samples that it has.
+
+    A sample next to a flagged one, or in a gap of three usual steps of a channel, is flagged.
+    """
     rate_hz = mapping.data.even_rate_hz
     if rate_hz is None:
         return run
     count = int(np.floor(run.duration_s * rate_hz * (1 + 1e-12))) + 1
     time_s = np.arange(count) / rate_hz
     after = np.clip(np.searchsorted(run.time_s, time_s), 0, len(run) - 1)
-    before = np.clip(after - 1, 0, None)
-    wide = run.time_s[after] - run.time_s[before] > 3.0 * max(1 / rate_hz, 1 / run.sample_rate_hz)
-    flags = run.flags[after] | run.flags[before] | np.where(wide, np.uint8(Flag.MISSING), 0)
-    columns = {name: np.interp(time_s, run.time_s, values) for name, values in run.columns.items()}
+    flags = run.flags[after] | run.flags[np.clip(after - 1, 0, None)]
+    columns = {}
+    for name, values in run.columns.items():
+        known = np.isfinite(values)
+        if known.sum() < 2:
+            columns[name] = np.full(count, np.nan)
+            flags |= np.uint8(Flag.MISSING)
+            continue
+        at_s = run.time_s[known]
+        columns[name] = np.interp(time_s, at_s, values[known])
+        place = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
+        apart = at_s[place] - at_s[place - 1]
+        beyond = np.maximum(at_s[0] - time_s, time_s - at_s[-1])
+        usual = max(1 / rate_hz, float(np.median(np.diff(at_s))))
+        flags |= np.where((apart > 3.0 * usual) | (beyond > usual), np.uint8(Flag.MISSING), 0)
     return replace(run, time_s=time_s, columns=columns, flags=flags.astype(np.uint8))

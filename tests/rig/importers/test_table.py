@@ -306,6 +306,23 @@ def test_conditions_come_from_columns_names_of_files_and_a_side_file(tmp_path, m
     assert second.conditions["load_mass_kg"] == pytest.approx(0.2)
 
 
+def test_channels_of_two_rates_in_one_table_are_each_interpolated(tmp_path, machine):
+    time = np.arange(200) / 100
+    rows = "".join(
+        f"{t * 1000},{90 * t},{100 * t if k % 5 == 0 else ''}\n" for k, t in enumerate(time)
+    )
+    (tmp_path / "run.csv").write_text("t,enc,i\n" + rows)
+    remarks = []
+    list(read_runs(tmp_path / "run.csv", machine(), remarks))
+    assert "160 samples with an empty cell flagged" in remarks[-1][1]
+    assert "even_rate_hz = 20.1 interpolates" in remarks[-1][1]
+    (run,) = open_table(tmp_path / "run.csv", machine("[data]\neven_rate_hz = 50\n" + MAPPED))
+    inside = run.time_s <= 1.95
+    assert not run.flags[inside].any()
+    np.testing.assert_allclose(run["motor_current_a"][inside], 0.1 * run.time_s[inside], atol=1e-9)
+    np.testing.assert_allclose(run["motor_angle_rad"], np.radians(90 * run.time_s), atol=1e-9)
+
+
 def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path, machine):
     path = tmp_path / "run.csv"
     time_s = np.cumsum(np.random.default_rng(0).uniform(0.008, 0.012, 300))

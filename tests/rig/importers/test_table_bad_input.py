@@ -152,6 +152,25 @@ def test_a_velocity_that_contradicts_its_angle(refused):
     assert "motor_velocity_rad_s" in said
 
 
+@pytest.mark.parametrize("column", ["q [deg]", "angle (DEG)"])
+def test_a_unit_in_the_name_of_a_column_is_not_passed_over(refused, tmp_path, column):
+    table, mapping = TABLE.replace("angle", column), GOOD.replace("angle:deg", column)
+    said = refused(table, mapping)
+    assert f"the name of the column {column!r} states" in said
+    assert f"Write motor_angle_rad = '{column}:deg'" in said
+    (tmp_path / "bench.toml").write_text(mapping.replace(column, f"{column}:rad"))
+    (run,) = open_table(tmp_path / "run.csv", read_mapping(tmp_path / "bench.toml", []))
+    assert run["motor_angle_rad"][-1] == 19.0
+
+
+@pytest.mark.parametrize("column", ["angle (rad)", "angle (raw)", "angle (mm)", "angle (left)"])
+def test_a_name_that_states_no_other_unit_is_read_as_si(tmp_path, column):
+    (tmp_path / "run.csv").write_text(TABLE.replace("angle", column))
+    (tmp_path / "bench.toml").write_text(GOOD.replace("angle:deg", column))
+    (run,) = open_table(tmp_path / "run.csv", read_mapping(tmp_path / "bench.toml", []))
+    assert run["motor_angle_rad"][-1] == 19.0
+
+
 def test_a_compressed_table_that_is_cut_is_refused(refused):
     cut = gzip.compress(TABLE.encode())[:-9]
     assert "cannot be decompressed" in refused(cut, name="run.csv.gz")
