@@ -152,7 +152,7 @@ class Data(Layout):
 
     Attributes:
         sample_rate_hz: Rate of the samples where no column holds their time.
-        even_rate_hz: Rate of an even clock onto which the samples are interpolated, or None.
+        even_rate_hz: Rate of an even clock onto which each channel is interpolated, or None.
         file_name: Regular expression of NAME or FOLDER/NAME; each named group is a single value.
         side_file: CSV next to the data with a column `file` and one for each single value.
         columns: Channel to its source.
