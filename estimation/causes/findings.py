@@ -186,8 +186,9 @@ def _variables(candidate: Candidate) -> tuple[str, ...]:
     ]
     if cause.family == "friction.dwell":
         found = ["dwell" if v == "time" else v for v in found]
-    signed = cause.family.startswith("friction.") and not cause.family.endswith(
-        ("viscous_asymmetry", "drag", "stribeck", "load_viscous")
+    effect = cause.family if cause.is_declared else cause.effect.id
+    signed = cause.family.startswith("friction.") and not effect.endswith(
+        ("viscous_asymmetry", "drag", "stribeck", "load_viscous", "warmup.viscous")
     )
     if signed:
         found = ["velocity_sign" if v == "velocity" else v for v in found]

@@ -1,4 +1,4 @@
-"""Warm-up friction: friction that changes exponentially with time within a run."""
+"""Warm-up friction: friction that changes as the machine warms, over time or measured."""
 
 from typing import ClassVar
 
@@ -109,3 +109,28 @@ class MeasuredWarmup(Pointwise):
         """Return one value or one array per amplitude."""
         colder = REFERENCE_K - inputs["temperature"]
         return (colder * np.tanh(inputs["speed"] / shape[0]),)
+
+
+class ViscousWarmup(Pointwise):
+    """Viscous friction that decreases with a measured temperature, as the viscosity of grease does.
+
+    Equation: torque = D (298.15 K - temperature) speed. D in N m s/rad/K, temperature in K.
+
+    Check: compare a cold run with the same run when the machine is warm.
+
+    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010 (friction of a robot joint as
+    it warms), to first order in temperature.
+    """
+
+    id = "friction.warmup.viscous"
+    family = "friction.warmup"
+    balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
+    roles: ClassVar = {"speed": "motor_velocity_rad_s", "temperature": "motor_temperature_k"}
+    amplitudes = (
+        Parameter("damping", "target / speed / temperature", "fall of the damping per kelvin"),
+    )
+    told_apart_by = "the same run when the machine is cold and when it is warm"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        return ((REFERENCE_K - inputs["temperature"]) * inputs["speed"],)

@@ -216,15 +216,15 @@ def _trial(
     return np.column_stack([np.full(len(turn), k), time_s, *counts, *read])
 
 
-def warming_table(file: Path, runs: int = 10, seed: int = 1) -> None:
+def warming_table(file: Path, viscous: bool = False, runs: int = 10, seed: int = 1) -> None:
     """Write a table of an axis whose friction falls with a temperature, in the last column, °C."""
     random = np.random.default_rng(seed)
     time_s = np.arange(0.0, 4.0 * runs, 2e-3)
     position = 0.15 * np.sin(2 * np.pi * time_s / 4.0) + 0.03 * np.sin(2.7 * time_s)
     speed = np.gradient(position, time_s)
     warmth = 25.0 + 6.0 * random.permutation(runs)[(time_s // 4.0).astype(int)] / runs
-    pwm = 0.01 * np.gradient(speed, time_s) + 0.2 * speed
-    pwm += (0.05 - 0.003 * (warmth - 25.0)) * np.tanh(speed / 2e-3)
+    pwm = 0.01 * np.gradient(speed, time_s) + 0.2 * speed + 0.05 * np.tanh(speed / 2e-3)
+    pwm -= (warmth - 25.0) * (0.015 * speed if viscous else 0.003 * np.tanh(speed / 2e-3))
     pwm += random.normal(0.0, 1e-3, time_s.size)
     read = np.round(position * 20000) / 20000
     warmth = warmth + random.normal(0.0, 0.05, time_s.size)
