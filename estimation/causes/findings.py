@@ -186,11 +186,10 @@ def _variables(candidate: Candidate) -> tuple[str, ...]:
     ]
     if cause.family == "friction.dwell":
         found = ["dwell" if v == "time" else v for v in found]
-    effect = cause.family if cause.is_declared else cause.effect.id
-    signed = cause.family.startswith("friction.") and not effect.endswith(
-        ("viscous_asymmetry", "drag", "stribeck", "load_viscous", "warmup.viscous")
+    follows_speed = cause.effect.id == "friction.warmup.viscous" or cause.family.endswith(
+        ("viscous_asymmetry", "drag", "stribeck", "load_viscous")
     )
-    if signed:
+    if cause.family.startswith("friction.") and not follows_speed:
         found = ["velocity_sign" if v == "velocity" else v for v in found]
     return tuple(dict.fromkeys(found))
 

@@ -100,7 +100,7 @@ class MeasuredWarmup(Pointwise):
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "temperature": "motor_temperature_k"}
     amplitudes = (Parameter("friction", "target / temperature", "fall of the loss per kelvin"),)
-    shape = (
+    shape: ClassVar[tuple[Parameter, ...]] = (
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=6),
     )
     told_apart_by = "the same run when the machine is cold and when it is warm"
@@ -111,7 +111,7 @@ class MeasuredWarmup(Pointwise):
         return (colder * np.tanh(inputs["speed"] / shape[0]),)
 
 
-class ViscousWarmup(Pointwise):
+class ViscousWarmup(MeasuredWarmup):
     """Viscous friction that decreases with a measured temperature, as the viscosity of grease does.
 
     Equation: torque = D (298.15 K - temperature) speed. D in N m s/rad/K, temperature in K.
@@ -123,13 +123,10 @@ class ViscousWarmup(Pointwise):
     """
 
     id = "friction.warmup.viscous"
-    family = "friction.warmup"
-    balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
-    roles: ClassVar = {"speed": "motor_velocity_rad_s", "temperature": "motor_temperature_k"}
     amplitudes = (
         Parameter("damping", "target / speed / temperature", "fall of the damping per kelvin"),
     )
-    told_apart_by = "the same run when the machine is cold and when it is warm"
+    shape = ()
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""

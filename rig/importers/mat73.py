@@ -54,8 +54,10 @@ def _value(item: Any, depth: int) -> Value:
         return Unread("sparse")
     if hasattr(item, "keys"):
         return _several(item, depth) if _is_array(item) else _fields(item, depth + 1)
-    if kind in ("function_handle", "object") or item.dtype.kind in "cV":
-        return Unread(kind if item.dtype.kind not in "cV" else "complex")
+    if item.dtype.kind in "cV":
+        return Unread("complex")
+    if kind in ("function_handle", "object"):
+        return Unread(kind)
     if item.attrs.get("MATLAB_empty", 0):
         return "" if kind == "char" else np.empty(0)
     if item.size * item.dtype.itemsize > MAX_INFLATED_BYTES:
@@ -67,7 +69,7 @@ def _value(item: Any, depth: int) -> Value:
     if kind == "char":
         if values.shape[-1:] != (1,) and values.ndim > 1:
             return Unread("text of several rows")
-        return bytes(values.astype("<u2").tobytes()).decode("utf-16-le")
+        return str(values.astype("<u2").tobytes(), "utf-16-le")
     return np.asarray(values.T.squeeze())
 
 

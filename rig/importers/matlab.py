@@ -120,10 +120,13 @@ def read_variables(path: Path) -> dict[str, Value]:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise DataError(f"{path} has more than {MAX_BYTES >> 30} GB.")
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            head = file.read(512 + len(HDF5_SIGNATURE))
+            is_hdf5 = head.startswith(HDF5_VERSION) or head[512:] == HDF5_SIGNATURE
+            content = b"" if is_hdf5 else head + file.read()
     except OSError as error:
         raise DataError(f"{path} cannot be read: {error.strerror}.") from error
-    if content.startswith(HDF5_VERSION) or content[512:520] == HDF5_SIGNATURE:
+    if is_hdf5:
         from rig.importers.mat73 import read_mat73
 
         return read_mat73(path)

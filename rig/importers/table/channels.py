@@ -186,7 +186,7 @@ def _check_name(mapping: Mapping, path: tuple[str, str], name: str, column: str)
     if found is None:
         return
     for stated in (found[1], found[1].lower()):
-        with suppress(NotAUnitError, UnknownUnitError, DataError):
+        with suppress(NotAUnitError, UnknownUnitError):
             unit = conversion(stated, name)
             if unit is not None and (unit.factor, unit.shift) != (1.0, 0.0):
                 break

@@ -129,18 +129,18 @@ def _after_notes(path: Path, lines: list[str], start: int, layout: Layout) -> tu
         return start, []
     separator = _separator(path, lines[below], layout)[0]
     last = max(k for k in range(start, below) if lines[k].strip())
-    count, head = len(_fields(lines[below], separator)), lines[last]
+    bare = lines[last].lstrip("".join(MARKS)).lstrip()
+    as_it_is, without_mark, wanted = (
+        len(_cells([line], 0, separator, "")[0][1]) if line else 0
+        for line in (lines[last], bare, lines[below])
+    )
     left_out = "lines that begin with # or % are left out"
-    if len(_fields(head, separator)) == count:
+    if as_it_is == wanted:
         return last, [left_out] if last > start else []
-    if len(_fields(head.lstrip("".join(MARKS)), separator)) == count:
-        lines[last] = head.lstrip("".join(MARKS)).lstrip()
+    if without_mark == wanted:
+        lines[last] = bare
         return last, [f"line {last + 1} is the head"]
     return below, [left_out]
-
-
-def _fields(line: str, separator: str) -> list[str]:
-    return line.split() if separator == " " else next(csv.reader([line], delimiter=separator))
 
 
 def _is_blank(line: str, comment: str) -> bool:

@@ -120,7 +120,7 @@ def _run(
             name=name,
             time_s=time_s - time_s[0],
             columns=channels,
-            flags=np.where(empty & ~interpolated, np.uint8(Flag.MISSING), np.uint8(0)),
+            flags=np.where(empty, np.uint8(0 if interpolated else Flag.MISSING), np.uint8(0)),
             conditions=conditions,
             rig=mapping.name,
             started_at_ns=start_ns,
