@@ -11,6 +11,9 @@ from estimation.plant import Actuator, Axis, Plant, PlantError, Reads, Sensor, T
 from estimation.toml_table import value_text
 from rig.errors import UsageError
 
+MOST_REMARK = 100
+"""Characters of a remark on a column."""
+
 PARTS = {
     "axis": ("NAME:rad or NAME:m", ""),
     "transmission": ("INPUT:OUTPUT:RATIO", ""),
@@ -117,11 +120,19 @@ def data_text(table: Path, plant: Plant) -> str:
     mapping = Mapping(Data())
     raw = read_raw(files_at(table, mapping)[0], mapping)
     channels = [*(a.name for a in plant.actuators), *(s.name for s in plant.sensors)]
-    lines = ["", f"# Columns of {table.name}: {', '.join(raw.columns)}", "[data]", ""]
-    lines += ["[data.columns]"]
+    lines = ["", f"# Columns of {table.name}, with the first sample:"]
+    lines += [f"#   {_line(name, x[0])}" for name, x in raw.columns.items() if len(x)]
+    lines += [f"# Single value {_line(name, value)}" for name, value in raw.fields.items()]
+    lines += [f"# Remark: {remark}." for remark in raw.remarks]
+    lines += ["[data]", "", "[data.columns]"]
     for channel in ("time_s", *channels):
         if channel in raw.columns:
             lines.append(f"{channel} = {value_text(channel)}")
         else:
             lines.append(f'# {channel} = "COLUMN:UNIT"')
     return "\n".join(lines) + "\n"
+
+
+def _line(name: str, value: object) -> str:
+    """Return a name and a value as one line of a remark."""
+    return " ".join(f"{name}: {value}".split())[:MOST_REMARK]

@@ -186,7 +186,7 @@ def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_te
     words = ["--axis", "carriage:m", "--actuator", "carriage:drive_force_n"]
     words += ["--sensor", "carriage:carriage_position_m", "--from", str(table)]
     assert main(["machine", "new", str(out), *words]) == 0
-    assert "# Columns of slide.csv: t, x, volts" in out.read_text()
+    assert "# Columns of slide.csv, with the first sample:\n#   t: " in out.read_text()
     text = out.read_text()
     for name, column in (
         ("time_s", "t"),

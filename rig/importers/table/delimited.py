@@ -17,6 +17,9 @@ MAX_BYTES = 1 << 31
 MARKS = ("#", "%")
 """What lines before a head begin with, where no comment sign is stated."""
 
+LEAST_LINES, MOST_NOTES = 4, 200
+"""Lines from which notes above a head are distinguished from samples, and the most notes."""
+
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "space"}
 TRUTHS = {"true": "1", "false": "0"}
 
@@ -41,6 +44,8 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
         layout = layout.model_copy(update={"separator": sign})
         start += 1
     start, remarks = _after_notes(path, lines, start, layout)
+    start, more = _above_samples(path, lines, start, layout)
+    remarks += more
     if start >= len(lines):
         raise DataError(f"{path} has no rows.", fix="Name a file with a head and samples.")
     separator, more = _separator(path, lines[start], layout)
@@ -141,6 +146,49 @@ def _after_notes(path: Path, lines: list[str], start: int, layout: Layout) -> tu
         lines[last] = bare
         return last, [f"line {last + 1} is the head"]
     return below, [left_out]
+
+
+def _above_samples(
+    path: Path, lines: list[str], start: int, layout: Layout
+) -> tuple[int, list[str]]:
+    """Return the line of the head, directly above the samples, and remarks on what is above it.
+
+    The samples are the lines with as many fields as the last one, and a number or nothing where
+    that has a number. A table whose first line has as many fields has its head there.
+    """
+    own = [k for k in range(start, len(lines)) if not _is_blank(lines[k], layout.comment)]
+    if layout.skip_lines or layout.header is not None or len(own) < LEAST_LINES:
+        return start, []
+    last = lines[own[-2]]  # the very last one may be cut off
+    separator = _separator(path, last, layout)[0]
+    decimal = layout.decimal or _decimal([(0, [""]), *_cells([last], 0, separator, "")], separator)
+
+    def cells_of(k: int) -> list[str]:
+        return _cells([lines[k]], 0, separator, "")[0][1]
+
+    width = len(cells_of(own[-2]))
+    held = [c for c, x in enumerate(cells_of(own[-2])) if _is_number(x, decimal)]
+    if width < 2 or not held or len(cells_of(own[0])) == width:
+        return start, []
+
+    def has_names(k: int, in_all: bool) -> bool:
+        cells = cells_of(k)
+        named = [bool(cells[c].strip()) for c in held if len(cells) == width]
+        numbers = any(_is_number(cells[c], decimal) for c in held if len(cells) == width)
+        return any(named) and not numbers and (all(named) or not in_all)
+
+    def is_sample(k: int) -> bool:
+        cells = cells_of(k)
+        read = [_is_number(cells[c], decimal) for c in held if len(cells) == width]
+        return any(read) and all(x or not cells[c].strip() for x, c in zip(read, held, strict=True))
+
+    head = min(len(own) - 2, MOST_NOTES)
+    while head and is_sample(own[head - 1]):
+        head -= 1
+    has_units = head > 1 and has_names(own[head - 1], False) and has_names(own[head - 2], True)
+    if has_units or (head and has_names(own[head - 1], True)):
+        head -= 2 if has_units else 1
+    return own[head], [f"the {own[head] - start} lines above line {own[head] + 1} are left out"]
 
 
 def _is_blank(line: str, comment: str) -> bool:

@@ -33,6 +33,7 @@ READERS: Mapping[str, Callable[[Path, Layout], Raw]] = {
     ".json": read_json,
     ".jsonl": read_json,
     ".ndjson": read_json,
+    ".lvm": read_delimited,
 }
 """Ending of a file's name to its reader; any other file is read as a text table."""
 

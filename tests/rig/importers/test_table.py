@@ -380,6 +380,9 @@ TEXT = "t,enc,i\n0,0,100\n10,45,200\n20,90,300\n"
         ("a spreadsheet's sign", ("sep=;\n" + TEXT.replace(",", ";")).encode()),
         ("notes", ("# log of a bench\n% 3 samples\n" + TEXT).encode()),
         ("notes and a head", ("# log of a bench\n# " + TEXT.replace(",", " ")).encode()),
+        ("an instrument's header", ("Bench;A\nDate;2024-03-01\n\n" + TEXT).encode()),
+        ("a header as wide as the table", ("Lab\nX,2,3\nEnd,,\n" + TEXT).encode()),
+        ("a header and a line of units", ("Lab\n\nt,enc,i\nms,deg,mA" + TEXT[7:]).encode()),
         ("compressed", gzip.compress(TEXT.encode(), mtime=0)),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
@@ -390,6 +393,16 @@ def test_a_text_table_of_another_writer_is_read(tmp_path, machine, name, content
     (run,) = open_table(path, machine())
     np.testing.assert_allclose(run.time_s, [0.0, 0.01, 0.02])
     np.testing.assert_allclose(run["motor_current_a"], [0.1, 0.2, 0.3])
+
+
+def test_lines_above_samples_without_a_head_are_remarked_on(tmp_path, machine):
+    text = "Name,angle,current\nUnit,V,V,,\nRate [ms],10\n0,0,100\n10,,200\n20,90,300\n"
+    (tmp_path / "run.csv").write_text("Scope\n" + text)
+    remarks = []
+    mapped = '[data.columns]\ntime_s = "1:ms"\nmotor_current_a = "3:mA"\n'
+    (run,) = read_runs(tmp_path / "run.csv", machine(mapped), remarks)
+    np.testing.assert_allclose(run["motor_current_a"], [0.1, 0.2, 0.3])
+    assert any("4 lines above line 5" in text for _, text in remarks)
 
 
 def test_a_head_whose_first_name_begins_with_a_mark_keeps_it(tmp_path, machine):
