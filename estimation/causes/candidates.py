@@ -207,7 +207,10 @@ def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
             noisy = _is_noisy(joint.layout, one)
             shaken = _columns(one, joint.layout.shaken) if noisy else None
             width = next(iter(columns[0].values())).shape[1]
-            key = (width, _unit(one.cause), one.acts is None, one.given, shaken is None)
+            key = (
+                *(width, _unit(one.cause), one.acts is None, one.given, shaken is None),
+                one.cause.is_declared,
+            )
             held = waiting.setdefault(key, [])
             held.append((one, columns, shaken))
             if len(held) * width**2 >= AT_ONCE:
@@ -240,8 +243,9 @@ def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
     first = held[0][0]
     columns = _stacked(joint, [raw[1] for raw in held])
     shaken = _stacked(joint, [raw[2] for raw in held if raw[2] is not None])
-    # what starts between runs also shifts their means, by its own offset
-    has_means = first.acts is None or first.given
+    # what starts between runs also shifts their means, by its own offset; another factor of a
+    # declared term shifts them as the term does
+    has_means = first.acts is None or first.given or first.cause.is_declared
     laid = joint.projection.laid(columns, shaken, _unit(first.cause), has_means)
     shown = np.flatnonzero(laid.size.min(axis=1) >= NOTHING)
     if len(shown) < len(held):

@@ -26,10 +26,12 @@ class Gains:
 
     Attributes:
         by_run: Run to score, as if the cause acted there.
+        without: Run to score, as if it did not: the other parameters are known better.
         acting: Run to the probability that it acts there, from the training runs.
     """
 
     by_run: Mapping[str, float]
+    without: Mapping[str, float]
     acting: Mapping[str, float]
 
     def log_ratio(self, per_score: float) -> float:
@@ -43,7 +45,8 @@ class Gains:
         return float(
             sum(
                 np.logaddexp(
-                    _log(self.acting[name]) + per_score * gain, _log(1.0 - self.acting[name])
+                    _log(self.acting[name]) + per_score * gain,
+                    _log(1.0 - self.acting[name]) + per_score * self.without[name],
                 )
                 for name, gain in self.by_run.items()
             )
@@ -52,7 +55,7 @@ class Gains:
     def acts_in(self, name: str, per_score: float) -> bool:
         """Whether the cause more probably acts in a run than not, the run itself included."""
         odds = _log(self.acting[name]) + per_score * self.by_run[name]
-        return odds > _log(1.0 - self.acting[name])
+        return odds > _log(1.0 - self.acting[name]) + per_score * self.without[name]
 
 
 class HeldOut:
@@ -124,13 +127,23 @@ class HeldOut:
     def gains(self, before: Sequence[Candidate], cause: Candidate) -> "Gains":
         """Return the score of one more cause in each test run, next to the causes before it."""
         joint, old = self._next_to(before)
-        new = self._squared(self._with(joint, cause))
+        acting, names = self._acting(cause), [self.layout.runs[k].name for k in self.at]
+        by_run = self._scores(old, self._squared(self._with(joint, cause)))
+        without = np.zeros(len(self.at))
+        if any(acting[name] < 1.0 for name in names):
+            without = self._scores(old, self._squared(self._with(joint, cause, in_test=False)))
+        found = [dict(zip(names, x.tolist(), strict=True)) for x in (by_run, without)]
+        return Gains(found[0], found[1], acting)
+
+    def _scores(
+        self, before: Mapping[Part, FloatArray], after: Mapping[Part, FloatArray]
+    ) -> FloatArray:
+        """Return the score of each test run, from squared errors."""
         total = np.zeros(len(self.at))
         for p, samples in self.joint.samples.items():
-            mean = [e[p] / samples[self.at] for e in (old, new)]
+            mean = [e[p] / samples[self.at] for e in (before, after)]
             total += self.joint.log_ratio(p, mean[0], mean[1])
-        names = [self.layout.runs[k].name for k in self.at]
-        return Gains(dict(zip(names, total.tolist(), strict=True)), self._acting(cause))
+        return total
 
     def _next_to(self, causes: Sequence[Candidate]) -> tuple[Joint, Mapping[Part, FloatArray]]:
         """Return the regression with causes, and its squared errors; the last one is kept."""
@@ -146,14 +159,14 @@ class HeldOut:
         (errors,) = joint.base_errors([[self.at]])
         return {p: values[self.at] for p, values in errors.items()}
 
-    def _with(self, joint: Joint, candidate: Candidate) -> Joint:
-        """Return a regression with a cause, as if it acted in every test run."""
-        acts = None
-        if candidate.acts is not None:
-            trained = iter(candidate.acts)
+    def _with(self, joint: Joint, candidate: Candidate, in_test: bool = True) -> Joint:
+        """Return a regression with a cause, as if it acted in every test run, or in none."""
+        acts, given = None, candidate.given or candidate.acts is None
+        if candidate.acts is not None or not in_test:
             count = len(self.layout.runs)
-            acts = tuple(k in self.at or next(trained) for k in range(count))
-        laid = laid_out(self.joint, Claim(candidate.cause, acts))
+            trained = iter(candidate.acts or itertools.repeat(True, count))
+            acts = tuple(in_test if k in self.at else next(trained) for k in range(count))
+        laid = laid_out(self.joint, Claim(candidate.cause, acts, given=given))
         return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
 
 

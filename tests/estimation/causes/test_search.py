@@ -152,6 +152,13 @@ def test_a_tight_spot_in_every_turn_depends_on_the_angle_and_the_direction() -> 
     assert {*finding.depends_on} == {"velocity_sign", "crank_angle"}
 
 
+def test_coloured_noise_of_a_torque_is_no_other_compliance_in_some_of_the_runs() -> None:
+    """Within runs a noisy torque is better left out; the means of the runs hold its factor."""
+    runs = list(draw(22_067, "clean", gear_ratio=35.0).recordings)
+    rig = model_file.reference_rig()
+    assert diagnose(runs, rig, split(runs)).findings == ()
+
+
 def test_no_axis_of_the_reference_rig_is_apart_from_another() -> None:
     """The equations relate its shafts one after the other, so none is an axis of its own."""
     runs = list(draw(1_000_000, "clean").recordings)[:6]
