@@ -13,11 +13,12 @@ from estimation.causes.candidates import (
     groups_of,
 )
 from estimation.causes.declared import moved_terms
+from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.scoring import ByRun, Scored, assessed, best_of_each
-from estimation.causes.sources import RELATIVE, Bend, Source
+from estimation.causes.sources import RELATIVE, TURNING, Bend, Source, least_order
 from estimation.causes.weights import reweighted
 from estimation.effects import Parameter
 
@@ -44,7 +45,7 @@ def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]
         some = best_of_each([*some, *climbing])
     spoilt = assessed(joint, groups_of(joint, reweighted(joint, pool, folds)), folds)
     best = best_of_each([*everything, *some, *spoilt])
-    near = [c for s in best[:REFINED] for c in _neighbours(s.candidate)]
+    near = [c for s in best[:REFINED] for c in _neighbours(joint.layout, s.candidate)]
     best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
     bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
     more = assessed(joint, groups_of(joint, bent), folds)
@@ -67,7 +68,7 @@ def _by_whole_form(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list
     for group in groups.values():
         if len(group) < 2 or group[0].score < 0.0:
             continue
-        near = [c for s in group for c in (s.candidate, *_neighbours(s.candidate))]
+        near = [c for s in group for c in (s.candidate, *_neighbours(joint.layout, s.candidate))]
         whole = [replace(Claim(c.cause, c.acts, c.choices), cause=_whole(c.cause)) for c in near]
         found = best_of_each(assessed(joint, groups_of(joint, whole), folds))
         of_name = {one.candidate.name: one for one in found}
@@ -101,24 +102,25 @@ def _bent(joint: Joint, one: Scored) -> Claim | None:
     return Claim(replace(cause, bend=bend), candidate.acts, candidate.choices)
 
 
-def _neighbours(candidate: Candidate) -> list[Claim]:
+def _neighbours(layout: Layout, candidate: Candidate) -> list[Claim]:
     """Return a named effect at shapes between the points of the grid."""
     cause = candidate.cause
     if isinstance(cause, Function):
         return []
     out = []
     for k, parameter in enumerate(cause.effect.shape):
-        for value in _nearby(cause, k, parameter):
+        for value in _nearby(layout, cause, k, parameter):
             shape = (*cause.shape[:k], float(value), *cause.shape[k + 1 :])
             out.append(Claim(replace(cause, shape=shape), candidate.acts, candidate.choices))
     return out
 
 
-def _nearby(cause: Source, k: int, parameter: Parameter) -> list[float]:
+def _nearby(layout: Layout, cause: Source, k: int, parameter: Parameter) -> list[float]:
     """Return values of one shape parameter between the points of its grid."""
     if parameter.name == "order":
         near = [cause.shape[k] + step for step in (-2.0, -1.0, 1.0, 2.0)]  # whole: of its shaft
-        return [order for order in near if order > 0.0]
+        angle = next(channel for role, channel in cause.channels if role in TURNING)
+        return [order for order in near if order >= least_order(layout, angle)]
     values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
     if parameter.name in ("width", "settled") or values is None or len(values) < 2:
         return []

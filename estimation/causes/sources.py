@@ -78,7 +78,7 @@ LATE = ("sensor.delay", "sensor.lag", "motor.electrical")
 LEAST_LATE = 0.3
 """Share of a reading that a delay or a lag makes late, at least: a small slow share is creep."""
 
-LEAST_PERIODS, MOST_PERIODS = 1.5, 60.0
+LEAST_PERIODS, MOST_PERIODS = 2.0, 60.0
 """Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
 
 
@@ -388,18 +388,20 @@ def _harmonics(layout: Layout, parameter: Parameter, angle: str) -> list[float]:
     return [float(x) for x in parameter.grid() if x * travel > 0.5 * math.pi]
 
 
+def least_order(layout: Layout, angle: str) -> float:
+    """Return the least order that repeats: with fewer periods any smooth form looks like a wave."""
+    return LEAST_PERIODS * 2 * math.pi / travel_of(layout, angle)
+
+
 def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:
     """Return whole orders, as finely as the travel resolves them.
 
     A harmonic repeats with the shaft that makes it, so its order there is a whole number.
     """
-    travel = travel_of(layout, angle)
-    resolved = 2 * math.pi / travel
+    resolved = 2 * math.pi / travel_of(layout, angle)
     if not angle.endswith("_angle_rad"):  # nothing turns: any period
         return list(np.arange(LEAST_PERIODS, MOST_PERIODS, 1.0 / 3.0) * resolved)
-    first = max(1, math.ceil(LEAST_PERIODS * resolved))
-    if effect.id == "eccentric.load":
-        first = 1  # the load multiplies it, so a part of one sine shows
+    first = max(1, math.ceil(least_order(layout, angle)))
     last = max(40, round(MOST_PERIODS * min(resolved, 1.5))) // (len(effect.amplitudes) // 2)
     return [float(k) for k in range(first, last + 1, max(1, round(resolved / 3)))]
 
