@@ -247,7 +247,7 @@ def _actuator(equation: Equation, angles: Sequence[str]) -> Place | None:
     """Return the place of the actuator that an equation reads as a term or as its target."""
     read = [t.channels["source"] for t in equation.terms if t.effect.id == "motor.torque_constant"]
     current = next(iter(read), equation.target)
-    if not read and current.endswith((*ANGLES, "_n_m", "_n")):
+    if not read and (equation.of_angle or current.endswith(("_n_m", "_n"))):
         return None
     roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
         "current": (current,),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.rigs import draw
-from estimation import model_file
+from estimation import model_file, plant_file
 from estimation.causes.candidates import Claim, groups_of
 from estimation.causes.equations import lay_out
 from estimation.causes.findings import family_probabilities
@@ -28,6 +28,7 @@ from estimation.causes.sources import sources_at
 from estimation.causes.verdict import answer, diagnose
 from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.split import split
+from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
 from tests.estimation.causes.synthetic import (
     RATIO,
@@ -157,6 +158,71 @@ def test_coloured_noise_of_a_torque_is_no_other_compliance_in_some_of_the_runs()
     runs = list(draw(22_067, "clean", gear_ratio=35.0).recordings)
     rig = model_file.reference_rig()
     assert diagnose(runs, rig, split(runs)).findings == ()
+
+
+def test_a_part_of_a_period_is_named_by_its_variables() -> None:
+    """Over fewer than two periods a wave is any smooth function of the position."""
+    runs = list(draw(1_120_002, "outside", gear_ratio=35.0).recordings)
+    (finding,) = diagnose(runs, model_file.reference_rig(), split(runs)).findings
+    assert finding.verdict == "depends_on"
+    variables = {*finding.depends_on}
+    assert variables in ({"spindle_angle", "load"}, {"jaw_angle", "load"})  # of one shaft
+
+
+TWO_ENCODERS = """
+schema = "rig.machine/1"
+[machine]
+name = "joint"
+[[axis]]
+name = "motor"
+unit = "rad"
+[[axis]]
+name = "arm"
+unit = "rad"
+[[transmission]]
+name = "belt"
+input = "motor"
+output = "arm"
+ratio = 8.0
+compliant = true
+[[actuator]]
+name = "motor_current_a"
+axis = "motor"
+[[sensor]]
+name = "motor_angle_rad"
+axis = "motor"
+reads = "position"
+[[sensor]]
+name = "arm_angle_rad"
+axis = "arm"
+reads = "position"
+[[sensor]]
+name = "arm_torque_n_m"
+axis = "arm"
+reads = "effort"
+"""
+
+
+def test_a_belt_that_stiffens_is_the_only_explanation_of_the_angle_between_two_encoders() -> None:
+    """The angle between them is computed: no actuator and no sensor has a gain in it."""
+    random, time = np.random.default_rng(0), np.arange(3000) / 250
+    runs = []
+    for k in range(10):
+        waves = zip(random.uniform(0.1, 0.7, 8), random.uniform(0, 2 * np.pi, 8), strict=True)
+        parts = [np.sin(2 * np.pi * f * time + p) for f, p in waves]
+        arm, load = sum(parts[:4]), 0.5 * sum(parts[4:])
+        motor_angle = 8.0 * (arm + 0.01 * load - 0.001 * load * np.abs(load))
+        speed = np.gradient(motor_angle, time)
+        lost = 0.02 * np.tanh(speed) + 0.002 * speed + 1e-4 * np.gradient(speed, time)
+        channels = {
+            "motor_current_a": 10.0 * (lost + load / 8.0) + random.normal(0, 0.02, len(time)),
+            "motor_angle_rad": motor_angle + random.normal(0, 1e-4, len(time)),
+            "arm_angle_rad": arm + random.normal(0, 1e-5, len(time)),
+            "arm_torque_n_m": load + random.normal(0, 2e-3, len(time)),
+        }
+        runs.append(Recording(f"{k:02d}", time, channels, started_at_ns=int(1e10 * k) + 1))
+    (finding,) = diagnose(runs, declared(plant_file.parse(TWO_ENCODERS)), split(runs)).findings
+    assert (finding.family, finding.verdict) == ("transmission.stiffening", "identified")
 
 
 def test_no_axis_of_the_reference_rig_is_apart_from_another() -> None:
