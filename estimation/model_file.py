@@ -176,7 +176,8 @@ def _signals(top: Table) -> Signals:
     slowest = {speed: rest.number(speed) for speed in rest.content}
     sensors = table.table("sensors")
     readings = {channel: sensors.table(channel).made(Reading) for channel in sensors.content}
-    found = Signals(read_combinations(table.tables("derived", [])), slowest, readings)
+    derived, joined = (read_combinations(table.tables(key, [])) for key in ("derived", "joined"))
+    found = Signals(derived, slowest, readings, joined)
     table.finish()
     return found
 
@@ -219,6 +220,7 @@ def _lines(model: Model, within: str = "") -> list[str]:
         lines += ["", f"[{within}signals.sensors]"] if model.signals.readings else []
         lines += entries({name: _known(one) for name, one in model.signals.readings.items()})
         lines += combination_lines(model.signals.combinations, f"{within}signals.derived")
+        lines += combination_lines(model.signals.joined, f"{within}signals.joined")
     for term in model.terms:
         lines += ["", f"[[{within}effects]]", *entries({"id": term.effect.id, "sign": term.sign})]
         lines += entries(term.channels, "channels.")

@@ -22,6 +22,7 @@ from estimation.channels import unit_of
 from estimation.plant import (
     ACCELERATION,
     EFFORT,
+    POSITION,
     SPEED,
     Actuator,
     Part,
@@ -130,7 +131,34 @@ def signals(plant: Plant) -> Signals:
     stated = {s.name: Reading(s.noise, s.step, s.rate_hz, s.delay_s) for s in plant.sensors}
     warmth = {s.name for s in plant.sensors if s.reads == "temperature"}
     readings = {name: one for name, one in stated.items() if one != Reading() or name in warmth}
-    return Signals((*bends, *plant.derived), rest, readings)
+    joined = _joined(plant)
+    own = {*(s.name for s in plant.sensors), *plant.integrals, *(c.name for c in plant.derived)}
+    positions = (c for c in joined if c.name not in own)
+    return Signals((*bends, *positions, *plant.derived), rest, readings, joined)
+
+
+def _joined(plant: Plant) -> tuple[Combination, ...]:
+    """Return the positions that follow from another axis' by the ratio of a transmission.
+
+    A shaft that a gear drives turns by the motor's angle over the ratio, but for the gear's bend.
+    The other way round the bend would count as many times as the ratio.
+    """
+    read = {axis.name: plant.moved(axis.name, POSITION) for axis in plant.axes}
+    shares = {axis: Share(name) for axis, name in read.items() if name}
+    found: dict[str, Combination] = {}
+    for joint in plant.transmissions * len(plant.transmissions):  # along a chain of any order
+        ways = [(joint.input, joint.output, joint.ratio)]
+        if joint.ratio and not joint.compliant:
+            ways.append((joint.output, joint.input, 1.0 / joint.ratio))
+        for near, far, ratio in ways:
+            if not ratio or near not in shares:
+                continue
+            share = replace(shares[near], over=shares[near].over * ratio)
+            name = read[far] or far + POSITION[plant.axis(far).unit]
+            if name not in (share.channel, *found):
+                shares.setdefault(far, share)
+                found[name] = Combination(name, (share,))
+    return tuple(found.values())
 
 
 def chains(plant: Plant) -> Iterator[Chain]:

@@ -99,11 +99,14 @@ class Signals:
             the threshold. Slower than a share of the usual speed is at rest too, see
             `estimation.rest`, so 0 is a threshold that follows the data.
         readings: What is stated of the sensors of some channels; of a temperature that it is one.
+        joined: Positions that follow from another's by the ratio of a transmission. One whose axis
+            has no encoder is among the combinations, too; else a reading can be compared with it.
     """
 
     combinations: tuple[Combination, ...] = ()
     rest: Mapping[str, float] = field(default_factory=dict)
     readings: Mapping[str, Reading] = field(default_factory=dict)
+    joined: tuple[Combination, ...] = ()
 
     @property
     def temperatures(self) -> tuple[str, ...]:

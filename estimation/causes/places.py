@@ -13,9 +13,12 @@ import numpy as np
 
 from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensitivity
 from estimation.derived import CAMPAIGN_TIME, measured_channels
-from estimation.signals import Signals
+from estimation.signals import Combination, Signals
 
 Kind = Literal["loss", "actuator", "deflection", "lever", "torque sensor", "angle sensor"]
+
+MOST_BEND = 0.1
+"""Share of a joined axis' travel that may be the bend of what joins it."""
 
 
 @dataclass(frozen=True)
@@ -103,12 +106,28 @@ def direction_width(layout: Layout, place: Place) -> float:
 def _angles(layout: Layout) -> list[str]:
     """Return the angles that the equations read, the one with the largest travel first.
 
-    No other channel is ever read: another recorded channel may be a copy of a target.
+    Those that follow by a known ratio come with them. No other channel is ever read: another
+    recorded channel may be a copy of a target.
     """
+    signals = _signals(layout)
     read = [n for e in layout.equations.values() for n in (e.target, *e.model.channels)]
-    names = [n for n in measured_channels(read, _signals(layout)) if n.endswith(ANGLES)]
-    names = [n for n in names if n in layout.measured]
-    return sorted(names, key=lambda n: -travel_of(layout, n))
+    names = {n for n in measured_channels(read, signals) if n in layout.measured}
+    for one in (c for c in signals.joined for _ in signals.joined):  # along a chain
+        both = {one.name, one.shares[0].channel}
+        if names & both and _agrees(layout, one):
+            names |= both
+    return sorted((n for n in names if n.endswith(ANGLES)), key=lambda n: -travel_of(layout, n))
+
+
+def _agrees(layout: Layout, joined: Combination) -> bool:
+    """Whether a position was recorded or derived, and moves as its neighbour and the ratio give."""
+    (share,) = joined.shares
+    if not all({joined.name, share.channel} <= {*run.channels} for run in layout.runs):
+        return False
+    channels = [run.channels for run in layout.runs]
+    moved = sum(float(np.var(c[joined.name])) for c in channels)
+    bent = sum(float(np.var(c[joined.name] - share.gain * c[share.channel])) for c in channels)
+    return bent < MOST_BEND**2 * moved
 
 
 def groups_apart(layout: Layout) -> int:
@@ -127,6 +146,7 @@ def _related(layout: Layout, equation: Equation, angles: Sequence[str]) -> list[
     Every angle, where it reads none.
     """
     read = [_read(e) & {*angles} for e in layout.equations.values()]
+    read += [{c.name, c.shares[0].channel} & {*angles} for c in _signals(layout).joined]
     known: set[str] = set()
     grown = _read(equation) & {*angles}
     while grown > known:
@@ -239,6 +259,7 @@ def _unrelated(layout: Layout, equation: Equation, angles: Sequence[str]) -> tup
     """Return the angles that no equation relates to those of an equation: of other joints."""
     own = _read(equation)
     read = [_read(e) for e in layout.equations.values()]
+    read += [{c.name, c.shares[0].channel} for c in _signals(layout).joined]
     related = set().union(*(r for r in read if r & own & set(angles)))
     return tuple(a for a in angles if a not in related)
 

@@ -31,6 +31,7 @@ from estimation.diagnosis.split import split
 from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
 from tests.estimation.causes.synthetic import (
+    AXIS,
     RATIO,
     Effect,
     axis,
@@ -167,6 +168,18 @@ def test_a_part_of_a_period_is_named_by_its_variables() -> None:
     assert finding.verdict == "depends_on"
     variables = {*finding.depends_on}
     assert variables in ({"spindle_angle", "load"}, {"jaw_angle", "load"})  # of one shaft
+
+
+def test_a_weight_behind_a_gear_depends_on_the_angle_that_the_gear_gives() -> None:
+    """Only the motor has an encoder: the arm turns by its angle over the ratio."""
+    arm = '[[axis]]\nname = "arm"\nunit = "rad"\n'
+    gear = '[[transmission]]\nname = "gear"\ninput = "crank"\noutput = "arm"\nratio = 10.0\n'
+    text = AXIS.replace("DRIVE", "crank_torque_n_m") + arm + gear
+    runs = turning(lambda angle, *_: 3.0 * np.sin(angle / 10.0), size=15.0)
+    (finding,) = diagnose(runs, declared(plant_file.parse(text)), split(runs)).findings
+    assert finding.family == "gravity.payload"
+    assert finding.depends_on == ("arm_angle",)
+    assert finding.parameters["sine"].value == pytest.approx(3.0, rel=0.05)
 
 
 TWO_ENCODERS = """
