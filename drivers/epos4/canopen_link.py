@@ -6,18 +6,17 @@ reading the bus, which also serves whoever subscribed to a frame that comes mean
 
 import logging
 from collections.abc import Callable
-from pathlib import Path
 
 import canopen
 from canopen.sdo.client import SdoClient
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from drivers.counters import TRIES, DeviceCounters
+from drivers.epos4.dictionary import object_dictionary
 from drivers.errors import DriverError, LinkTimeoutError
 from drivers.transport.can_bus import CanBus, CanFrame
 
 REPLY_TIMEOUT_S = 0.1
-EDS = Path(__file__).with_name("epos4.eds")
 
 logging.getLogger("canopen").addHandler(logging.NullHandler())  # its complaints are our errors
 
@@ -48,9 +47,8 @@ class CanopenLink:
         self.node_id = node_id
         self._counters = counters
         self._network = _InlineNetwork(bus)
-        dictionary = canopen.import_od(str(EDS), node_id)
         self._sdo = _InlineSdo(  # type: ignore[no-untyped-call]
-            0x600 + node_id, 0x580 + node_id, dictionary
+            0x600 + node_id, 0x580 + node_id, object_dictionary()
         )
         self._sdo.network = self._network
         self._sdo.bus = bus
@@ -106,7 +104,7 @@ class CanopenLink:
     def _variable(self, index: int, subindex: int) -> canopen.objectdictionary.ODVariable:
         variable = self._sdo.od.get_variable(index, subindex)
         if variable is None:
-            raise DriverError(f"Object {index:#06x}:{subindex} is not in {EDS.name}.")
+            raise DriverError(f"Object {index:#06x}:{subindex} is not in the dictionary.")
         return variable
 
     def _transfer(

@@ -20,7 +20,7 @@ from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.device import Device
 from drivers.epos4 import protocol
-from drivers.epos4.canopen_link import EDS
+from drivers.epos4.dictionary import object_dictionary
 from drivers.epos4.drive import Epos4
 from drivers.epos4.fake_network import FrameNetwork
 from drivers.epos4.protocol import State
@@ -89,7 +89,7 @@ class Epos4Fake:
         self._motor = motor or FreeMotor()
         self._absent = absent
         self._network = FrameNetwork()
-        self._node = canopen.LocalNode(node_id, canopen.import_od(str(EDS), node_id))
+        self._node = canopen.LocalNode(node_id, object_dictionary())
         self._network[node_id] = self._node
         self._id = node_id
         self._position = 0
