@@ -57,16 +57,20 @@ class ProtocolMismatchError(DriverError):
     """The board's firmware and this program speak different protocols."""
 
 
-class CommandRefusedError(DriverError):
-    """The board understood a command and refused it.
+class CodedError(DriverError):
+    """An error to which the device gives a number.
 
     Attributes:
-        result: The board's reason, a `drivers.teensy.protocol.Result`.
+        code: That number; 0 where it gave none.
     """
 
-    def __init__(self, what: str, why: str = "", fix: str = "", result: int = 0) -> None:
-        self.result = result
+    def __init__(self, what: str, why: str = "", fix: str = "", code: int = 0) -> None:
+        self.code = code
         super().__init__(what, why, fix)
+
+
+class CommandRefusedError(CodedError):
+    """The board understood a command and refused it; `code` is a `protocol.Result`."""
 
 
 class DisarmUnconfirmedError(DriverError):

@@ -3,23 +3,15 @@
 from drivers.counters import TRIES, DeviceCounters
 from drivers.dynamixel import protocol
 from drivers.dynamixel.protocol import Register
-from drivers.errors import DriverError, FrameError, LinkTimeoutError
+from drivers.errors import CodedError, FrameError, LinkTimeoutError
 from drivers.transport.transport import Transport
 
 REPLY_TIMEOUT_S = 0.02
 """Time for an answer: 500 us at most in the device, and what a USB adapter takes."""
 
 
-class InstructionRefusedError(DriverError):
-    """The device has refused an instruction.
-
-    Attributes:
-        number: Its reason, a key of `protocol.ERRORS`.
-    """
-
-    def __init__(self, what: str, why: str = "", fix: str = "", number: int = 0) -> None:
-        self.number = number
-        super().__init__(what, why, fix)
+class InstructionRefusedError(CodedError):
+    """The device has refused an instruction; `code` is its reason, a key of `protocol.ERRORS`."""
 
 
 class Line:

@@ -13,7 +13,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from drivers.counters import TRIES, DeviceCounters
 from drivers.epos4.dictionary import object_dictionary
-from drivers.errors import DriverError, LinkTimeoutError
+from drivers.errors import CodedError, DriverError, LinkTimeoutError
 from drivers.transport.can_bus import CanBus, CanFrame
 
 REPLY_TIMEOUT_S = 0.1
@@ -21,16 +21,8 @@ REPLY_TIMEOUT_S = 0.1
 logging.getLogger("canopen").addHandler(logging.NullHandler())  # its complaints are our errors
 
 
-class ObjectRefusedError(DriverError):
-    """The drive refused to read or write one of its objects.
-
-    Attributes:
-        code: The abort code.
-    """
-
-    def __init__(self, what: str, why: str = "", fix: str = "", code: int = 0) -> None:
-        self.code = code
-        super().__init__(what, why, fix)
+class ObjectRefusedError(CodedError):
+    """The drive refused to read or write one of its objects; `code` is the abort code."""
 
 
 class CanopenLink:

@@ -5,7 +5,7 @@ the transcription of the 2026 firmware specification in the public library `Imca
 they differ (0x738A to 0x738D), the specification.
 """
 
-from drivers.errors import DriverError
+from drivers.errors import CodedError
 
 _MAKER = "Switch the drive off and on; if it comes again, ask the maker."
 _LOAD = "Take the load off, let it cool, then command less torque or for a shorter time."
@@ -83,16 +83,8 @@ _RANGES: tuple[tuple[range, tuple[str, str, str]], ...] = (
 )
 
 
-class DriveFaultError(DriverError):
-    """The drive has a fault, or has left operation by itself.
-
-    Attributes:
-        code: Its error code, 0 when it reported none.
-    """
-
-    def __init__(self, what: str, why: str = "", fix: str = "", code: int = 0) -> None:
-        self.code = code
-        super().__init__(what, why, fix)
+class DriveFaultError(CodedError):
+    """The drive has a fault, or has left operation by itself; `code` is its error code."""
 
 
 def explain(code: int) -> tuple[str, str, str]:

@@ -77,7 +77,7 @@ def _reference_at_index(logger: TeensyLogger, counts: Sequence[int]) -> None:
             logger.reference(counts, at_index=True)
             return
         except CommandRefusedError as error:
-            waits = error.result in (Result.NO_INDEX, Result.NOT_AT_REST)
+            waits = error.code in (Result.NO_INDEX, Result.NOT_AT_REST)
             if not waits or seen >= INDEX_SAMPLES or silent >= SILENT_READS:
                 raise
         samples = len(logger.read(READ_S).samples)

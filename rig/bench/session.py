@@ -297,10 +297,10 @@ class Session:
                 return self._logger.arm(gains, limits)
             except CommandRefusedError as error:
                 report = self._logger.trip()
-                if error.result == Result.TRIPPED and report.code is not Trip.NONE:
+                if error.code == Result.TRIPPED and report.code is not Trip.NONE:
                     state = "It tripped before this run and has not been cleared; nothing moved."
                     raise self._tripped(report, state) from error
-                if error.result != Result.TOO_HOT or self._transport.now_s > give_up_s:
+                if error.code != Result.TOO_HOT or self._transport.now_s > give_up_s:
                     raise
             for _ in self.rest(COOLING_STEP_S):
                 pass

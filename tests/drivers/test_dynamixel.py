@@ -206,5 +206,5 @@ def test_a_refusal_gives_its_reason() -> None:
     device = armed(fake)
     with pytest.raises(InstructionRefusedError, match="cannot be accessed") as caught:
         device._line.write(protocol.OPERATING_MODE, 3)
-    assert caught.value.number == 7
+    assert caught.value.code == 7
     device.close()

@@ -125,7 +125,7 @@ def test_without_a_word_from_the_host_the_board_makes_itself_safe(make_board: Ma
     assert not samples["load_ma"][251:].any()
     with pytest.raises(CommandRefusedError, match="not armed") as refusal:
         logger.queue(np.array([0]), np.array([0]))
-    assert refusal.value.result == Result.NOT_ARMED
+    assert refusal.value.code == Result.NOT_ARMED
     with pytest.raises(CommandRefusedError, match="rig clear"):
         logger.arm(GAINS, WIDEST)
     logger.clear(logger.trip().code)

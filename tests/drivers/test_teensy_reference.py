@@ -43,7 +43,7 @@ def test_a_board_that_was_started_is_not_armed_before_it_is_referenced(library: 
         assert not newest(logger)["status"] & STATUS_REFERENCED
         with pytest.raises(CommandRefusedError, match="rig reference") as refused:
             logger.arm(GAINS, Limits())
-        assert refused.value.result == Result.NOT_REFERENCED
+        assert refused.value.code == Result.NOT_REFERENCED
         at_rest(logger)
         logger.reference([0, 1000, 500])
         sample = newest(logger)
@@ -74,7 +74,7 @@ def test_the_index_gives_the_reference_once_wherever_the_shaft_stands_then(libra
         assert sample["status"] & STATUS_REFERENCED
         with pytest.raises(CommandRefusedError, match="through its index") as refused:
             logger.reference([0, 1000, 500], at_index=True)
-        assert refused.value.result == Result.NO_INDEX
+        assert refused.value.code == Result.NO_INDEX
 
 
 def test_a_shaft_that_turns_is_not_referenced(library: Path) -> None:
