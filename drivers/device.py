@@ -62,20 +62,6 @@ def wrench_channels(rate_hz: float, tops: Sequence[float]) -> tuple[Channel, ...
     )
 
 
-def moved_wrench(wrench: NDArray[np.float64], point_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a wrench about another point, axes unchanged, shape (..., 6).
-
-    The force stays; the torque becomes T' = T + r x F, with r from the new point to the old one,
-    here `-point_m`.
-
-    Args:
-        wrench: Force and torque about the sensor's origin, N and N m, shape (..., 6).
-        point_m: The new point in the sensor's axes, m, shape (3,).
-    """
-    force, torque = wrench[..., :3], wrench[..., 3:]
-    return np.concatenate((force, torque + np.cross(-point_m, force)), axis=-1)
-
-
 @dataclass(frozen=True, slots=True)
 class DeviceIdentity:
     """Identity of the device; a part that it does not report is empty."""

@@ -149,7 +149,7 @@ class FrameStream:
             end = data.find(DELIMITER)
             if end < 0:
                 self._overlong_bytes += len(data)
-                return self._nothing(0, 0)
+                return DecodedFrames(np.empty((0, self._payload_size), np.uint8), [], 0, 0, b"")
             bad, bad_bytes = 1, self._overlong_bytes + end + 1
             self._overlong_bytes = 0
             data = data[end + 1 :]
@@ -161,6 +161,3 @@ class FrameStream:
         return DecodedFrames(
             frames.payloads, frames.others, frames.bad + bad, frames.bad_bytes + bad_bytes, b""
         )
-
-    def _nothing(self, bad: int, bad_bytes: int) -> DecodedFrames:
-        return DecodedFrames(np.empty((0, self._payload_size), np.uint8), [], bad, bad_bytes, b"")

@@ -16,6 +16,9 @@ from drivers.registry import BaudOption, Driver, RateOption, made
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
+REPLY_TIMEOUT_S = 0.01
+"""Time for an answer: on a USB adapter it takes some milliseconds."""
+
 
 class Amt21(PolledDevice):
     """One encoder on an RS-485 line. Nothing else on the line may be asked at the same time.
@@ -25,7 +28,6 @@ class Amt21(PolledDevice):
         address: The encoder's address.
         multi_turn: Whether it also counts turns.
         rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
-        reply_timeout_s: Time for an answer, on a USB adapter some milliseconds.
         top_speed_rad_s: The fastest the shaft turns; a reading that would need more is damaged.
     """
 
@@ -37,7 +39,6 @@ class Amt21(PolledDevice):
         address: int = protocol.DEFAULT_ADDRESS,
         multi_turn: bool = False,
         rate_hz: float = 200.0,
-        reply_timeout_s: float = 0.01,
         top_speed_rad_s: float = TOP_SPEED_RAD_S,
     ) -> None:
         super().__init__(transport, rate_hz)
@@ -45,7 +46,6 @@ class Amt21(PolledDevice):
         self._requests = [protocol.request(address, turns) for turns in (False, True)]
         self._address = address
         self._multi_turn = multi_turn
-        self._reply_timeout_s = reply_timeout_s
         self._identified = True  # it has nothing to be identified by but an answer
         self._gate = RateGate(top_speed_rad_s, multi_turn)
         angle = Channel("angle_rad", "rad", rate_hz, 0.0, 2 * math.pi, "absolute angle, one turn")
@@ -146,7 +146,7 @@ class Amt21(PolledDevice):
 
     def _receive(self, request: bytes) -> bytes:
         """Return the answer, without the request where the adapter returns it."""
-        give_up_s = self._transport.now_s + self._reply_timeout_s
+        give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
         came = b""
         while len(came) < protocol.REPLY_SIZE:
             remaining_s = give_up_s - self._transport.now_s

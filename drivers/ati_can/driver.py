@@ -272,11 +272,7 @@ def open_ati_can(
     Raises:
         LinkError: The bus cannot be opened, or the options are no sensor's.
     """
-    return made(
-        open_can(url),
-        lambda bus: AtiCan(bus, base, calibration, rate_hz),
-        "NETCANOEM",
-    )
+    return made(open_can(url), lambda bus: AtiCan(bus, base, calibration, rate_hz), "NETCANOEM")
 
 
 def _identifiers(options: Mapping[str, Any]) -> frozenset[int]:

@@ -29,6 +29,8 @@ MATRIX = np.array(
     ]
 )
 """A matrix of a plausible size; no real sensor's. Single precision holds every value exactly."""
+CALIBRATIONS = 2
+"""How many it holds; another's matrix is scaled by its number."""
 
 
 def swaying(tick: int) -> NDArray[np.int64]:
@@ -44,7 +46,6 @@ class AtiCanFake:
         base: Its base identifier.
         load: What its gauges read.
         firmware: Major and minor version and build.
-        calibrations: How many calibrations it holds; another's matrix is scaled by its number.
     """
 
     def __init__(
@@ -52,12 +53,10 @@ class AtiCanFake:
         base: int = protocol.DEFAULT_BASE,
         load: Load = swaying,
         firmware: tuple[int, int, int] = (3, 9, 1042),
-        calibrations: int = 2,
     ) -> None:
         self._base = base
         self._load = load
         self._firmware = firmware
-        self._calibrations = calibrations
         self._active = 0
         self._out: list[CanFrame] = []
         self._tick = 0
@@ -90,7 +89,7 @@ class AtiCanFake:
         if operation == protocol.MATRIX_ROW and len(data) == 1 and data[0] < 6:
             return protocol.encode_matrix_row(self._base, MATRIX[data[0]] * (1 + self._active))
         if operation == protocol.CALIBRATION and len(data) == 1:
-            self._active = data[0] if data[0] < self._calibrations else self._active
+            self._active = data[0] if data[0] < CALIBRATIONS else self._active
             return [self._reply(operation, bytes([self._active]))]
         if operation == protocol.SERIAL and not data:
             return [self._reply(operation, b"FT012345")]

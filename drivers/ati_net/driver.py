@@ -1,7 +1,7 @@
 """The driver of a Net F/T: calibration by TCP, then a stream of records by UDP."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import astuple, replace
 from typing import Annotated
 
 import numpy as np
@@ -42,7 +42,6 @@ class AtiNet(StreamedDevice):
     ) -> None:
         super().__init__(transport, rate_hz, "force/torque sensor")
         self._open_calibration = open_calibration
-        self._calibration: protocol.Calibration | None = None
         self._slopes = np.full(6, np.inf)
         self._sequence = RecordSequence(self._counters)
         self._numbers = np.empty(0, np.int64)
@@ -59,7 +58,7 @@ class AtiNet(StreamedDevice):
     @property
     def counts_per_unit(self) -> dict[str, float]:
         """Counts per newton and newton metre, from the device; empty before they are read."""
-        if self._calibration is None:
+        if not self._identified:
             return {}
         force, torque = float(self._slopes[0]), float(self._slopes[3])
         return {"counts_per_n": 1.0 / force, "counts_per_n_m": 1.0 / torque}
@@ -87,8 +86,8 @@ class AtiNet(StreamedDevice):
                 f"It was asked for its calibration and had {ANSWER_TIMEOUT_S:g} s.",
                 "Check its power, the cable, and that this computer is in its network.",
             )
-        self._calibration = protocol.decode_calibration(answer)
-        self._slopes = self._calibration.slopes()
+        units_and_counts = astuple(protocol.decode_calibration(answer))[:4]
+        self._slopes = protocol.slopes(*units_and_counts)
         self._identified = True
         return DeviceIdentity("ATI Net F/T", "", "")
 

@@ -83,12 +83,6 @@ class Calibration:
     counts_per_torque: int
     scale_factors: tuple[int, ...] = (0, 0, 0, 0, 0, 0)
 
-    def slopes(self) -> NDArray[np.float64]:
-        """Return N a count three times, then N m a count three times, shape (6,)."""
-        return slopes(
-            self.force_unit, self.torque_unit, self.counts_per_force, self.counts_per_torque
-        )
-
 
 def slopes(
     force_unit: int, torque_unit: int, counts_per_force: int, counts_per_torque: int

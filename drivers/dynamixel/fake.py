@@ -12,6 +12,8 @@ from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import Outbox, SimulatedTransport
 
 XL330_M288 = 1200
+DEVICE_ID = 1
+"""It stays silent for any other."""
 ROM_END = 64
 """Registers below can be written only while the motor is out of force."""
 _GOALS = range(100, 120)
@@ -24,14 +26,12 @@ class DynamixelFake(Outbox):
     """A drive, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
-        device_id: Its identifier; it stays silent for any other.
         model: Its model number.
         echo: Whether the adapter returns the host's own bytes.
     """
 
-    def __init__(self, device_id: int = 1, model: int = XL330_M288, echo: bool = False) -> None:
+    def __init__(self, model: int = XL330_M288, echo: bool = False) -> None:
         super().__init__()
-        self._id = device_id
         self._model = model
         self._echo = echo
         self._held = b""
@@ -52,7 +52,7 @@ class DynamixelFake(Outbox):
                 device_id, instruction, parameters = protocol.decode(packet)
             except FrameError:
                 continue
-            if device_id == self._id and instruction != protocol.STATUS:
+            if device_id == DEVICE_ID and instruction != protocol.STATUS:
                 self._silent_ms = 0
                 self._carry_out(instruction, parameters)
 
@@ -134,7 +134,7 @@ class DynamixelFake(Outbox):
     def _answer(self, error: int, parameters: bytes = b"") -> None:
         alert = protocol.ALERT if self.table[protocol.HARDWARE_ERROR.address] else 0
         body = bytes([error | alert]) + parameters
-        self._out += protocol.encode(self._id, protocol.STATUS, body)
+        self._out += protocol.encode(DEVICE_ID, protocol.STATUS, body)
 
 
 def open_fake(faults: Faults) -> Device:

@@ -4,62 +4,56 @@ Not the maker's file: ranges and defaults are left out.
 """
 
 from canopen import ObjectDictionary
-from canopen.objectdictionary import ODRecord, ODVariable
-from canopen.objectdictionary.datatypes import (
-    INTEGER8,
-    INTEGER16,
-    INTEGER32,
-    UNSIGNED8,
-    UNSIGNED16,
-    UNSIGNED32,
-    VISIBLE_STRING,
-)
+from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 
 OBJECTS = (
-    (0x1000, "Device type", UNSIGNED32, "ro"),
-    (0x1001, "Error register", UNSIGNED8, "ro"),
-    (0x1008, "Device name", VISIBLE_STRING, "const"),
-    (0x1017, "Producer heartbeat time", UNSIGNED16, "rw"),
-    (0x6007, "Abort connection option code", INTEGER16, "rw"),
-    (0x603F, "Error code", UNSIGNED16, "ro"),
-    (0x6040, "Controlword", UNSIGNED16, "rw"),
-    (0x6041, "Statusword", UNSIGNED16, "ro"),
-    (0x605E, "Fault reaction option code", INTEGER16, "rw"),
-    (0x6060, "Modes of operation", INTEGER8, "rw"),
-    (0x6061, "Modes of operation display", INTEGER8, "ro"),
-    (0x6064, "Position actual value", INTEGER32, "ro"),
-    (0x6071, "Target torque", INTEGER16, "rw"),
-    (0x6076, "Motor rated torque", UNSIGNED32, "ro"),
-    (0x6077, "Torque actual value", INTEGER16, "ro"),
-    (0x6502, "Supported drive modes", UNSIGNED32, "ro"),
+    (0x1000, "Device type", datatypes.UNSIGNED32, "ro"),
+    (0x1001, "Error register", datatypes.UNSIGNED8, "ro"),
+    (0x1008, "Device name", datatypes.VISIBLE_STRING, "const"),
+    (0x1017, "Producer heartbeat time", datatypes.UNSIGNED16, "rw"),
+    (0x6007, "Abort connection option code", datatypes.INTEGER16, "rw"),
+    (0x603F, "Error code", datatypes.UNSIGNED16, "ro"),
+    (0x6040, "Controlword", datatypes.UNSIGNED16, "rw"),
+    (0x6041, "Statusword", datatypes.UNSIGNED16, "ro"),
+    (0x605E, "Fault reaction option code", datatypes.INTEGER16, "rw"),
+    (0x6060, "Modes of operation", datatypes.INTEGER8, "rw"),
+    (0x6061, "Modes of operation display", datatypes.INTEGER8, "ro"),
+    (0x6064, "Position actual value", datatypes.INTEGER32, "ro"),
+    (0x6071, "Target torque", datatypes.INTEGER16, "rw"),
+    (0x6076, "Motor rated torque", datatypes.UNSIGNED32, "ro"),
+    (0x6077, "Torque actual value", datatypes.INTEGER16, "ro"),
+    (0x6502, "Supported drive modes", datatypes.UNSIGNED32, "ro"),
 )
 RECORDS = {
-    0x1016: (("Consumer heartbeat time 1", UNSIGNED32, "rw"),),
+    0x1016: (("Consumer heartbeat time 1", datatypes.UNSIGNED32, "rw"),),
     0x1018: tuple(
-        (name, UNSIGNED32, "ro")
+        (name, datatypes.UNSIGNED32, "ro")
         for name in ("Vendor id", "Product code", "Revision number", "Serial number")
     ),
-    0x1029: (("Communication error", UNSIGNED8, "rw"),),
-    0x2200: (("Supply voltage", UNSIGNED16, "ro"),),
+    0x1029: (("Communication error", datatypes.UNSIGNED8, "rw"),),
+    0x2200: (("Supply voltage", datatypes.UNSIGNED16, "ro"),),
     0x3001: (
-        ("Nominal current", UNSIGNED32, "rw"),
-        ("Output current limit", UNSIGNED32, "rw"),
-        ("Number of pole pairs", UNSIGNED8, "rw"),
-        ("Thermal time constant winding", UNSIGNED16, "rw"),
-        ("Torque constant", UNSIGNED32, "rw"),
+        ("Nominal current", datatypes.UNSIGNED32, "rw"),
+        ("Output current limit", datatypes.UNSIGNED32, "rw"),
+        ("Number of pole pairs", datatypes.UNSIGNED8, "rw"),
+        ("Thermal time constant winding", datatypes.UNSIGNED16, "rw"),
+        ("Torque constant", datatypes.UNSIGNED32, "rw"),
     ),
     0x30D1: (
-        ("Current actual value averaged", INTEGER32, "ro"),
-        ("Current actual value", INTEGER32, "ro"),
+        ("Current actual value averaged", datatypes.INTEGER32, "ro"),
+        ("Current actual value", datatypes.INTEGER32, "ro"),
     ),
-    0x30D2: (("Torque actual value averaged", INTEGER16, "ro"),),
+    0x30D2: (("Torque actual value averaged", datatypes.INTEGER16, "ro"),),
 }
 """Index to the members from sub-index 1 on; sub-index 0 is their number."""
-_OF_A_PDO = (("COB-ID", UNSIGNED32, "rw"), ("Transmission type", UNSIGNED8, "rw"))
-_MAPPED = tuple((f"Mapped object {k}", UNSIGNED32, "rw") for k in range(1, 13))
+_OF_A_PDO = (
+    ("COB-ID", datatypes.UNSIGNED32, "rw"),
+    ("Transmission type", datatypes.UNSIGNED8, "rw"),
+)
+_MAPPED = tuple((f"Mapped object {k}", datatypes.UNSIGNED32, "rw") for k in range(1, 13))
 for _number in range(4):
     RECORDS[0x1400 + _number] = _OF_A_PDO
-    RECORDS[0x1800 + _number] = (*_OF_A_PDO, ("Inhibit time", UNSIGNED16, "rw"))
+    RECORDS[0x1800 + _number] = (*_OF_A_PDO, ("Inhibit time", datatypes.UNSIGNED16, "rw"))
     RECORDS[0x1600 + _number] = RECORDS[0x1A00 + _number] = _MAPPED
 
 
@@ -70,7 +64,7 @@ def object_dictionary() -> ObjectDictionary:
         made.add_object(_variable(index, 0, name, kind, access))
     for index, members in RECORDS.items():
         record = ODRecord(f"{index:#06x}", index)
-        count = ("Number of entries", UNSIGNED8, "rw" if members is _MAPPED else "ro")
+        count = ("Number of entries", datatypes.UNSIGNED8, "rw" if members is _MAPPED else "ro")
         for subindex, member in enumerate((count, *members)):
             record.add_member(_variable(index, subindex, *member))
         made.add_object(record)

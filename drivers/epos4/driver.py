@@ -25,11 +25,7 @@ def open_epos4(
     Raises:
         LinkError: The bus cannot be opened, an option is unknown, or `canopen` is missing.
     """
-    return made(
-        open_can(url),
-        lambda bus: Epos4(bus, node_id, rate_hz, host_timeout_ms),
-        "EPOS4",
-    )
+    return made(open_can(url), lambda bus: Epos4(bus, node_id, rate_hz, host_timeout_ms), "EPOS4")
 
 
 def _identifiers(options: Mapping[str, Any]) -> frozenset[int]:

@@ -56,7 +56,6 @@ def identify(link: "CanopenLink") -> tuple[DeviceIdentity, Ratings]:
     ratings = Ratings(
         rated_torque_n_m=read(0x6076) * 1e-6,
         torque_constant_n_m_per_a=read(0x3001, 5) * 1e-6,
-        nominal_current_a=read(0x3001, 1) * 1e-3,
         current_limit_a=read(0x3001, 2) * 1e-3,
     )
     product, revision, serial = (read(0x1018, part) for part in (2, 3, 4))

@@ -139,13 +139,11 @@ class Ratings:
     Attributes:
         rated_torque_n_m: Motor rated torque; torques are in thousandths of it.
         torque_constant_n_m_per_a: Torque constant.
-        nominal_current_a: Nominal current.
         current_limit_a: Output current limit, the one that takes effect.
     """
 
     rated_torque_n_m: float
     torque_constant_n_m_per_a: float
-    nominal_current_a: float
     current_limit_a: float
 
     def __post_init__(self) -> None:

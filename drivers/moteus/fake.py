@@ -13,6 +13,8 @@ from drivers.moteus.protocol import State
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import Outbox, SimulatedTransport
 
+DEVICE_ID = 1
+"""It stays silent for any other."""
 PREPARES_MS = 20
 """Time between stopped and position mode, in which it measures its current sensors."""
 _INERTIA_KG_M2, _FRICTION_N_M_S = 1e-5, 2e-4
@@ -21,15 +23,10 @@ _MEASURED = 4
 
 
 class MoteusFake(Outbox):
-    """A controller and its fdcanusb, with `drivers.transport.simulated.Board`'s interface.
+    """A controller and its fdcanusb, with `drivers.transport.simulated.Board`'s interface."""
 
-    Args:
-        device_id: Its identifier; it stays silent for any other.
-    """
-
-    def __init__(self, device_id: int = 1) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._id = device_id
         self._held = b""
         self._speed_rad_s = self._angle_rad = 0.0
         self._valid_ms = math.inf
@@ -48,7 +45,7 @@ class MoteusFake(Outbox):
             self._out += b"OK\r\n"
             try:
                 frame = protocol.decode_line(line)
-                if frame is not None and frame[0] & 0x7F == self._id:
+                if frame is not None and frame[0] & 0x7F == DEVICE_ID:
                     self._carry_out(frame[1])
             except FrameError:
                 continue
@@ -92,7 +89,7 @@ class MoteusFake(Outbox):
             else:
                 self._command |= {first + k: value for k, value in enumerate(values)}
                 self._valid_ms = 1e3 * self._command.get(protocol.COMMAND + 7, math.inf)
-        self._out += protocol.receive_line(self._id, answer)
+        self._out += protocol.receive_line(DEVICE_ID, answer)
 
     def _change(self, mode: int) -> None:
         if mode == protocol.STOPPED:

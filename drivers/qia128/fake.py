@@ -12,6 +12,8 @@ from drivers.qia128.driver import Qia128
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import Outbox, SimulatedTransport
 
+RATE_HZ = 1300
+
 
 class Qia128Fake(Outbox):
     """An amplifier, with the interface of `drivers.transport.simulated.Board`.
@@ -20,7 +22,6 @@ class Qia128Fake(Outbox):
         serial: Its serial number.
         zero: Reading without load.
         full_scale: Reading at rated load.
-        rate_hz: Samples a second.
     """
 
     def __init__(
@@ -28,7 +29,6 @@ class Qia128Fake(Outbox):
         serial: int = 712345,
         zero: int = protocol.MIDDLE + 1200,
         full_scale: int = protocol.MIDDLE + 3_355_443,
-        rate_hz: int = 1300,
     ) -> None:
         super().__init__()
         self._numbers = {
@@ -38,7 +38,6 @@ class Qia128Fake(Outbox):
         }
         self._zero = zero
         self._span = full_scale - zero
-        self._rate_hz = rate_hz
         self._ticks = 0
         self._sent = 0
         self._in = b""
@@ -60,14 +59,14 @@ class Qia128Fake(Outbox):
     def advance(self, ticks: int) -> None:
         """Let `ticks` milliseconds pass; while it streams, readings are made."""
         self._ticks += ticks
-        made = self._ticks * self._rate_hz // 1000
+        made = self._ticks * RATE_HZ // 1000
         if self.streaming:
             self._out += protocol.encode_frames(self.raw(np.arange(self._sent, made)))
         self._sent = made
 
     def raw(self, numbers: np.ndarray) -> np.ndarray:
         """Return the readings with the given numbers since power-up, shape (n,)."""
-        load = 0.4 * np.sin(2 * np.pi * numbers / self._rate_hz)
+        load = 0.4 * np.sin(2 * np.pi * numbers / RATE_HZ)
         return (self._zero + np.round(self._span * load)).astype(np.int64)
 
     def _answer(self, command: tuple[int, int], payload: bytes) -> None:

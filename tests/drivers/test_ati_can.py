@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from drivers.ati_can import protocol
 from drivers.ati_can.driver import AtiCan, open_ati_can
 from drivers.ati_can.fake import MATRIX, AtiCanFake
-from drivers.device import AXES, SampleFlag, moved_wrench
+from drivers.device import AXES, SampleFlag
 from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
 from drivers.transport.can_bus import CanFrame
 from drivers.transport.simulated_can import SimulatedCanBus
@@ -235,16 +235,6 @@ def test_nobody_there_is_a_timeout_that_names_the_base() -> None:
         device.identify()
     there = AtiCan(SimulatedCanBus([AtiCanFake(base=0x68)]), base=0x68)
     assert there.identify().serial == "FT012345"
-
-
-def test_the_torque_about_another_point() -> None:
-    # 1 N along y at the sensor's origin, seen from 1 m behind it on x, turns about +z
-    wrench = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-    moved = moved_wrench(wrench, np.array([-1.0, 0.0, 0.0]))
-    assert moved.tolist() == [0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    # a force whose line passes through the point has no torque about it
-    pull = np.array([0.0, 0.0, -5.0, 0.0, 0.0, 0.0])
-    assert not moved_wrench(pull, np.array([0.0, 0.0, 0.3]))[3:].any()
 
 
 @given(st.binary(max_size=8), st.binary(max_size=8), st.binary(max_size=8))

@@ -28,7 +28,7 @@ from drivers.errors import (
 from drivers.transport.can_bus import CanFrame
 from drivers.transport.simulated_can import SimulatedCanBus
 
-RATINGS = Ratings(12.46e-3, 17.8e-3, 0.7, 1.4)
+RATINGS = Ratings(12.46e-3, 17.8e-3, 1.4)
 
 
 class Tapped(SimulatedCanBus):
