@@ -20,20 +20,7 @@ from drivers.errors import FrameError
 from drivers.framing import FrameStream, encode_frame, encode_frames
 from drivers.teensy import protocol
 from drivers.teensy.logic import ENGAGED, STATE, Bench, BoardLogic, Drive
-from drivers.teensy.protocol import (
-    GAIN_NAMES,
-    STATUS_ARMED,
-    STATUS_QUEUE_DRY,
-    STATUS_REFERENCED,
-    STATUS_SATURATED,
-    STATUS_WATCHDOG_TRIPPED,
-    TRIP_SHIFT,
-    Ack,
-    Identity,
-    Kind,
-    Result,
-    Trip,
-)
+from drivers.teensy.protocol import GAIN_NAMES, STATUS_ARMED, Ack, Identity, Kind, Result, Trip
 from drivers.teensy.reference_board import REFERENCE_LOGIC
 from drivers.transport.simulated import Outbox
 
@@ -43,7 +30,7 @@ FRAME_OVERHEAD = 4
 """Bytes of a sample frame on the wire beyond its payload."""
 _ONCE_ONLY = (Kind.ARM, Kind.START, Kind.SETPOINTS)
 """Commands that a repeat, sent because the answer was lost, must not carry out again."""
-_SILENT = STATUS_WATCHDOG_TRIPPED | Trip.HOST_SILENT << TRIP_SHIFT
+_SILENT = protocol.STATUS_WATCHDOG_TRIPPED | Trip.HOST_SILENT << protocol.TRIP_SHIFT
 
 
 class PythonBoard(Outbox):
@@ -254,11 +241,11 @@ class PythonBoard(Outbox):
     @property
     def _status(self) -> int:
         """The state as the host gets it: a simulated rig's counters are absolute."""
-        return self._state | STATUS_REFERENCED
+        return self._state | protocol.STATUS_REFERENCED
 
     @property
     def _trip(self) -> int:
-        return self._state >> TRIP_SHIFT
+        return self._state >> protocol.TRIP_SHIFT
 
     @property
     def _armed(self) -> bool:
@@ -287,7 +274,7 @@ class PythonBoard(Outbox):
         counts = self._bench.advance(ticks, *np.ascontiguousarray(setpoints.T), self._drive)
         status = counts[:, self._logic.status_column].astype(np.uint16)
         dry = (status[fed:] & STATUS_ARMED) != 0
-        status[fed:][dry] |= STATUS_QUEUE_DRY
+        status[fed:][dry] |= protocol.STATUS_QUEUE_DRY
         self._log(counts, status)
 
     def _play(self, ticks: int, engaged: bool) -> tuple[NDArray[np.int32], int]:
@@ -318,8 +305,8 @@ class PythonBoard(Outbox):
         saturated = self._logic.saturated(counts[:fitting])
         samples["version"] = protocol.VERSION
         samples["kind"] = Kind.SAMPLE
-        samples["status"] = status[:fitting] | np.uint16(STATUS_REFERENCED)
-        samples["status"][saturated] |= np.uint16(STATUS_SATURATED)
+        samples["status"] = status[:fitting] | np.uint16(protocol.STATUS_REFERENCED)
+        samples["status"][saturated] |= np.uint16(protocol.STATUS_SATURATED)
         samples["sequence"] = (self._sequence + np.arange(fitting, dtype=np.int64)) % 2**32
         samples["tick_us"] = ticks_us[:fitting]
         samples["dropped"] = self._dropped

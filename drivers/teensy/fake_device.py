@@ -4,20 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.device import Device
+from drivers.teensy import reference_board as at
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.logic import Drive
-from drivers.teensy.reference_board import (
-    COLUMNS,
-    CURRENT,
-    DISTAL,
-    FSR,
-    JAW,
-    MOTOR,
-    PROXIMAL,
-    SPINDLE,
-    run_ticks,
-)
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 
@@ -39,15 +29,15 @@ class HandMovedBench:
         time_s = (self._ticks + np.arange(ticks)) * 1e-3
         self._ticks += ticks
         turn = np.sin(2 * np.pi * time_s)
-        counts = np.zeros((ticks, COLUMNS), np.int32)
-        counts[:, MOTOR] = 3500 * turn
-        counts[:, SPINDLE] = -200 * turn
-        counts[:, JAW] = 80 * turn
-        counts[:, PROXIMAL] = 900 * turn
-        counts[:, DISTAL] = -700 * turn
-        counts[:, CURRENT] = 3 * np.cos(2 * np.pi * 50 * time_s)
-        counts[:, FSR] = 300 * np.maximum(turn, 0.0)
-        run_ticks(counts, target, load_ma, *drive.arrays)
+        counts = np.zeros((ticks, at.COLUMNS), np.int32)
+        counts[:, at.MOTOR] = 3500 * turn
+        counts[:, at.SPINDLE] = -200 * turn
+        counts[:, at.JAW] = 80 * turn
+        counts[:, at.PROXIMAL] = 900 * turn
+        counts[:, at.DISTAL] = -700 * turn
+        counts[:, at.CURRENT] = 3 * np.cos(2 * np.pi * 50 * time_s)
+        counts[:, at.FSR] = 300 * np.maximum(turn, 0.0)
+        at.run_ticks(counts, target, load_ma, *drive.arrays)
         return counts
 
 

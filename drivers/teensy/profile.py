@@ -14,24 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import DriverError, FrameError
-from drivers.teensy.protocol import (
-    HEADER_DTYPE,
-    LAYOUTS,
-    SESSION_DTYPE,
-    STATUS_ARMED,
-    STATUS_HOLDING,
-    STATUS_LIMIT_TRIPPED,
-    STATUS_QUEUE_DRY,
-    STATUS_REFERENCED,
-    STATUS_SATURATED,
-    STATUS_WATCHDOG_TRIPPED,
-    TRIP_SHIFT,
-    VERSION,
-    Kind,
-    Result,
-    Trip,
-    TripReport,
+from drivers.teensy import protocol
+from drivers.teensy.protocol import SESSION_DTYPE, VERSION, Kind, Result, Trip, TripReport
+
+_STATES = (
+    *("ARMED", "SATURATED", "QUEUE_DRY", "WATCHDOG_TRIPPED", "LIMIT_TRIPPED"),
+    *("HOLDING", "REFERENCED"),
 )
+"""Bits of the board's state, as the contract names them."""
 
 
 class ArmLimits(Protocol):
@@ -86,7 +76,7 @@ class Profile:
     def layouts(self) -> dict[Kind, np.dtype[np.void]]:
         """Layout of every frame kind; that of setpoints is the header before them."""
         own = {Kind.SAMPLE: self.sample, Kind.ARM: self.arm}
-        return {kind: (own | LAYOUTS)[kind] for kind in Kind}
+        return {kind: (own | protocol.LAYOUTS)[kind] for kind in Kind}
 
     @cached_property
     def text(self) -> str:
@@ -96,14 +86,11 @@ class Profile:
         for kind, layout in self.layouts.items():
             more = repeated if kind is Kind.SETPOINTS else ""
             lines.append(f"{kind} {kind.name}: {_fields(layout)}{more}")
-        lines.append(
-            f"status: {STATUS_ARMED} ARMED, {STATUS_SATURATED} SATURATED,"
-            f" {STATUS_QUEUE_DRY} QUEUE_DRY, {STATUS_WATCHDOG_TRIPPED} WATCHDOG_TRIPPED,"
-            f" {STATUS_LIMIT_TRIPPED} LIMIT_TRIPPED, {STATUS_HOLDING} HOLDING,"
-            f" {STATUS_REFERENCED} REFERENCED, trip << {TRIP_SHIFT}"
-        )
-        lines.append("trip: " + ", ".join(f"{trip.value} {trip.name}" for trip in Trip))
-        lines.append("result: " + ", ".join(f"{result.value} {result.name}" for result in Result))
+        states = ", ".join(f"{getattr(protocol, f'STATUS_{name}')} {name}" for name in _STATES)
+        lines.append(f"status: {states}, trip << {protocol.TRIP_SHIFT}")
+        for named in (Trip, Result):
+            meanings = ", ".join(f"{one.value} {one.name}" for one in named)
+            lines.append(f"{named.__name__.lower()}: {meanings}")
         return "".join(f"{line}\n" for line in lines)
 
     @cached_property
@@ -155,7 +142,7 @@ class Profile:
         Raises:
             FrameError: Too short, of another version, of an unknown kind, or of the wrong size.
         """
-        if len(payload) < HEADER_DTYPE.itemsize:
+        if len(payload) < protocol.HEADER_DTYPE.itemsize:
             raise FrameError(f"A frame of {len(payload)} bytes holds no header.")
         version, number = payload[0], payload[1]
         if version != VERSION:
@@ -208,5 +195,4 @@ def _whole(values: NDArray[np.integer], kind: np.dtype[Any], name: str) -> NDArr
             f"A {name} setpoint lies outside {bounds.min}..{bounds.max}.",
             f"The setpoints reach from {array.min()} to {array.max()}.",
         )
-    whole: NDArray[Any] = array.astype(kind)
-    return whole
+    return np.asarray(array.astype(kind))

@@ -17,17 +17,7 @@ from urllib.parse import parse_qsl
 
 import can
 
-from drivers.errors import (
-    BusOffError,
-    LinkError,
-    LinkLostError,
-    LinkTimeoutError,
-    MissingExtraError,
-    PortBusyError,
-    PortNotFoundError,
-    PortPermissionError,
-    UnknownSchemeError,
-)
+from drivers import errors
 from drivers.transport.can_bus import MAX_DATA, CanBus, CanCounters, CanFrame
 from drivers.transport.transport import HostLink
 
@@ -148,7 +138,7 @@ class PythonCanBus(HostLink):
         if kind & _BUS_OFF:
             self.counters.bus_off += 1
             raise self._lose(
-                BusOffError(
+                errors.BusOffError(
                     f"The CAN controller of {self.url} has taken itself off the bus.",
                     "It could not get its frames through: a short, a missing terminator,"
                     " swapped wires, or another bit rate.",
@@ -157,16 +147,16 @@ class PythonCanBus(HostLink):
                 )
             )
 
-    def _stuck(self) -> LinkTimeoutError:
-        return LinkTimeoutError(
+    def _stuck(self) -> errors.LinkTimeoutError:
+        return errors.LinkTimeoutError(
             f"{self.url} took no frame for {SEND_TIMEOUT_S:g} s.",
             "No other node acknowledges, or the bus is full.",
             "Check that a device is powered, and that both ends have one bit rate.",
         )
 
-    def _gone(self, error: Exception) -> LinkLostError:
+    def _gone(self, error: Exception) -> errors.LinkLostError:
         return self._lose(
-            LinkLostError(
+            errors.LinkLostError(
                 f"The CAN bus {self.url} is gone.",
                 f"The interface was unplugged or taken down ({error}).",
                 "Check the adapter and start again.",
@@ -196,11 +186,11 @@ def open_can(url: str) -> CanBus:
         arguments = interface.channel(channel)
         arguments |= {key: interface.options[key](value) for key, value in options.items()}
     except ValueError as error:
-        raise LinkError(
+        raise errors.LinkError(
             f"{url!r} cannot be read: {error}.", "", f"Write e.g. {_EXAMPLES}."
         ) from error
     if name in ("slcan", "gs_usb") and "bitrate" not in options:
-        raise LinkError(
+        raise errors.LinkError(
             f"{url!r} names no bit rate.",
             "A wrong one disturbs everybody on the bus, so none is assumed.",
             f"Write {url}{'&' if options else '?'}bitrate=1000000, or the rate of your bus.",
@@ -218,7 +208,7 @@ def _split(url: str) -> tuple[str, str, dict[str, str]]:
     scheme, _, named = rest.partition(":")
     name, _, channel = named.partition(":")
     if scheme.lower() != "can" or name not in _INTERFACES or not channel:
-        raise UnknownSchemeError(
+        raise errors.UnknownSchemeError(
             f"No CAN bus is opened by {url!r}.",
             f"The interface is one of {', '.join(_INTERFACES)}, followed by its channel.",
             f"Write e.g. {_EXAMPLES}.",
@@ -226,7 +216,7 @@ def _split(url: str) -> tuple[str, str, dict[str, str]]:
     options = dict(parse_qsl(query, keep_blank_values=True))
     strange = sorted(set(options) - set(_INTERFACES[name].options))
     if strange:
-        raise LinkError(
+        raise errors.LinkError(
             f"{name} has no option {', '.join(strange)}.",
             f"Its options are: {', '.join(_INTERFACES[name].options) or 'none'}.",
             "The bit rate of socketcan is set by: sudo ip link set can0 up type can bitrate N."
@@ -236,25 +226,29 @@ def _split(url: str) -> tuple[str, str, dict[str, str]]:
     return name, channel, options
 
 
-def _explain(url: str, name: str, channel: str, error: Exception) -> LinkError:
+def _explain(url: str, name: str, channel: str, error: Exception) -> errors.LinkError:
     """Turn an interface's refusal into what happened, why, and what to do."""
     code = getattr(error, "errno", None) or getattr(error, "error_code", None)
     up = f"Run: sudo ip link set {channel} up type can bitrate N."
     if isinstance(error, (ImportError, can.CanInterfaceNotImplementedError)):
-        return MissingExtraError(f"{url} cannot be opened.", f"{error}.", "can")
+        return errors.MissingExtraError(f"{url} cannot be opened.", f"{error}.", "can")
     if code in (errno.ENODEV, errno.ENOENT, errno.ENXIO):
         fix = up if name == "socketcan" else "Is the adapter plugged in?"
-        return PortNotFoundError(f"There is no CAN bus {url}.", str(error), fix)
+        return errors.PortNotFoundError(f"There is no CAN bus {url}.", str(error), fix)
     if code in (errno.EACCES, errno.EPERM):
-        return PortPermissionError(
+        return errors.PortPermissionError(
             f"You may not open {url}.", str(error), "Give your user access by a udev rule."
         )
     if code in (errno.EBUSY, errno.EAGAIN):
-        return PortBusyError(f"{url} is in use.", str(error), "Close the program that holds it.")
+        return errors.PortBusyError(
+            f"{url} is in use.", str(error), "Close the program that holds it."
+        )
     if code == errno.EAFNOSUPPORT:
-        return LinkError(
+        return errors.LinkError(
             f"{url} cannot be opened.",
             "The kernel of this computer has no CAN support.",
             "Run: sudo modprobe can_raw; or use an slcan or gs_usb adapter.",
         )
-    return LinkError(f"{url} cannot be opened.", f"{error}.", up if name == "socketcan" else "")
+    return errors.LinkError(
+        f"{url} cannot be opened.", f"{error}.", up if name == "socketcan" else ""
+    )

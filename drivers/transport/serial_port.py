@@ -16,14 +16,7 @@ import serial
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
-from drivers.errors import (
-    LinkError,
-    LinkLostError,
-    LinkTimeoutError,
-    PortBusyError,
-    PortNotFoundError,
-    PortPermissionError,
-)
+from drivers import errors
 from drivers.transport.transport import HostLink, Transport, open_transport
 
 BAUD_RATE = 115200
@@ -72,7 +65,7 @@ class SerialTransport(HostLink):
         try:
             self._port.write(data)
         except serial.SerialTimeoutException as error:
-            raise LinkTimeoutError(
+            raise errors.LinkTimeoutError(
                 f"{self.url} took no bytes for {WRITE_TIMEOUT_S:g} s.",
                 "The device has stopped reading.",
                 "Unplug it and plug it in again.",
@@ -107,10 +100,10 @@ class SerialTransport(HostLink):
         if self._port.timeout != timeout_s:
             self._port.timeout = timeout_s
 
-    def _gone(self, error: Exception) -> LinkLostError:
+    def _gone(self, error: Exception) -> errors.LinkLostError:
         self._port.close()
         return self._lose(
-            LinkLostError(
+            errors.LinkLostError(
                 f"The link to {self.url} is gone.",
                 f"The device was unplugged or reset, or another program took the port ({error}).",
                 "Check the cable and start again.",
@@ -157,7 +150,7 @@ def open_line(url: str, baud_rate: int, parity: str = "N") -> Transport:
             transport.set_line(baud_rate, parity)
         except _SETTING_ERRORS as error:
             transport.close()
-            raise LinkError(
+            raise errors.LinkError(
                 f"{url} cannot be set to {baud_rate} bit/s, parity {parity}.",
                 str(error),
                 "Use an adapter that has this speed, or set the device to another one.",
@@ -175,7 +168,7 @@ def find_usb_port(url: str) -> str:
     try:
         vendor, product = int(parts[1], 16), int(parts[2], 16)
     except (IndexError, ValueError) as error:
-        raise PortNotFoundError(
+        raise errors.PortNotFoundError(
             f"{url!r} is not a USB identity.", "", "Write it as usb:16c0:0483:SERIAL."
         ) from error
     ports = list(list_ports.comports())
@@ -186,7 +179,7 @@ def find_usb_port(url: str) -> str:
         return str(matching[0].device)
     what = f"{'Several devices have' if matching else 'No device has'} the identity {url}."
     fix = "Give its serial number too: usb:VID:PID:SERIAL." if matching else "Plug it in."
-    raise PortNotFoundError(what, _present(ports), f"{fix} See: rig devices")
+    raise errors.PortNotFoundError(what, _present(ports), f"{fix} See: rig devices")
 
 
 def port_holders(path: str) -> list[str]:
@@ -202,23 +195,23 @@ def port_holders(path: str) -> list[str]:
     return holders
 
 
-def _explain(url: str, name: str, error: Exception) -> LinkError:
+def _explain(url: str, name: str, error: Exception) -> errors.LinkError:
     """Turn pyserial's refusal into what happened, why, and what to do."""
     code = getattr(error, "errno", None)
     if code in (errno.EAGAIN, errno.EBUSY):
         holders = ", ".join(port_holders(name)) or "a program of another user"
-        return PortBusyError(
+        return errors.PortBusyError(
             f"{url} is in use.", f"It is held by {holders}.", "Close that program and try again."
         )
     if code in (errno.EACCES, errno.EPERM):
-        return PortPermissionError(
+        return errors.PortPermissionError(
             f"You may not open {url}.", f"{name} belongs to group {_group(name)}.", _join(name)
         )
     if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return PortNotFoundError(
+        return errors.PortNotFoundError(
             f"There is no port {url}.", _present(list(list_ports.comports())), "Is it plugged in?"
         )
-    return LinkError(f"{url} cannot be opened.", str(error))
+    return errors.LinkError(f"{url} cannot be opened.", str(error))
 
 
 def _present(ports: Sequence[ListPortInfo]) -> str:

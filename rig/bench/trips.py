@@ -8,18 +8,11 @@ from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
 from drivers.errors import DriverError
+from drivers.teensy import protocol
 from drivers.teensy.core import CoreGuard, firmware_library
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.profile import ArmLimits
-from drivers.teensy.protocol import (
-    STATUS_ARMED,
-    STATUS_HOLDING,
-    STATUS_LIMIT_TRIPPED,
-    STATUS_WATCHDOG_TRIPPED,
-    TRIP_SHIFT,
-    Trip,
-    TripReport,
-)
+from drivers.teensy.protocol import Trip, TripReport
 from estimation.channels import unit_of
 from rig.bench.sensor_logger import SensorLogger
 from rig.errors import ExitCode, RigError, SafetyTripError
@@ -150,9 +143,9 @@ def _numbers(report: TripReport, calibrations: CalibrationSet, machine: Machine)
 def tripped(reading: Reading) -> tuple[Trip, bool] | None:
     """Return the crossed limit and whether the board holds, None without a trip."""
     newest = int(reading.counts["status"][-1])
-    if not newest & (STATUS_LIMIT_TRIPPED | STATUS_WATCHDOG_TRIPPED):
+    if not newest & (protocol.STATUS_LIMIT_TRIPPED | protocol.STATUS_WATCHDOG_TRIPPED):
         return None
-    return Trip(newest >> TRIP_SHIFT), bool(newest & STATUS_HOLDING)
+    return Trip(newest >> protocol.TRIP_SHIFT), bool(newest & protocol.STATUS_HOLDING)
 
 
 class HostWatch:
@@ -174,7 +167,7 @@ class HostWatch:
 
     def check(self, reading: Reading) -> TripReport | None:
         """Return the first crossing in the armed samples, None when there is none."""
-        armed = has_status(reading.counts["status"], STATUS_ARMED)
+        armed = has_status(reading.counts["status"], protocol.STATUS_ARMED)
         if self._guard is None or not armed.any():
             return None
         samples = reading.counts[armed]
