@@ -197,63 +197,25 @@ class Arm:
         )
 
 
+def _turning(
+    name: str, row: DhRow, reach_deg: float, speed: float, link: Link = "full", spring: bool = False
+) -> Joint:
+    """Return a revolute joint that turns as far to either side."""
+    reach = radians(reach_deg)
+    return Joint(name, "revolute", row, -reach, reach, speed, link, spring)
+
+
 PSM = Arm(
     name="da Vinci patient-side manipulator, serial",
     joints=(
+        _turning("outer yaw", DhRow(0.0, pi / 2, 0.0, pi / 2), 60, 2.0, spring=True),
+        _turning("outer pitch", DhRow(0.0, -pi / 2, 0.0, -pi / 2), 45, 2.0, spring=True),
         Joint(
-            name="outer yaw",
-            kind="revolute",
-            row=DhRow(0.0, pi / 2, 0.0, pi / 2),
-            lower=radians(-60),
-            upper=radians(60),
-            speed=2.0,
-            spring=True,
+            "insertion", "prismatic", DhRow(0, pi / 2, -0.43, 0), lower=0.05, upper=0.18, speed=0.4
         ),
-        Joint(
-            name="outer pitch",
-            kind="revolute",
-            row=DhRow(0.0, -pi / 2, 0.0, -pi / 2),
-            lower=radians(-45),
-            upper=radians(45),
-            speed=2.0,
-            spring=True,
-        ),
-        Joint(
-            name="insertion",
-            kind="prismatic",
-            row=DhRow(0.0, pi / 2, -0.43, 0.0),
-            lower=0.05,
-            upper=0.18,
-            speed=0.4,
-        ),
-        Joint(
-            name="outer roll",
-            kind="revolute",
-            row=DhRow(0.0, 0.0, 0.41, 0.0),
-            lower=radians(-180),
-            upper=radians(180),
-            speed=6.0,
-            link="first moments",
-            spring=True,
-        ),
-        Joint(
-            name="wrist pitch",
-            kind="revolute",
-            row=DhRow(0.0, -pi / 2, 0.0, -pi / 2),
-            lower=radians(-90),
-            upper=radians(90),
-            speed=5.0,
-            link="first moments",
-        ),
-        Joint(
-            name="wrist yaw",
-            kind="revolute",
-            row=DhRow(0.0091, -pi / 2, 0.0, -pi / 2),
-            lower=radians(-90),
-            upper=radians(90),
-            speed=5.0,
-            link="first moments",
-        ),
+        _turning("outer roll", DhRow(0.0, 0.0, 0.41, 0.0), 180, 6.0, "first moments", spring=True),
+        _turning("wrist pitch", DhRow(0.0, -pi / 2, 0.0, -pi / 2), 90, 5.0, "first moments"),
+        _turning("wrist yaw", DhRow(0.0091, -pi / 2, 0.0, -pi / 2), 90, 5.0, "first moments"),
     ),
     tip=DhRow(0.0, -pi / 2, 0.01, 0.0),
     viscous_pairs=((4, 5), (5, 4)),
