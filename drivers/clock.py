@@ -195,8 +195,7 @@ def _distance_from_middle_line(
     rises = (skew[good][second] - skew[good][first])[apart]
     drift = float(np.median(rises / steps_s[apart])) if apart.any() else 0.0
     rest = skew - drift * (device_s - device_s[0])
-    distance: NDArray[np.float64] = rest - np.median(rest[good])
-    return distance
+    return np.asarray(rest - np.median(rest[good]))
 
 
 def _straight(

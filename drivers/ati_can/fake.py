@@ -35,8 +35,7 @@ CALIBRATIONS = 2
 
 def swaying(tick: int) -> NDArray[np.int64]:
     """Return the gauges of a load that sways."""
-    gauges: NDArray[np.int64] = np.round(900 * np.sin(0.01 * tick + np.arange(6))).astype(np.int64)
-    return gauges
+    return np.asarray(np.round(900 * np.sin(0.01 * tick + np.arange(6))).astype(np.int64))
 
 
 class AtiCanFake:

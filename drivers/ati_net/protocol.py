@@ -164,5 +164,4 @@ def status_words(status: int) -> list[str]:
 
 def is_data_fault(status: NDArray[np.uint32]) -> NDArray[np.bool_]:
     """Whether each status makes its sample doubtful; a latched threshold alone does not."""
-    faulty: NDArray[np.bool_] = (status & ~np.uint32(SUMMARY | LATCHED)) != 0
-    return faulty
+    return np.asarray((status & ~np.uint32(SUMMARY | LATCHED)) != 0)

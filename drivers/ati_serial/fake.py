@@ -58,8 +58,7 @@ class AtiSerialFake(Outbox):
     def gauges(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the gauges in the frames with the given numbers, shape (n, 6)."""
         turn = np.sin(2 * np.pi * numbers / 7000)[:, np.newaxis]
-        gauges: NDArray[np.int64] = np.round(turn * np.arange(1000, 7000, 1000)).astype(np.int64)
-        return gauges
+        return np.round(turn * np.arange(1000, 7000, 1000)).astype(np.int64)
 
 
 def _server(block: bytes) -> "ModbusServer":

@@ -108,8 +108,7 @@ def encode_calibration(calibration: Calibration) -> bytes:
 def frame_checks(candidates: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return for each row, shape (m, 13), whether its low 7 bits of checksum are right."""
     sums = candidates[:, :12].sum(axis=1, dtype=np.uint32) & 0x7F
-    holds: NDArray[np.bool_] = sums == (candidates[:, 12] & 0x7F)
-    return holds
+    return np.asarray(sums == (candidates[:, 12] & 0x7F))
 
 
 def decode_frames(frames: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

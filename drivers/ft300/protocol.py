@@ -29,8 +29,7 @@ def message_checks(candidates: NDArray[np.uint8]) -> NDArray[np.bool_]:
     for column in range(MESSAGE_SIZE - 2):
         crc = crc >> 8 ^ _TABLE[(crc ^ candidates[:, column]) & 0xFF]
     sent = candidates[:, 14].astype(np.uint16) | candidates[:, 15].astype(np.uint16) << 8
-    holds: NDArray[np.bool_] = (candidates[:, :2] == _HEADER).all(axis=1) & (crc == sent)
-    return holds
+    return np.asarray((candidates[:, :2] == _HEADER).all(axis=1) & (crc == sent))
 
 
 def decode_messages(messages: NDArray[np.uint8]) -> NDArray[np.int64]:

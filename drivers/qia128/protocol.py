@@ -83,8 +83,7 @@ def find_packet(data: bytes, command: tuple[int, int]) -> tuple[bytes, int] | No
 def frame_checks(candidates: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return for each row, shape (m, 4), whether it is a reading with its checksum."""
     weighted = candidates[:, :3] * np.array([1, 2, 3], np.uint8)
-    holds: NDArray[np.bool_] = weighted.sum(axis=1, dtype=np.uint8) == candidates[:, 3]
-    return holds
+    return np.asarray(weighted.sum(axis=1, dtype=np.uint8) == candidates[:, 3])
 
 
 def readings(frames: NDArray[np.uint8]) -> NDArray[np.int64]:

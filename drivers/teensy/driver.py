@@ -335,8 +335,7 @@ class TeensyLogger:
         if known.all():
             return samples
         self.counters.unknown_frames += int(np.count_nonzero(~known))
-        kept: NDArray[np.void] = samples[known]
-        return kept
+        return np.asarray(samples[known])
 
 
 _ACK = bytes([Kind.ACK])

@@ -198,13 +198,11 @@ def _slips(position: FloatArray, joint: Joint) -> list[FloatArray]:
 
 
 def _sign(motion: Motion, k: int, joint: Joint) -> FloatArray:
-    sign: FloatArray = np.tanh(motion.velocity[:, k] / (SIGN_SHARE * joint.speed))
-    return sign
+    return np.tanh(motion.velocity[:, k] / (SIGN_SHARE * joint.speed))
 
 
 def _slow(motion: Motion, k: int, joint: Joint) -> FloatArray:
-    share: FloatArray = np.exp(-((motion.velocity[:, k] / (STRIBECK_SHARE * joint.speed)) ** 2))
-    return share
+    return np.exp(-((motion.velocity[:, k] / (STRIBECK_SHARE * joint.speed)) ** 2))
 
 
 def _track(position: FloatArray, joint: Joint) -> FloatArray:

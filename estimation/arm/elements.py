@@ -20,8 +20,7 @@ def slip(position: FloatArray, threshold: float) -> FloatArray:
             only after each has slipped once.
         threshold: Stretch at which they slip, in the unit of position.
     """
-    stretch: FloatArray = _stretch(np.ascontiguousarray(position), threshold) / threshold
-    return stretch
+    return np.asarray(_stretch(np.ascontiguousarray(position), threshold) / threshold)
 
 
 @numba.njit(cache=True)
@@ -43,8 +42,7 @@ def creep(velocity: FloatArray, time_constant_s: float, period_s: float) -> Floa
         period_s: Sample period, s.
     """
     kept = np.exp(-period_s / time_constant_s)
-    lagged: FloatArray = signal.lfilter([1 - kept], [1, -kept], velocity, axis=0)
-    return lagged
+    return signal.lfilter([1 - kept], [1, -kept], velocity, axis=0)
 
 
 def hats(position: FloatArray, lower: float, upper: float, count: int) -> FloatArray:
@@ -58,5 +56,4 @@ def hats(position: FloatArray, lower: float, upper: float, count: int) -> FloatA
     """
     knots = np.linspace(lower, upper, count)
     inside = np.clip(position, lower, upper)[:, None]
-    columns: FloatArray = np.clip(1 - np.abs(inside - knots) / (knots[1] - knots[0]), 0, 1)
-    return columns
+    return np.asarray(np.clip(1 - np.abs(inside - knots) / (knots[1] - knots[0]), 0, 1))

@@ -64,8 +64,7 @@ def _series(sine: FloatArray, cosine: FloatArray, time_s: FloatArray, order: int
     pulse = 2 * np.pi * FUNDAMENTAL_HZ * np.arange(1.0, HARMONICS + 1)
     phase = np.outer(time_s, pulse) + order * np.pi / 2
     scale = (pulse**order)[:, None]
-    values: FloatArray = np.sin(phase) @ (scale * sine) + np.cos(phase) @ (scale * cosine)
-    return values
+    return np.sin(phase) @ (scale * sine) + np.cos(phase) @ (scale * cosine)
 
 
 def bounds(sine: FloatArray, cosine: FloatArray) -> FloatArray:
@@ -125,8 +124,7 @@ def numbers_of(arm: Arm, excitation: Excitation) -> FloatArray:
     lower, upper, _ = arm.limits
     off_centre = (excitation.middle - (lower + upper) / 2) / (0.25 * (upper - lower))
     share = np.arctanh(np.clip(off_centre, -0.99, 0.99))
-    raw: FloatArray = np.concatenate([excitation.sine, excitation.cosine, share[None]]).ravel()
-    return raw
+    return np.concatenate([excitation.sine, excitation.cosine, share[None]]).ravel()
 
 
 def condition(arm: Arm, excitation: Excitation) -> float:

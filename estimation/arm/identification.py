@@ -32,8 +32,7 @@ class Fit:
     def errors(self) -> FloatArray:
         """Standard errors, shape (parameters,). They include noise, not model error."""
         # rounding may leave a damped parameter's variance just below zero
-        spread: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return spread
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
 
 def smoothed(
@@ -59,8 +58,7 @@ def thesis_weights(torque: FloatArray) -> FloatArray:
     Args:
         torque: Shape (n, joints).
     """
-    weights: FloatArray = 1 / np.abs(torque).max(axis=0)
-    return weights
+    return np.asarray(1 / np.abs(torque).max(axis=0))
 
 
 def fit(
@@ -132,8 +130,7 @@ def damped_around(
     table = columns.reshape(-1, columns.shape[2])
     left = torque.ravel() - table @ prior
     gram = table.T @ table + damping**2 * np.eye(table.shape[1])
-    values: FloatArray = prior + linalg.solve(gram, table.T @ left, assume_a="pos")
-    return values
+    return prior + linalg.solve(gram, table.T @ left, assume_a="pos")
 
 
 def nrmsd_percent(estimate: FloatArray, torque: FloatArray) -> FloatArray:
@@ -149,5 +146,4 @@ def nrmsd_percent(estimate: FloatArray, torque: FloatArray) -> FloatArray:
     spread = np.ptp(torque, axis=0)
     if np.any(spread == 0):
         raise ArmError("A joint's torque does not change: its error has no scale.")
-    error: FloatArray = 100 * np.sqrt(np.mean((estimate - torque) ** 2, axis=0)) / spread
-    return error
+    return np.asarray(100 * np.sqrt(np.mean((estimate - torque) ** 2, axis=0)) / spread)

@@ -80,8 +80,7 @@ def tip_pose(arm: Arm, position: FloatArray) -> FloatArray:
     data = model.createData()
     q = _checked(arm, position)
     pin.framesForwardKinematics(model, data, arm.closure @ q if arm.loops else q)
-    pose: FloatArray = data.oMf[model.getFrameId(TIP)].homogeneous
-    return pose
+    return np.asarray(data.oMf[model.getFrameId(TIP)].homogeneous)
 
 
 def _checked(arm: Arm, position: FloatArray) -> FloatArray:

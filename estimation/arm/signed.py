@@ -63,8 +63,7 @@ class Products:
         """Return the RMS residual of each row with some columns and these parameters."""
         gram = self.gram[:, at[:, None], at]
         squares = self.square - 2 * self.right[:, at] @ values + (gram @ values) @ values
-        left: FloatArray = np.sqrt(np.maximum(squares, 0.0) / self.samples)
-        return left
+        return np.sqrt(np.maximum(squares, 0.0) / self.samples)
 
 
 @dataclass(frozen=True)
@@ -101,8 +100,7 @@ def solve(normal: Normal, blocks: Sequence[Block]) -> FloatArray:
     root = cholesky(scaled)
     target = solve_triangular(root, right / length, trans="T")
     bounded = np.concatenate([block.dissipative for block in blocks])
-    values: FloatArray = _bounded(root, target, bounded) / length
-    return values
+    return _bounded(root, target, bounded) / length
 
 
 def _lengths(own: FloatArray, blocks: Sequence[Block]) -> FloatArray:

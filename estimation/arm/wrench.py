@@ -78,8 +78,7 @@ def by_pseudo_inverse(jacobians: FloatArray, external_torque: FloatArray) -> Flo
         external_torque: Shape (n, joints).
     """
     inverse = np.linalg.pinv(jacobians.transpose(0, 2, 1))
-    wrenches: FloatArray = np.einsum("nij,nj->ni", inverse, external_torque)
-    return wrenches
+    return np.asarray(np.einsum("nij,nj->ni", inverse, external_torque))
 
 
 def most_likely(

@@ -89,8 +89,7 @@ def _of_roll(arm: Arm) -> list[ArmEffect]:
     roll = arm.joints[first - 1]
 
     def twist(m: Motion) -> FloatArray:
-        share: FloatArray = np.abs(m.position[:, [first - 1]]) / roll.upper
-        return share
+        return np.abs(m.position[:, [first - 1]]) / roll.upper
 
     return [
         ArmEffect(
@@ -182,5 +181,4 @@ def _on_each(arm: Arm, values: FloatArray) -> FloatArray:
 
 
 def _sign(velocity: FloatArray) -> FloatArray:
-    sign: FloatArray = np.tanh(velocity / SIGN_RAD_S)
-    return sign
+    return np.tanh(velocity / SIGN_RAD_S)

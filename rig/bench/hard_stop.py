@@ -122,8 +122,7 @@ def _follow(logger: TeensyLogger, here: int, step: float, reach: int) -> NDArray
         if first and not (parts[-1]["status"][-1] & STATUS_ARMED):
             break
     samples = np.concatenate(parts)
-    armed: NDArray[np.void] = samples[(samples["status"] & STATUS_ARMED) != 0]
-    return armed
+    return np.asarray(samples[(samples["status"] & STATUS_ARMED) != 0])
 
 
 def _read(logger: TeensyLogger, duration_s: float) -> NDArray[np.void]:

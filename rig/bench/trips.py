@@ -188,8 +188,7 @@ class HostWatch:
         self._newest_us = int(tick_us[-1])
         clock = np.concatenate(([before], tick_us)).astype(np.uint32)
         steps = (clock[1:] - clock[:-1]).astype(np.float64)  # it wraps
-        ticks: NDArray[np.float64] = steps / self._machine.profile.tick_us
-        return ticks
+        return steps / self._machine.profile.tick_us
 
 
 class BoardResetError(RigError):

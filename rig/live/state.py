@@ -317,8 +317,7 @@ class Recent:
     def flags(self, span_s: float) -> NDArray[np.int64]:
         """Return on how many of the last samples each flag was seen."""
         seen = np.isfinite(self.last(span_s, slice(FIRST_FLAG, FIRST_CHANNEL)))
-        counts: NDArray[np.int64] = seen.sum(axis=1)
-        return counts
+        return np.asarray(seen.sum(axis=1))
 
     def rate_hz(self) -> float | None:
         """Return the rate of the samples received in the last 2 s."""

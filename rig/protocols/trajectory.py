@@ -74,8 +74,7 @@ def chirp(
     t = times(duration_s)
     rate = math.log(high_hz / low_hz) / duration_s
     phase: FloatArray = 2.0 * np.pi * low_hz * np.expm1(rate * t) / rate
-    angle: FloatArray = start_rad + amplitude_rad * (1.0 - np.cos(phase))
-    return angle
+    return start_rad + amplitude_rad * (1.0 - np.cos(phase))
 
 
 def dwells(

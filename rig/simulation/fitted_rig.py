@@ -147,8 +147,7 @@ def with_load_unit(plant: PlantParameters, runs: Sequence[Recording]) -> PlantPa
 def _direction(run: Recording) -> FloatArray:
     speed = np.gradient(run["spindle_angle_rad"], run.time_s)
     smooth = signal.sosfiltfilt(signal.butter(2, 20.0, fs=run.sample_rate_hz, output="sos"), speed)
-    direction: FloatArray = np.tanh(smooth / 0.02)
-    return direction
+    return np.tanh(smooth / 0.02)
 
 
 def noise_std(values: FloatArray, rate_hz: float) -> float:

@@ -35,8 +35,7 @@ def smooth(random: Random, scale: float) -> FloatArray:
     rates = random.standard_normal(WAVES) / scale
     phases = random.uniform(0.0, 2.0 * np.pi, WAVES)
     waves = np.cos(np.outer(grid(), rates) + phases)
-    drawn: FloatArray = np.sqrt(2.0 / WAVES) * waves.sum(axis=1)
-    return drawn
+    return np.asarray(np.sqrt(2.0 / WAVES) * waves.sum(axis=1))
 
 
 def bend(random: Random, most: float = 0.45) -> FloatArray:
