@@ -85,8 +85,8 @@ class FsrCurve:
             low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
         return np.asarray((low + high) / 2)
 
-    def interval_n(self, fsr_v: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
-        """Return the interval of one force at voltages, any shape.
+    def interval_n(self, fsr_v: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the 95 % interval of one force at voltages, any shape.
 
         It is Student's with as many degrees of freedom as runs less one: samples of one run share
         its errors.
@@ -101,7 +101,7 @@ class FsrCurve:
         powers = polynomial.polyvander(np.asarray(fsr_v, float), len(self.coefficients) - 1)
         curve = np.einsum("...i,ij,...j->...", powers, np.array(self.fit.covariance), powers)
         spread = np.sqrt(np.maximum(curve, 0.0) + self.fit.residual_rms**2)
-        half = float(stats.t.ppf((1 + level) / 2, self.runs - 1)) * spread
+        half = float(stats.t.ppf(0.975, self.runs - 1)) * spread
         return force - half, force + half
 
 

@@ -245,12 +245,7 @@ class CalibrationRecord:
 
 
 def record_of_line(
-    line: LinearCalibration,
-    *,
-    kind: str,
-    made_at: str,
-    operator: str,
-    **rest: Any,
+    line: LinearCalibration, *, kind: str, made_at: str, operator: str, **rest: Any
 ) -> CalibrationRecord:
     """Return the record of a line whose numbers come from a certificate or a datasheet.
 

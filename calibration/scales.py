@@ -80,7 +80,8 @@ def torque_scale(runs: Sequence[Recording]) -> Scale:
     """
     pair = PAIRS["jaw"]
     names = (TORQUE, JAW_TORQUE)
-    whole = [run for run in runs if all(name in run for name in (*names, *_encoders()))]
+    needed = (*names, pair.channel, pair.reference)
+    whole = [run for run in runs if all(name in run for name in needed)]
     ratios = [fit[0] * pair.nominal_ratio for run in whole if (fit := fitted(run, pair))]
     parts = [steady(Measurement(run), names) for run in whole]
     both = [
@@ -138,10 +139,6 @@ def current_scale(runs: Sequence[Recording], record: CalibrationRecord | None) -
         span=span,
         residual=fit.residual_rms,
     )
-
-
-def _encoders() -> tuple[str, str]:
-    return PAIRS["jaw"].channel, PAIRS["jaw"].reference
 
 
 def _slope(part: Mapping[str, FloatArray], direction: float) -> tuple[FloatArray, FloatArray]:

@@ -41,10 +41,7 @@ def weight_torque_n_m(mass_kg: ArrayLike, arm_m: float) -> FloatArray:
 
 
 def check_shunt(
-    unloaded: ArrayLike,
-    shunted: ArrayLike,
-    certificate_v_v: float,
-    counts_per_v_v: float,
+    unloaded: ArrayLike, shunted: ArrayLike, certificate_v_v: float, counts_per_v_v: float
 ) -> float:
     """Return the change a shunt makes over the one its certificate states, less one.
 
@@ -153,7 +150,8 @@ def fit_torque(steps: Sequence[Step]) -> TorqueResult:
     slope, zero = 1.0 / float(line.slope), float(line.intercept)
     residual = (counts - zero) * slope - torques
     span = float(np.ptp(torques))
-    linearity = _linearity(torques, residual) / span
+    departures = [float(residual[torques == level].mean()) for level in np.unique(torques)]
+    linearity = max(map(abs, departures)) / span
     hysteresis, drift = _hysteresis(torques, residual, span), None
     if torques[0] == 0.0 and torques[-1] == 0.0:
         drift = float(residual[-1] - residual[0]) / span
@@ -196,10 +194,6 @@ def _at_rest(values: ArrayLike, name: str) -> FloatArray:
             "Wait until the weight hangs still.",
         )
     return readings
-
-
-def _linearity(torques: FloatArray, residual: FloatArray) -> float:
-    return max(abs(float(residual[torques == level].mean())) for level in np.unique(torques))
 
 
 def _hysteresis(torques: FloatArray, residual: FloatArray, span: float) -> float | None:

@@ -192,8 +192,8 @@ def fit_tool(gravity: ArrayLike, wrench: ArrayLike) -> Tool:
     fix = "Check the poses, and keep cables from pulling."
     weight = mass * STANDARD_GRAVITY_M_S2
     check_limit("not_linear", force_left / weight, RESIDUAL_LIMIT, "The force left over", fix)
-    # c x w = -[w]x c, with w = m g0 g and the moment m c unknown
-    torque_design = np.concatenate([np.hstack([np.eye(3), -_cross(p)]) for p in pull])
+    # c x w, with w = m g0 g and the moment m c unknown: rows of the columns' products with w
+    torque_design = np.concatenate([np.hstack([np.eye(3), np.cross(p, np.eye(3))]) for p in pull])
     torque, torque_cov, torque_left = _solve(torque_design, read[:, 3:].ravel())
     centre = torque[3:] / mass
     covariance = np.zeros((10, 10))
@@ -223,11 +223,6 @@ def at_point(
     force = read[..., :3]
     torque = read[..., 3:] - np.cross(np.asarray(point_m, dtype=np.float64), force)
     return np.concatenate([force @ turn.T, torque @ turn.T], axis=-1)
-
-
-def _cross(vector: FloatArray) -> FloatArray:
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _solve(design: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray, float]:

@@ -53,9 +53,7 @@ class TorqueSession:
     def __post_init__(self) -> None:
         if self.sensor not in SENSORS:
             raise BadDataError(
-                "points",
-                f"Unknown torque sensor {self.sensor!r}.",
-                f"Known: {', '.join(SENSORS)}.",
+                "points", f"Unknown torque sensor {self.sensor!r}.", f"Known: {', '.join(SENSORS)}."
             )
         rising = len(self.masses_kg) > 0 and np.all(np.diff((0.0, *self.masses_kg)) > 0)
         if not (rising and self.arm_m > 0 and np.isfinite(self.arm_m)):

@@ -176,7 +176,7 @@ class Epos4Fake:
         if index in self._absent:
             raise SdoAbortedError(NOT_THERE)
         if index == 0x6041:
-            return self._statusword()
+            return _LOW[self.state] | (0x200 if self._operational else 0)
         if index == 0x6064:
             return self._position
         if index in (0x6077, 0x30D2) and (index, subindex) != (0x30D2, 0):
@@ -241,9 +241,6 @@ class Epos4Fake:
         self._host_silent_ms = None
         self._node.nmt.state = "INITIALISING"
         self._node.nmt.state = "PRE-OPERATIONAL"
-
-    def _statusword(self) -> int:
-        return _LOW[self.state] | (0x200 if self._operational else 0)
 
     @property
     def _operational(self) -> bool:

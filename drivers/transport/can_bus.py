@@ -1,7 +1,7 @@
 """CAN frames to and from a bus: what every way to a bus offers, real or simulated."""
 
 import struct
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Protocol
 
 MAX_STANDARD_ID = 0x7FF
@@ -63,10 +63,6 @@ class CanCounters:
     overruns: int = 0
     echoes: int = 0
     ignored: int = 0
-
-    def as_dict(self) -> dict[str, int]:
-        """Return the counters by name."""
-        return asdict(self)
 
 
 class CanBus(Protocol):

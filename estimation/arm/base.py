@@ -58,7 +58,8 @@ def base_of(arm: Arm) -> Base:
     order = np.array(sorted(range(len(all_names)), key=lambda k: _rank(all_names[k])))
     norms = np.where(norms > DEPENDENT * norms.max(), norms, np.inf)  # others act on no joint
     scaled = stacked[:, order] / norms[order]
-    independent = _independent(scaled)
+    # whether each unit column depends on those before it
+    independent = np.abs(np.diag(np.linalg.qr(scaled, mode="r"))) > DEPENDENT
     kept, rest = np.sort(order[independent]), np.sort(order[~independent])
     relations = np.linalg.lstsq(stacked[:, kept], stacked[:, rest], rcond=None)[0]
     mapping = np.zeros((len(kept), len(all_names)))
@@ -71,12 +72,6 @@ def _rank(name: str) -> tuple[int, int]:
     link = int(name[-1]) if name[-1].isdigit() else BESIDE  # bodies of a loop come last
     kind = 0 if name.startswith(("F", "f", "Ke", "tau0")) else 1 if name.startswith("Ia") else 2
     return kind, link
-
-
-def _independent(columns: FloatArray) -> NDArray[np.bool_]:
-    """Return for each unit column whether it depends on those before it."""
-    left = np.abs(np.diag(np.linalg.qr(columns, mode="r")))
-    return np.asarray(left > DEPENDENT)
 
 
 def _combination(row: FloatArray, all_names: tuple[str, ...]) -> str:

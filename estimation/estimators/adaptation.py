@@ -99,19 +99,16 @@ class Evidence:
         return np.asarray(inside[np.isfinite(found.half_width)])
 
 
-def _channels(estimator: Adaptable) -> tuple[str, ...]:
-    if isinstance(estimator, BankEstimator):
-        return estimator.bank.channels
-    return estimator.network.inputs
-
-
 def evidence(estimator: Adaptable, recording: Recording) -> Evidence | None:
     """Reduce a raw run to what an estimator reads; None where it has no valid closing sample.
 
     Raises:
         MissingChannelError: The run lacks a channel.
     """
-    names = _channels(estimator)
+    if isinstance(estimator, BankEstimator):
+        names = estimator.bank.channels
+    else:
+        names = estimator.network.inputs
     run = processed(recording, [*names, estimator.target], estimator.low_pass)
     kept = is_closing(run)
     if not (kept & run.valid).any():

@@ -26,13 +26,9 @@ class FlightRecorder:
         self._way = way
         self._tick_us = tick_us
         self._sent: list[tuple[int, bytes]] = []
+        self.url = way.url
         self.read = way.read
         self.close = way.close
-
-    @property
-    def url(self) -> str:
-        """The URL of the way."""
-        return self._way.url
 
     @property
     def now_s(self) -> float:

@@ -339,7 +339,9 @@ class Session:
                     "Its cable was pulled, it was reset, or its program stopped.",
                     "Check the cable and its supply, then start again; nothing recorded is lost.",
                 )
-        self._follow_clock()
+        exchange = self._logger.last_exchange
+        if exchange is not None:
+            self.clock.add(exchange.sent_s, exchange.received_s, exchange.tick_us)
         for companion in self.companions:
             companion.poll(self._transport.now_s)
         if self._first_tick_us is None:
@@ -385,11 +387,6 @@ class Session:
         if self._watch is not None and trip is not None:
             state = "It holds the spindle with a low command" if trip[1] else "It is released"
             raise self._tripped(self._logger.trip(), f"{state}, until it is cleared.")
-
-    def _follow_clock(self) -> None:
-        exchange = self._logger.last_exchange
-        if exchange is not None:
-            self.clock.add(exchange.sent_s, exchange.received_s, exchange.tick_us)
 
     def _to_counts(self, channel: str, values: NDArray[np.float64]) -> NDArray[np.int32]:
         line = self.calibrations.channels[channel]

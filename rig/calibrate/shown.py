@@ -39,7 +39,11 @@ def announced(procedure: Procedure) -> list[str]:
     """Return the needs of a session, its duration and its moving parts, a line each."""
     steps = procedure.steps()
     own = [step.instruction for step in steps if step.instruction]
-    measured_s = sum(_seconds(step) for step in steps)
+    moved = [step.target_angle_rad for step in steps]
+    measured_s = sum(
+        step.duration_s if angle is None else len(angle) / 1000.0
+        for step, angle in zip(steps, moved, strict=True)
+    )
     minutes = (measured_s + SET_UP_S * len(own)) / 60
     devices = " and ".join(name.replace("_", " ") for name in procedure.devices)
     lines = [
@@ -48,11 +52,6 @@ def announced(procedure: Procedure) -> list[str]:
         _moving(steps),
     ]
     return lines + [f"  {text}" for text in dict.fromkeys(own)]
-
-
-def _seconds(step: Step) -> float:
-    target = step.target_angle_rad
-    return step.duration_s if target is None else len(target) / 1000.0
 
 
 def _moving(steps: Sequence[Step]) -> str:

@@ -42,7 +42,7 @@ class CanopenProcess:
     """
 
     def __init__(self, config: Config) -> None:
-        self._url = config.logger.url
+        self.url = config.logger.url
         ours, theirs = socket.socketpair()
         with theirs:
             # a group of its own: what ends this program must not end that before the drive is safe
@@ -67,11 +67,6 @@ class CanopenProcess:
         except BaseException:
             self.close()
             raise
-
-    @property
-    def url(self) -> str:
-        """The bus's URL."""
-        return self._url
 
     @property
     def now_s(self) -> float:
@@ -139,7 +134,7 @@ class CanopenProcess:
             left_s = give_up_s - time.monotonic()
             if not select.select([self._told], [], [], max(0.0, left_s))[0]:
                 raise LinkTimeoutError(
-                    f"The drive at {self._url} was not set up in {STARTS_S:g} s.",
+                    f"The drive at {self.url} was not set up in {STARTS_S:g} s.",
                     fix="Run: rig doctor",
                 )
             if self._hear():
@@ -161,11 +156,11 @@ class CanopenProcess:
 
     def _require_link(self) -> None:
         if self._closed:
-            raise LinkLostError(f"{self._url} is closed.")
+            raise LinkLostError(f"{self.url} is closed.")
 
     def _gone(self) -> LinkLostError:
         return LinkLostError(
-            f"The process that drives the EPOS4 at {self._url} is gone.",
+            f"The process that drives the EPOS4 at {self.url} is gone.",
             f"It ended with {self.process.poll()}.",
             "Take the motor for live and cut its supply. A working drive stops by itself when it"
             " misses the heartbeat.",

@@ -14,7 +14,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import monotonic
-from types import FrameType
 
 from drivers.epos4.drive import Epos4
 from drivers.errors import DriverError
@@ -39,7 +38,7 @@ def main() -> int:
     host = socket.socket(fileno=int(sys.argv[1]))
     host.setblocking(False)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the host's; it lets go when it is done
-    signal.signal(signal.SIGTERM, _end)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
     try:
         with _opened(config) as logger:
             logger.run(PERIOD_S)  # what is compiled the first time is compiled before anybody waits
@@ -53,10 +52,6 @@ def main() -> int:
     except SystemExit:
         pass
     return 0
-
-
-def _end(number: int, frame: FrameType | None) -> None:
-    raise SystemExit
 
 
 @contextmanager

@@ -221,7 +221,9 @@ def load_config(path: Path | None = None) -> Config:
     Raises:
         UsageError: The file cannot be read or a key is wrong; names the key and the nearest one.
     """
-    path = SIMULATED if path is None else _found(path)
+    path = SIMULATED if path is None else path
+    if str(path) in shipped_configs():
+        path = SHIPPED / f"{path}.toml"
     try:
         text = path.read_text()
         return Config.model_validate(tomllib.loads(text))
@@ -237,11 +239,6 @@ def load_config(path: Path | None = None) -> Config:
         raise UsageError(
             f"{path} is not a configuration.", explain(error, _known_keys(), text)
         ) from error
-
-
-def _found(path: Path) -> Path:
-    """Return the shipped configuration of that name, or the path itself."""
-    return SHIPPED / f"{path}.toml" if str(path) in shipped_configs() else path
 
 
 def _known_keys() -> set[str]:

@@ -22,6 +22,7 @@ OF_REPLAY = {
     LEAVE: ("quits", "ends the replay"),
 }
 """Key to its word and what it does."""
+BLOCK_S = 0.05
 SKIP_S = 5.0
 SHORTEST_WAIT_S, LONGEST_WAIT_S = 1e-4, 0.1
 """A shorter wait is none; keys are read at least as often as the longer one."""
@@ -31,7 +32,6 @@ def replay_blocks(
     recording: Recording,
     estimators: Sequence[ModelEstimator],
     speed: float | None,
-    block_s: float = 0.05,
     pace: "Pace | None" = None,
 ) -> Iterator[SampleBlock]:
     """Yield a recording block by block, at the pace of its own clock or faster.
@@ -43,7 +43,6 @@ def replay_blocks(
         recording: The run.
         estimators: Streams that have seen nothing yet; none for none.
         speed: Times real time; None for as fast as it can be read.
-        block_s: Time a block covers, s.
         pace: Waits for each block, and obeys keys; None for the speed alone.
 
     Raises:
@@ -54,19 +53,16 @@ def replay_blocks(
         raise DataError(f"Run {recording.name!r} holds no samples.", "There is nothing to show.")
     if speed is not None and not speed > 0:
         raise UsageError(f"A speed of {speed:g} shows nothing.", fix="Give a positive speed.")
-    return _blocks(recording, estimators, pace or Pace(speed), block_s)
+    return _blocks(recording, estimators, pace or Pace(speed))
 
 
 def _blocks(
-    recording: Recording,
-    estimators: Sequence[ModelEstimator],
-    pace: "Pace",
-    block_s: float,
+    recording: Recording, estimators: Sequence[ModelEstimator], pace: "Pace"
 ) -> Iterator[SampleBlock]:
     lost = lost_samples(recording)
     start_s = float(recording.time_s[0])
     pace.wait_for(start_s)
-    block_of = np.floor((recording.time_s - start_s) / block_s)
+    block_of = np.floor((recording.time_s - start_s) / BLOCK_S)
     edges = [0, *(np.flatnonzero(np.diff(block_of)) + 1).tolist(), len(recording)]
     for first, last in itertools.pairwise(edges):
         part = slice(first, last)

@@ -20,25 +20,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
+import mcap.records as mcap
 import numpy as np
 import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 from numpy.typing import NDArray
 
 from rig.log.schema import Stream
@@ -79,7 +65,7 @@ class Attached:
     data: bytes
 
 
-def encode(*records: McapRecord) -> bytes:
+def encode(*records: mcap.McapRecord) -> bytes:
     """Return the bytes of MCAP records."""
     builder = RecordBuilder()
     for record in records:
@@ -116,13 +102,13 @@ class Container:
         self._offset = 0
         self._crc = 0
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
-        self._schemas: list[Schema] = []
-        self._channels: list[Channel] = []
-        self._chunks: list[ChunkIndex] = []
-        self._metadata: list[MetadataIndex] = []
-        self._attachments: list[AttachmentIndex] = []
+        self._schemas: list[mcap.Schema] = []
+        self._channels: list[mcap.Channel] = []
+        self._chunks: list[mcap.ChunkIndex] = []
+        self._metadata: list[mcap.MetadataIndex] = []
+        self._attachments: list[mcap.AttachmentIndex] = []
         self._counts: dict[int, int] = {}
-        self._put(MAGIC + encode(Header(profile=PROFILE, library=library)))
+        self._put(MAGIC + encode(mcap.Header(profile=PROFILE, library=library)))
 
     def _put(self, data: bytes) -> int:
         """Write bytes of the data section and return the offset they start at."""
@@ -136,13 +122,13 @@ class Container:
     def add_stream(self, stream: Stream) -> int:
         """Write a stream's schema and channel and return its channel number, counted from 1."""
         number = len(self._channels) + 1
-        schema = Schema(
+        schema = mcap.Schema(
             id=number,
             name=stream.message_type,
             encoding="ros2msg",
             data=stream.schema_text.encode(),
         )
-        channel = Channel(
+        channel = mcap.Channel(
             id=number,
             schema_id=number,
             topic=stream.topic,
@@ -157,14 +143,14 @@ class Container:
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
         """Write one metadata record."""
-        record = encode(Metadata(name=name, metadata=dict(data)))
+        record = encode(mcap.Metadata(name=name, metadata=dict(data)))
         start = self._put(record)
-        self._metadata.append(MetadataIndex(offset=start, length=len(record), name=name))
+        self._metadata.append(mcap.MetadataIndex(offset=start, length=len(record), name=name))
 
     def add_attachment(self, attached: Attached, log_time_ns: int) -> None:
         """Write one attachment."""
         record = encode(
-            Attachment(
+            mcap.Attachment(
                 create_time=log_time_ns,
                 log_time=log_time_ns,
                 name=attached.name,
@@ -174,7 +160,7 @@ class Container:
         )
         start = self._put(record)
         self._attachments.append(
-            AttachmentIndex(
+            mcap.AttachmentIndex(
                 offset=start,
                 length=len(record),
                 log_time=log_time_ns,
@@ -218,7 +204,7 @@ class Container:
         index_start = start + len(head) + len(packed)
         self._counts[channel] += messages.size
         self._chunks.append(
-            ChunkIndex(
+            mcap.ChunkIndex(
                 message_start_time=first,
                 message_end_time=last,
                 chunk_start_offset=start,
@@ -233,7 +219,7 @@ class Container:
 
     def finish(self) -> None:
         """Write the data end and the summary; nothing may be added after it."""
-        self._put(encode(DataEnd(data_section_crc=self._crc)))
+        self._put(encode(mcap.DataEnd(data_section_crc=self._crc)))
         start = self._offset
         groups: list[tuple[Opcode, Any]] = [
             (Opcode.SCHEMA, self._schemas),
@@ -248,16 +234,16 @@ class Container:
         for opcode, records in groups:
             if records:
                 data = encode(*records)
-                offsets.append(SummaryOffset(opcode, start + len(summary), len(data)))
+                offsets.append(mcap.SummaryOffset(opcode, start + len(summary), len(data)))
                 summary += data
         offsets_start = start + len(summary)
         summary += encode(*offsets)
         footer = struct.pack("<BQQQ", Opcode.FOOTER, 20, start, offsets_start)
         crc = zlib.crc32(footer, zlib.crc32(summary))
-        self._put(summary + encode(Footer(start, offsets_start, crc)) + MAGIC)
+        self._put(summary + encode(mcap.Footer(start, offsets_start, crc)) + MAGIC)
 
-    def _statistics(self) -> Statistics:
-        return Statistics(
+    def _statistics(self) -> mcap.Statistics:
+        return mcap.Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self._channels),
             channel_message_counts=dict(self._counts),

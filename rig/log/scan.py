@@ -11,47 +11,36 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+import mcap.records as mcap
 import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    DataEnd,
-    Footer,
-    Header,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 
 from rig.errors import DataError
 from rig.log.container import CHUNK_HEAD, MAGIC
 
-T = TypeVar("T", Schema, Channel)
+T = TypeVar("T", mcap.Schema, mcap.Channel)
 
 _HEAD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")
 _INDEX = struct.Struct("<HI")
+_WINDOW = 1 << 20  # Bytes that are searched at a time
 # plain numbers: looking a member of an enumeration up is slow where it is done for every record
 _CHUNK_OPCODE, _MESSAGE_INDEX_OPCODE, _CHUNK_INDEX_OPCODE = 0x06, 0x07, 0x08
 
 _READERS: dict[Opcode, Any] = {
-    Opcode.HEADER: Header,
-    Opcode.FOOTER: Footer,
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.ATTACHMENT: Attachment,
-    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
-    Opcode.STATISTICS: Statistics,
-    Opcode.METADATA: Metadata,
-    Opcode.METADATA_INDEX: MetadataIndex,
-    Opcode.SUMMARY_OFFSET: SummaryOffset,
-    Opcode.DATA_END: DataEnd,
+    Opcode.HEADER: mcap.Header,
+    Opcode.FOOTER: mcap.Footer,
+    Opcode.SCHEMA: mcap.Schema,
+    Opcode.CHANNEL: mcap.Channel,
+    Opcode.ATTACHMENT: mcap.Attachment,
+    Opcode.ATTACHMENT_INDEX: mcap.AttachmentIndex,
+    Opcode.STATISTICS: mcap.Statistics,
+    Opcode.METADATA: mcap.Metadata,
+    Opcode.METADATA_INDEX: mcap.MetadataIndex,
+    Opcode.SUMMARY_OFFSET: mcap.SummaryOffset,
+    Opcode.DATA_END: mcap.DataEnd,
 }
 
 
@@ -105,11 +94,11 @@ class Skeleton:
     """
 
     library: str = ""
-    schemas: dict[int, list[Schema]] = field(default_factory=dict)
-    channels: dict[int, list[Channel]] = field(default_factory=dict)
+    schemas: dict[int, list[mcap.Schema]] = field(default_factory=dict)
+    channels: dict[int, list[mcap.Channel]] = field(default_factory=dict)
     chunks: list[ChunkRef] = field(default_factory=list)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
-    attachments: list[Attachment] = field(default_factory=list)
+    attachments: list[mcap.Attachment] = field(default_factory=list)
     finished: bool = False
     damage: list[Damage] = field(default_factory=list)
 
@@ -230,11 +219,11 @@ def _torn_chunk(buffer: memoryview, start: int) -> ChunkRef | None:
     return ChunkRef(start, data, chunk.compression, chunk.unpacked_bytes, chunk.crc, torn=True)
 
 
-def _next_record(buffer: memoryview, start: int, window: int = 1 << 20) -> int:
+def _next_record(buffer: memoryview, start: int) -> int:
     """Return the next place at or after start where a whole record begins, or the file's end."""
     array = np.frombuffer(buffer, np.uint8)
-    for first in range(start, len(buffer), window):
-        part = array[first : first + window + _HEAD.size]
+    for first in range(start, len(buffer), _WINDOW):
+        part = array[first : first + _WINDOW + _HEAD.size]
         if part.size < _HEAD.size:
             break
         heads = np.lib.stride_tricks.sliding_window_view(part, _HEAD.size)
@@ -254,11 +243,7 @@ def _is_hollow(buffer: memoryview, start: int) -> bool:
 
 
 def _take(
-    skeleton: Skeleton,
-    record: Any,
-    position: int,
-    buffer: memoryview,
-    checksums: bool,
+    skeleton: Skeleton, record: Any, position: int, buffer: memoryview, checksums: bool
 ) -> None:
     """Add one record to the skeleton, checking the checksum it carries."""
     match record:
@@ -266,21 +251,21 @@ def _take(
             skeleton.chunks.append(record)
         case (channel, messages) if skeleton.chunks:  # of a message index
             skeleton.chunks[-1].indexed[channel] = messages
-        case Header():
+        case mcap.Header():
             skeleton.library = record.library
-        case Schema():
+        case mcap.Schema():
             _keep(skeleton, skeleton.schemas, record, position)
-        case Channel():
+        case mcap.Channel():
             _keep(skeleton, skeleton.channels, record, position)
-        case Metadata():
+        case mcap.Metadata():
             skeleton.metadata.append((record.name, record.metadata))
-        case Attachment():
+        case mcap.Attachment():
             _take_attachment(skeleton, record, position, buffer)
-        case DataEnd(data_section_crc=crc) if checksums and crc:
+        case mcap.DataEnd(data_section_crc=crc) if checksums and crc:
             if zlib.crc32(buffer[:position]) != crc:
                 what = "the file's data section does not match its checksum"
                 skeleton.damage.append(Damage(0, position, what))
-        case Footer():
+        case mcap.Footer():
             skeleton.finished = True
             crc = zlib.crc32(buffer[record.summary_start : position + _HEAD.size + 16])
             if record.summary_crc and crc != record.summary_crc:
@@ -288,12 +273,7 @@ def _take(
                 skeleton.damage.append(Damage(position, 0, what))
 
 
-def _keep(
-    skeleton: Skeleton,
-    known: dict[int, list[T]],
-    record: T,
-    position: int,
-) -> None:
+def _keep(skeleton: Skeleton, known: dict[int, list[T]], record: T, position: int) -> None:
     """Keep the first record of a number, and a later one that differs, which is damage."""
     versions = known.setdefault(record.id, [record])
     if record not in versions:
@@ -303,7 +283,7 @@ def _keep(
 
 
 def _take_attachment(
-    skeleton: Skeleton, record: Attachment, position: int, buffer: memoryview
+    skeleton: Skeleton, record: mcap.Attachment, position: int, buffer: memoryview
 ) -> None:
     first = position + _HEAD.size
     stop = first + int(_HEAD.unpack_from(buffer, position)[1])

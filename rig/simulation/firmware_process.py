@@ -32,24 +32,13 @@ class FirmwareProcess:
         assert self.process.stdout is not None  # noqa: S101
         self.path = self.process.stdout.readline().strip()
         self._port: Transport = open_transport(self.path)
-
-    @property
-    def url(self) -> str:
-        """Name for messages."""
-        return f"sim://pty ({self.path})"
+        self.url = f"sim://pty ({self.path})"
+        self.read, self.write = self._port.read, self._port.write
 
     @property
     def now_s(self) -> float:
         """The host's monotonic clock, seconds."""
         return self._port.now_s
-
-    def read(self, timeout_s: float) -> bytes:
-        """Return the bytes that are there, waiting at most `timeout_s` for the first."""
-        return self._port.read(timeout_s)
-
-    def write(self, data: bytes) -> None:
-        """Send all of `data`."""
-        self._port.write(data)
 
     def close(self) -> None:
         """Let go of the terminal and end the process."""
