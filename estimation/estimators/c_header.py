@@ -13,21 +13,9 @@ from functools import cache
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
+from estimation import derived
 from estimation.bank import states
 from estimation.bank.beyond import STANDING_RAD_S
-from estimation.derived import (
-    AGO,
-    ALIKE,
-    FALL,
-    RISE,
-    TRAVEL,
-    TRAVEL_WINDOW_S,
-    TURNED,
-    TURNING,
-    measured_channels,
-    origin_of,
-    window_samples,
-)
 from estimation.errors import EstimationError
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.c_model import model_text
@@ -38,7 +26,7 @@ from estimation.recording import FloatArray
 from estimation.signals import Signals, reference
 
 TURNING_TRAVEL, TURNING_TURNED = (
-    TURNING.replace("_angle_rad", suffix) for suffix in (TRAVEL, TURNED)
+    derived.TURNING.replace("_angle_rad", suffix) for suffix in (derived.TRAVEL, derived.TURNED)
 )
 
 
@@ -96,8 +84,8 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
             channels = estimator.bank.channels
         else:
             channels = estimator.network.inputs
-    measured = measured_channels(channels, signals)
-    windows = [c for c in channels if c.endswith(TRAVEL) or FALL in c]
+    measured = derived.measured_channels(channels, signals)
+    windows = [c for c in channels if c.endswith(derived.TRAVEL) or derived.FALL in c]
     pasts = _pasts(channels)
     row = _Row(measured, windows, pasts, sample_rate_hz, signals)
     text = _template().render(
@@ -110,7 +98,7 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         windows=windows,
         pasts=pasts,
         rate_hz=sample_rate_hz,
-        window=window_samples(sample_rate_hz),
+        window=derived.window_samples(sample_rate_hz),
         sections=np.delete(low_pass.sections(sample_rate_hz), 3, axis=1),
         tracker=tracker(sample_rate_hz),
         keep=_keep(pasts, measured),
@@ -136,9 +124,9 @@ def _template() -> Template:
     )
     environment.globals |= {
         "states": states,
-        "window_s": TRAVEL_WINDOW_S,
+        "window_s": derived.TRAVEL_WINDOW_S,
         "standing_rad_s": STANDING_RAD_S,
-        "alike": ALIKE,
+        "alike": derived.ALIKE,
         "floats": _floats,
         "doubles": _doubles,
         "ints": _ints,
@@ -165,8 +153,8 @@ def _ints(values: Sequence[int] | np.ndarray) -> str:
 
 def _pasts(channels: Sequence[str]) -> list[str]:
     """Return the measured channels and accelerations whose last values are kept."""
-    found = [m["name"] + m["unit"] for m in map(AGO.match, channels) if m is not None]
-    found += [channel.replace(RISE, "_") for channel in channels if RISE in channel]
+    found = [m["name"] + m["unit"] for m in map(derived.AGO.match, channels) if m is not None]
+    found += [channel.replace(derived.RISE, "_") for channel in channels if derived.RISE in channel]
     return list(dict.fromkeys(found))
 
 
@@ -179,7 +167,7 @@ def _keep(pasts: Sequence[str], measured: Sequence[str]) -> str:
 
 def _value(channel: str, measured: Sequence[str]) -> str:
     """Return the expression of a measured channel, a speed or an acceleration."""
-    source, times = origin_of(channel)
+    source, times = derived.origin_of(channel)
     if times and source in measured:
         return f"{('speed', 'acceleration')[times - 1]}[{measured.index(source)}]"
     if channel in measured:
@@ -210,17 +198,19 @@ def _channel(k: int, channel: str, row: _Row) -> str:
             parts.append(f"{turn.size!r} * tanh({_value(turn.speed, measured)} / {turn.width!r})")
         value = " + ".join(parts)
     elif channel in windows:
-        rises = channel.endswith(TRAVEL)
-        source = channel.replace(TRAVEL, "_angle_rad") if rises else channel.replace(FALL, "_")
+        rises = channel.endswith(derived.TRAVEL)
+        source = channel.replace(
+            *((derived.TRAVEL, "_angle_rad") if rises else (derived.FALL, "_"))
+        )
         sign = "" if rises else "-"
         slot = windows.index(channel)
         value = f"name_travel(&s->window[{slot}], s->tick, {sign}value[{place(source)}])"
     elif channel == TURNING_TURNED and TURNING_TRAVEL in windows:
         value = f"{turned()} / {row.sample_rate_hz!r}"
-    elif RISE in channel and TURNING_TRAVEL in windows:
-        source = channel.replace(RISE, "_")
+    elif derived.RISE in channel and TURNING_TRAVEL in windows:
+        source = channel.replace(derived.RISE, "_")
         value = f"value[{place(source)}] - {ago(source, turned())}"
-    elif (past := AGO.match(channel)) is not None:
+    elif (past := derived.AGO.match(channel)) is not None:
         ticks = round(1e-3 * int(past["ms"]) * row.sample_rate_hz)
         value = ago(past["name"] + past["unit"], str(ticks))
     else:

@@ -13,16 +13,9 @@ RING = 64
 
 
 @numba.njit()
-def current_sensor_bend_ratio(row: Row, current_a: float) -> float:
-    """Factor of the measured current: 1 + 0.2 x^2 / (1 + x^2), x = i / i0."""
-    x = current_a / row[FIRST]
-    return 1.0 + row[STRENGTH] * 0.2 * x * x / (1.0 + x * x)
-
-
-@numba.njit()
-def proximal_bend_ratio(row: Row, torque_n_m: float) -> float:
-    """Factor of the measured torque: 1 + 0.2 x^2 / (1 + x^2), x = T / T0."""
-    x = torque_n_m / row[FIRST]
+def bend_ratio(row: Row, value: float) -> float:
+    """Factor of a measured current or torque: 1 + 0.2 x^2 / (1 + x^2), x = i / i0 or T / T0."""
+    x = value / row[FIRST]
     return 1.0 + row[STRENGTH] * 0.2 * x * x / (1.0 + x * x)
 
 

@@ -25,31 +25,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.simulation import hidden_cable, hidden_drive
+from rig.simulation import hidden_cable, hidden_drive, places
 from rig.simulation.hidden import FIRST, STRENGTH
 from rig.simulation.parameters import PlantParameters
-from rig.simulation.places import (
-    AGE,
-    BRISTLE,
-    CLOCK,
-    CREEP_STRAIN,
-    CURRENT,
-    DISTAL_TORQUE,
-    HEAT,
-    HYSTERESIS,
-    JAW_ANGLE,
-    JAW_SPEED,
-    LAG_FIRST,
-    LAG_SECOND,
-    LOAD_CURRENT,
-    MOTOR_ANGLE,
-    MOTOR_SPEED,
-    PROXIMAL_TORQUE,
-    SPINDLE_ANGLE,
-    SPINDLE_SPEED,
-    STATE_SIZE,
-    TWO_STATE,
-)
 
 TICK_S = 1e-3
 """One tick of the logger, s."""
@@ -63,17 +41,17 @@ def constants_of(parameters: PlantParameters) -> Any:
 
 
 def rest_state(parameters: PlantParameters, spindle_angle_rad: float) -> NDArray[np.float64]:
-    """Return the state of a rig at rest with no torque anywhere, shape (`STATE_SIZE`,).
+    """Return the state of a rig at rest with no torque anywhere, shape (`places.STATE_SIZE`,).
 
     Args:
         parameters: Parameters of the plant.
         spindle_angle_rad: Where the spindle stands, closing positive.
     """
-    state = np.zeros(STATE_SIZE)
-    state[MOTOR_ANGLE] = parameters.gear_ratio * spindle_angle_rad
-    state[SPINDLE_ANGLE] = spindle_angle_rad
-    state[JAW_ANGLE] = parameters.cable_ratio * spindle_angle_rad + parameters.jaw_zero_rad
-    state[AGE] = hidden_cable.OLD_S
+    state = np.zeros(places.STATE_SIZE)
+    state[places.MOTOR_ANGLE] = parameters.gear_ratio * spindle_angle_rad
+    state[places.SPINDLE_ANGLE] = spindle_angle_rad
+    state[places.JAW_ANGLE] = parameters.cable_ratio * spindle_angle_rad + parameters.jaw_zero_rad
+    state[places.AGE] = hidden_cable.OLD_S
     return state
 
 
@@ -121,11 +99,7 @@ def braking(speed: float, most: float, creep_speed: float) -> float:
 
 @numba.njit()
 def step_tick(
-    state: NDArray[np.float64],
-    p: Any,
-    effects: Any,
-    current_target_a: float,
-    load_target_a: float,
+    state: NDArray[np.float64], p: Any, effects: Any, current_target_a: float, load_target_a: float
 ) -> None:
     """Move the plant by one tick under constant commands.
 
@@ -137,7 +111,7 @@ def step_tick(
     takes more than twice as long.
 
     Args:
-        state: Shape (`STATE_SIZE`,), changed in place.
+        state: Shape (`places.STATE_SIZE`,), changed in place.
         p: From `constants_of`.
         effects: A record of `hidden.table`.
         current_target_a: Commanded motor current.
@@ -164,17 +138,17 @@ def step_tick(
         mass = hidden_cable.jaw_mass_kg_m2(effects.jaw_mass)
         dt_jaw = dt / (p.jaw_inertia_kg_m2 + mass)
 
-    motor, motor_speed = state[MOTOR_ANGLE], state[MOTOR_SPEED]
-    spindle, spindle_speed = state[SPINDLE_ANGLE], state[SPINDLE_SPEED]
-    jaw, jaw_speed = state[JAW_ANGLE], state[JAW_SPEED]
-    current, load_current = state[CURRENT], state[LOAD_CURRENT]
-    bristle, strain = state[BRISTLE], state[CREEP_STRAIN]
-    bend, heat, rubbing = state[HYSTERESIS], state[HEAT], state[TWO_STATE]
-    lag_first, lag_second = state[LAG_FIRST], state[LAG_SECOND]
-    clock, age = state[CLOCK], state[AGE]
+    motor, motor_speed = state[places.MOTOR_ANGLE], state[places.MOTOR_SPEED]
+    spindle, spindle_speed = state[places.SPINDLE_ANGLE], state[places.SPINDLE_SPEED]
+    jaw, jaw_speed = state[places.JAW_ANGLE], state[places.JAW_SPEED]
+    current, load_current = state[places.CURRENT], state[places.LOAD_CURRENT]
+    bristle, strain = state[places.BRISTLE], state[places.CREEP_STRAIN]
+    bend, heat, rubbing = state[places.HYSTERESIS], state[places.HEAT], state[places.TWO_STATE]
+    lag_first, lag_second = state[places.LAG_FIRST], state[places.LAG_SECOND]
+    clock, age = state[places.CLOCK], state[places.AGE]
     wrist = wrist_pitch_rad(p, clock)
     wrist_speed = (wrist_pitch_rad(p, clock + TICK_S) - wrist) / TICK_S
-    proximal, distal = state[PROXIMAL_TORQUE], state[DISTAL_TORQUE]
+    proximal, distal = state[places.PROXIMAL_TORQUE], state[places.DISTAL_TORQUE]
 
     for _ in range(steps):
         current += current_gain * (target - current)
@@ -307,12 +281,12 @@ def step_tick(
         distal = load + load_share * impulse / dt_jaw
         jaw += dt * jaw_speed
 
-    state[MOTOR_ANGLE], state[MOTOR_SPEED] = motor, motor_speed
-    state[SPINDLE_ANGLE], state[SPINDLE_SPEED] = spindle, spindle_speed
-    state[JAW_ANGLE], state[JAW_SPEED] = jaw, jaw_speed
-    state[CURRENT], state[LOAD_CURRENT] = current, load_current
-    state[BRISTLE], state[CREEP_STRAIN] = bristle, strain
-    state[HYSTERESIS], state[HEAT], state[TWO_STATE] = bend, heat, rubbing
-    state[LAG_FIRST], state[LAG_SECOND] = lag_first, lag_second
-    state[CLOCK], state[AGE] = clock + TICK_S, age
-    state[PROXIMAL_TORQUE], state[DISTAL_TORQUE] = proximal, distal
+    state[places.MOTOR_ANGLE], state[places.MOTOR_SPEED] = motor, motor_speed
+    state[places.SPINDLE_ANGLE], state[places.SPINDLE_SPEED] = spindle, spindle_speed
+    state[places.JAW_ANGLE], state[places.JAW_SPEED] = jaw, jaw_speed
+    state[places.CURRENT], state[places.LOAD_CURRENT] = current, load_current
+    state[places.BRISTLE], state[places.CREEP_STRAIN] = bristle, strain
+    state[places.HYSTERESIS], state[places.HEAT], state[places.TWO_STATE] = bend, heat, rubbing
+    state[places.LAG_FIRST], state[places.LAG_SECOND] = lag_first, lag_second
+    state[places.CLOCK], state[places.AGE] = clock + TICK_S, age
+    state[places.PROXIMAL_TORQUE], state[places.DISTAL_TORQUE] = proximal, distal

@@ -93,7 +93,7 @@ def sample(
     current = state[places.CURRENT]
     if effects.current_sensor_bend[STRENGTH] != 0.0:
         row = effects.current_sensor_bend
-        current *= hidden_sensors.current_sensor_bend_ratio(row, current)
+        current *= hidden_sensors.bend_ratio(row, current)
     current += s.current_offset_a + s.current_noise_a * normal(seed, tick, 4)
     current += s.current_colour_a * state[places.CURRENT_COLOUR]
     counts[CURRENT] = _converted(
@@ -134,7 +134,7 @@ def _proximal_n_m(state: NDArray[np.float64], effects: Any) -> float:
         seen += hidden_sensors.proximal_creep_n_m(row, memory, seen, plant.TICK_S)
     row = effects.proximal_bend
     if row[STRENGTH] != 0.0:
-        seen *= hidden_sensors.proximal_bend_ratio(row, seen)
+        seen *= hidden_sensors.bend_ratio(row, seen)
     return float(seen)
 
 
@@ -157,9 +157,7 @@ def spindle_count_of(angle_rad: float, sensors: SensorParameters) -> int:
 
 
 def columns_of(
-    counts: NDArray[np.int32],
-    target_count: NDArray[np.int32],
-    sensors: SensorParameters,
+    counts: NDArray[np.int32], target_count: NDArray[np.int32], sensors: SensorParameters
 ) -> dict[str, NDArray[np.float64]]:
     """Return counts as channels in SI units, closing positive, with the nominal scales.
 
