@@ -73,12 +73,7 @@ class ModbusLine:
     """
 
     def __init__(
-        self,
-        transport: Transport,
-        slave: int,
-        counters: DeviceCounters,
-        title: str,
-        check: str,
+        self, transport: Transport, slave: int, counters: DeviceCounters, title: str, check: str
     ) -> None:
         self._transport = transport
         self._slave = slave

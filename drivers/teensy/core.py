@@ -186,11 +186,7 @@ class CoreGuard:
     """
 
     def __init__(
-        self,
-        profile: Profile,
-        gains: Sequence[Any],
-        limits: ArmLimits,
-        library: Path | None = None,
+        self, profile: Profile, gains: Sequence[Any], limits: ArmLimits, library: Path | None = None
     ) -> None:
         self._functions = _library(library)
         settings = settings_bytes(profile, gains, limits)

@@ -9,12 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.counters import LinkCounters
-from drivers.errors import (
-    CommandRefusedError,
-    DisarmUnconfirmedError,
-    DriverError,
-    FrameError,
-)
+from drivers.errors import CommandRefusedError, DisarmUnconfirmedError, DriverError, FrameError
 from drivers.link import FramedLink
 from drivers.teensy import protocol
 from drivers.teensy.continuity import Continuity

@@ -19,11 +19,7 @@ class HandMovedBench:
         self._ticks = 0
 
     def advance(
-        self,
-        ticks: int,
-        target: NDArray[np.int32],
-        load_ma: NDArray[np.int32],
-        drive: Drive,
+        self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
     ) -> NDArray[np.int32]:
         """Turn the shaft to and fro once a second; see `drivers.teensy.fake.Bench.advance`."""
         time_s = (self._ticks + np.arange(ticks)) * 1e-3

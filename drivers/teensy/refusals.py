@@ -58,10 +58,7 @@ _REASONS: dict[int, tuple[str, str]] = {
         "It has tripped over something else.",
         "Read its trip again, then clear that one.",
     ),
-    Result.ALREADY_ARMED: (
-        "It is armed already.",
-        "Disarm it first: rig stop",
-    ),
+    Result.ALREADY_ARMED: ("It is armed already.", "Disarm it first: rig stop"),
     Result.TOO_HOT: (
         "More than half of the heat its motors may take is used up, or it was just started and"
         " the heat from before is not known.",

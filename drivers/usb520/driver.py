@@ -122,9 +122,7 @@ class Usb520(StreamedDevice):
 
 
 def open_usb520(
-    url: str,
-    rate_hz: Annotated[float, Field(gt=0, le=10)] = 10.0,
-    baud_rate: BaudOption = 115_200,
+    url: str, rate_hz: Annotated[float, Field(gt=0, le=10)] = 10.0, baud_rate: BaudOption = 115_200
 ) -> Usb520:
     """Open the amplifier's virtual serial port.
 

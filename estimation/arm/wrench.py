@@ -136,11 +136,7 @@ class LiveWrench:
     """
 
     def __init__(
-        self,
-        arm: Arm,
-        values: FloatArray,
-        torque_error: FloatArray,
-        period_s: float,
+        self, arm: Arm, values: FloatArray, torque_error: FloatArray, period_s: float
     ) -> None:
         """Set up.
 

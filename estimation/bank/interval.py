@@ -101,10 +101,7 @@ class Interval:
 
 
 def calibrate(
-    bank: Bank,
-    designs: Sequence[FloatArray],
-    residuals: Sequence[FloatArray],
-    grid: Beyond,
+    bank: Bank, designs: Sequence[FloatArray], residuals: Sequence[FloatArray], grid: Beyond
 ) -> Interval:
     """Return the interval of the errors on left-out runs, with nothing added anywhere.
 

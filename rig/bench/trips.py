@@ -103,10 +103,7 @@ WORDS: dict[Trip, tuple[str, str]] = {
         "The emergency stop was pressed, or its wire is broken",
         "Release it when the rig is safe.",
     ),
-    Trip.SENSOR_MISSING: (
-        "A sensor gave no reading",
-        "Check its wiring and supply.",
-    ),
+    Trip.SENSOR_MISSING: ("A sensor gave no reading", "Check its wiring and supply."),
 }
 """What each trip is, and what to do before it is cleared."""
 

@@ -54,11 +54,7 @@ class HandledBench:
         self._inner = self._made(at, self._seed)
 
     def advance(
-        self,
-        ticks: int,
-        target: NDArray[np.int32],
-        load_ma: NDArray[np.int32],
-        drive: Drive,
+        self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
     ) -> NDArray[np.int32]:
         """Run the bench with the actions of the hands; see `drivers.teensy.fake.Bench.advance`."""
         rows = self._inner.advance(ticks, target, load_ma, drive)

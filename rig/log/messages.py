@@ -85,11 +85,7 @@ def _refuse_unflagged(stream: Stream, payload: NDArray[np.void]) -> None:
 
 
 def message_records(
-    stream: Stream,
-    payload: NDArray[np.void],
-    log_time_ns: ArrayLike,
-    channel: int,
-    already: int,
+    stream: Stream, payload: NDArray[np.void], log_time_ns: ArrayLike, channel: int, already: int
 ) -> NDArray[np.void]:
     """Return MCAP message records of the stream's `record_dtype`, shape (n,).
 

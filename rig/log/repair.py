@@ -101,8 +101,7 @@ def _write(log: LogFile, report: LogReport, target: Path) -> None:
         for record_name, data in log.metadata:
             writer.add_metadata(record_name, data)
         writer.add_metadata(
-            REPAIR_RECORD,
-            {"original": log.path.name, "problems": "\n".join(report.problems)},
+            REPAIR_RECORD, {"original": log.path.name, "problems": "\n".join(report.problems)}
         )
         for topic_name, topic in log.topics.items():
             writer.write(topic_name, topic.rows, topic.log_time_ns)

@@ -195,11 +195,7 @@ class SimulatedBench:
         return sensors.columns_of(counts, target, self.sensors)
 
     def advance(
-        self,
-        ticks: int,
-        target: NDArray[np.int32],
-        load_ma: NDArray[np.int32],
-        drive: Drive,
+        self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
     ) -> NDArray[np.int32]:
         """Run closed-loop ticks with the plain board's controller, without guards.
 

@@ -10,11 +10,7 @@ from rig.simulation.hidden import FIRST, SECOND, STRENGTH, Row
 
 @numba.njit()
 def motor_friction_n_m(
-    effects: Any,
-    speed: float,
-    spindle_angle: float,
-    state: float,
-    clock_s: float,
+    effects: Any, speed: float, spindle_angle: float, state: float, clock_s: float
 ) -> float:
     """Return the contribution of the hidden effects to the Coulomb level at the motor shaft.
 
