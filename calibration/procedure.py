@@ -118,16 +118,13 @@ class Procedure(Protocol):
     @property
     def kind(self) -> str:
         """Kind of the records it makes."""
-        ...
 
     @property
     def devices(self) -> tuple[str, ...]:
         """Devices it measures with: `logger`, `force_sensor` or both."""
-        ...
 
     def steps(self) -> Sequence[Step]:
         """Return the steps in order."""
-        ...
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
         """Return the conclusion from the measurements, in the order of the steps.
@@ -139,7 +136,6 @@ class Procedure(Protocol):
         Raises:
             BadDataError: They are not sufficient for a calibration; its `rule` is the reason.
         """
-        ...
 
 
 class Answer(Enum):
@@ -159,7 +155,6 @@ class Operator(Protocol):
         Raises:
             AbortedError: The session is to end here.
         """
-        ...
 
 
 class Bench(Protocol):
@@ -167,7 +162,6 @@ class Bench(Protocol):
 
     def measure(self, step: Step) -> Measurement:
         """Play the step's trajectory, or read the rig at rest for the step's duration."""
-        ...
 
 
 Progress = Callable[[Step, int, int], None]

@@ -105,12 +105,10 @@ class Device(Protocol):
     @property
     def name(self) -> str:
         """Short name of the kind of device, as registered."""
-        ...
 
     @property
     def channels(self) -> tuple[Channel, ...]:
         """What `read` returns; complete once `identify` or `start` has been called."""
-        ...
 
     @property
     def counters(self) -> Mapping[str, int]:
@@ -118,7 +116,6 @@ class Device(Protocol):
 
         `frames` counts what came well; every other counter is a trouble, and 0 on a good link.
         """
-        ...
 
     def identify(self) -> DeviceIdentity:
         """Ask who is there.
@@ -127,11 +124,9 @@ class Device(Protocol):
             LinkTimeoutError: Nobody answers.
             DriverError: Somebody else answers.
         """
-        ...
 
     def start(self) -> None:
         """Let samples come; sequence numbers begin at 0."""
-        ...
 
     def read(self, timeout_s: float) -> Batch:
         """Return the samples that have come, waiting at most `timeout_s` for the first.
@@ -139,15 +134,12 @@ class Device(Protocol):
         Raises:
             LinkLostError: The link is gone.
         """
-        ...
 
     def stop(self) -> None:
         """Let no more samples come."""
-        ...
 
     def close(self) -> None:
         """Stop, and let go of the link. Closing twice does nothing."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,24 +169,19 @@ class Drive(Device, Protocol):
     @property
     def now_s(self) -> float:
         """The clock of its samples, s."""
-        ...
 
     @property
     def wait_s(self) -> float:
         """Time until the next sample is due, 0 when it is."""
-        ...
 
     def idle(self, wait_s: float) -> None:
         """Let time pass without asking for a sample."""
-        ...
 
     def arm(self) -> None:
         """Energise the motor, its command 0."""
-        ...
 
     def command(self, ratio: float) -> None:
         """Command a share of full scale, -1 to 1, from the next reading on."""
-        ...
 
     def disarm(self) -> None:
         """Take the motor out of force, and return when the drive has confirmed it.
@@ -202,7 +189,6 @@ class Drive(Device, Protocol):
         Raises:
             DisarmUnconfirmedError: It has not confirmed it; its state is unknown.
         """
-        ...
 
 
 def stop_and_let_go(stop: Callable[[], None], let_go: Callable[[], None]) -> None:
@@ -226,11 +212,9 @@ class Clocked(Protocol):
     @property
     def now_s(self) -> float:
         """Its clock, s."""
-        ...
 
     def close(self) -> None:
         """Let go of it."""
-        ...
 
 
 class LinkedDevice:

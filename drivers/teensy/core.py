@@ -43,7 +43,6 @@ class FirmwareBench(Protocol):
             board_address: First argument of that function.
             tick_us: Device clock at the first tick; a period more each tick, modulo 2^32.
         """
-        ...
 
 
 class FirmwareMissingError(DriverError):

@@ -103,4 +103,3 @@ class Bench(Protocol):
             plan: A setpoint's fields, one array of shape (ticks,) each, int32; then the board's
                 `Drive`, changed in place.
         """
-        ...

@@ -29,7 +29,6 @@ class ArmLimits(Protocol):
 
     def as_array(self) -> NDArray[np.int64]:
         """Return the limits in the order of the wire."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,17 +71,14 @@ class CanBus(Protocol):
     @property
     def url(self) -> str:
         """The URL the bus was opened by."""
-        ...
 
     @property
     def now_s(self) -> float:
         """The bus's clock, seconds from an arbitrary zero; virtual where time is."""
-        ...
 
     @property
     def counters(self) -> CanCounters:
         """Counters of the bus."""
-        ...
 
     def send(self, frame: CanFrame) -> None:
         """Send one frame.
@@ -90,7 +87,6 @@ class CanBus(Protocol):
             LinkLostError: The bus is gone.
             LinkTimeoutError: The interface does not take the frame.
         """
-        ...
 
     def read(self, timeout_s: float) -> CanFrame | None:
         """Return the next frame, or None when none came in `timeout_s`.
@@ -98,8 +94,6 @@ class CanBus(Protocol):
         Raises:
             LinkLostError: The bus is gone; every later call raises it again.
         """
-        ...
 
     def close(self) -> None:
         """Let go of the bus. Closing twice does nothing."""
-        ...

@@ -21,15 +21,12 @@ class Board(Protocol):
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host."""
-        ...
 
     def advance(self, ticks: int) -> None:
         """Let that many of its ticks pass."""
-        ...
 
     def transmit(self) -> bytes:
         """Give the bytes that wait for the host."""
-        ...
 
 
 class Outbox:

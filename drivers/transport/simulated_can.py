@@ -20,15 +20,12 @@ class CanNode(Protocol):
 
     def receive(self, frame: CanFrame) -> None:
         """Take a frame from the bus."""
-        ...
 
     def advance(self, ticks: int) -> None:
         """Let `ticks` milliseconds pass."""
-        ...
 
     def transmit(self) -> list[CanFrame]:
         """Give the frames to be sent."""
-        ...
 
 
 class SimulatedCanBus(HostLink):

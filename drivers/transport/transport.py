@@ -16,12 +16,10 @@ class Transport(Protocol):
     @property
     def url(self) -> str:
         """The URL the transport was opened by."""
-        ...
 
     @property
     def now_s(self) -> float:
         """The transport's clock, seconds from an arbitrary zero; virtual where time is."""
-        ...
 
     def read(self, timeout_s: float) -> bytes:
         """Return the bytes that are there, waiting at most `timeout_s` for the first.
@@ -31,7 +29,6 @@ class Transport(Protocol):
         Raises:
             LinkLostError: The link is gone; every later call raises it again.
         """
-        ...
 
     def write(self, data: bytes) -> None:
         """Send all of `data`.
@@ -40,11 +37,9 @@ class Transport(Protocol):
             LinkLostError: The link is gone.
             LinkTimeoutError: The device does not take the bytes.
         """
-        ...
 
     def close(self) -> None:
         """Let go of the link. Closing twice does nothing."""
-        ...
 
 
 class HostLink:
