@@ -28,6 +28,14 @@ class SampleFlag(IntFlag):
     SUSPECT = 8
 
 
+def flags_of(
+    saturated: NDArray[np.bool_], suspect: NDArray[np.bool_] | None = None
+) -> NDArray[np.uint8]:
+    """Return the `SampleFlag` bits of samples that are saturated or suspect, shape (n,)."""
+    flags = saturated * np.uint8(SampleFlag.SATURATED)
+    return flags if suspect is None else flags | suspect * np.uint8(SampleFlag.SUSPECT)
+
+
 @dataclass(frozen=True, slots=True)
 class Channel:
     """One quantity a device measures.

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from drivers.ati_net import protocol
 from drivers.ati_net.stream import RecordSequence, StreamWatch
-from drivers.device import AXES, Batch, Channel, DeviceIdentity, SampleFlag, wrench_channels
+from drivers.device import AXES, Batch, Channel, DeviceIdentity, flags_of, wrench_channels
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.registry import Driver
 from drivers.streaming import StreamedDevice
@@ -173,14 +173,11 @@ class AtiNet(StreamedDevice):
         return np.concatenate(good) if good else np.empty(0, protocol.RECORD_DTYPE)
 
     def _flags(self, status: NDArray[np.uint32]) -> NDArray[np.uint8]:
-        flags = np.zeros(len(status), np.uint8)
         faulty = protocol.is_data_fault(status)
-        flags[faulty] |= np.uint8(SampleFlag.SUSPECT)
-        flags[(status & np.uint32(protocol.SATURATED)) != 0] |= np.uint8(SampleFlag.SATURATED)
         self._counters.device_errors += int(np.count_nonzero(faulty))
         if len(status):
             self.status = int(status[-1])
-        return flags
+        return flags_of((status & np.uint32(protocol.SATURATED)) != 0, faulty)
 
 
 def open_ati_net(url: str, rate_hz: Annotated[float, Field(ge=1, le=7800)] = 1000.0) -> AtiNet:

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT, slopes
 from drivers.ati_serial import protocol
-from drivers.device import DeviceIdentity, SampleFlag
+from drivers.device import DeviceIdentity, flags_of
 from drivers.errors import DriverError
 from drivers.modbus import Stream, StreamedSensor
 from drivers.registry import BaudOption, Driver, RateOption, made
@@ -132,7 +132,8 @@ class AtiSerial(StreamedSensor):
         """Return values, and which frames are suspect or saturated."""
         gauges, bad = protocol.decode_frames(frames)
         self._counters.device_errors += int(np.count_nonzero(bad))
-        return gauges @ self._matrix.T, _flags(gauges, bad)
+        full = np.asarray((np.abs(gauges) >= GAUGE_LIMIT).any(axis=1))
+        return gauges @ self._matrix.T, flags_of(full, bad)
 
     def _set_lock(self, state: bytes) -> None:
         message = protocol.encode(protocol.STORAGE, state)
@@ -147,14 +148,6 @@ class AtiSerial(StreamedSensor):
     def status(self) -> int:
         """Return the status register; only while it does not stream."""
         return int.from_bytes(self._line.read(protocol.STATUS, 1), "big")
-
-
-def _flags(gauges: NDArray[np.int64], bad: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    flags = np.zeros(len(gauges), np.uint8)
-    flags[bad] |= np.uint8(SampleFlag.SUSPECT)
-    full = (gauges >= GAUGE_LIMIT) | (gauges <= -GAUGE_LIMIT)
-    flags[full.any(axis=1)] |= np.uint8(SampleFlag.SATURATED)
-    return flags
 
 
 def open_ati_serial(

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.device import DeviceIdentity, SampleFlag
+from drivers.device import DeviceIdentity, flags_of
 from drivers.errors import DriverError
 from drivers.ft300 import protocol
 from drivers.modbus import WRITE, Stream, StreamedSensor, write_registers
@@ -65,9 +65,7 @@ class Ft300(StreamedSensor):
     def decode(self, frames: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return values, and where one is beyond the measuring range."""
         values = protocol.decode_messages(frames) * protocol.STEPS
-        flags = np.zeros(len(values), np.uint8)
-        flags[(np.abs(values) > RANGE).any(axis=1)] = np.uint8(SampleFlag.SATURATED)
-        return values, flags
+        return values, flags_of((np.abs(values) > RANGE).any(axis=1))
 
 
 def open_ft300(url: str, baud_rate: BaudOption = 19_200) -> Ft300:

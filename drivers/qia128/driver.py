@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.counters import TRIES
-from drivers.device import Channel, DeviceIdentity, SampleFlag
+from drivers.device import Channel, DeviceIdentity, flags_of
 from drivers.errors import DriverError, LinkTimeoutError
 from drivers.qia128 import protocol
 from drivers.registry import BaudOption, Driver, RateOption
@@ -95,8 +95,7 @@ class Qia128(StreamedDevice):
     ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
         """Return the loads that have come; a reading at an end of the range is saturated."""
         raw = protocol.readings(self._frames.read(self._transport, timeout_s))
-        flags = np.zeros(raw.size, np.uint8)
-        flags[(raw == 0) | (raw == protocol.TOP)] = np.uint8(SampleFlag.SATURATED)
+        flags = flags_of((raw == 0) | (raw == protocol.TOP))
         return {"load": self._load(raw.astype(np.float64))}, flags
 
     def stop(self) -> None:

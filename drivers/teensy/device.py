@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.counters import DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, SampleFlag, stop_and_let_go
+from drivers.device import Batch, Channel, DeviceIdentity, flags_of, stop_and_let_go
 from drivers.registry import Driver
 from drivers.streaming import LONGEST_SILENCE_S, Arrivals
 from drivers.teensy.driver import TeensyLogger
@@ -18,6 +17,7 @@ from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 
 ADC_BITS = 12
+_TRIPPED = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +104,7 @@ class TeensyDevice:
         """Return the samples that have come, with the board's own time."""
         batch = self.logger.read(timeout_s)
         self._arrivals.number(len(batch.samples), self._transport.now_s)
+        status = batch.samples["status"]
         return Batch(
             {
                 wired.channel.name: batch.samples[wired.field].astype(np.float64)
@@ -112,7 +113,7 @@ class TeensyDevice:
             np.multiply(batch.tick_us, 1e-6),
             "device",
             batch.samples["sequence"].astype(np.int64),
-            _flags(batch.samples["status"]),
+            flags_of((status & STATUS_SATURATED) != 0, (status & _TRIPPED) != 0),
             batch.lost,
         )
 
@@ -134,11 +135,3 @@ def open_teensy(url: str) -> TeensyDevice:
 
 
 DRIVER = Driver("teensy", "The 1 kHz logger on a Teensy 3.5 or 4.1", open_teensy)
-
-
-def _flags(status: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    flags = np.zeros(len(status), np.uint8)
-    flags[(status & STATUS_SATURATED) != 0] |= np.uint8(SampleFlag.SATURATED)
-    tripped = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED
-    flags[(status & tripped) != 0] |= np.uint8(SampleFlag.SUSPECT)
-    return flags
