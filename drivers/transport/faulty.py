@@ -269,17 +269,3 @@ class _Packets:
 def unchanged(data: bytes) -> bytes:
     """Let bytes pass as they are."""
     return data
-
-
-def once(tap: Tap) -> Tap:
-    """Return a tap that acts on the first non-empty bytes only."""
-    struck = False
-
-    def strike(data: bytes) -> bytes:
-        nonlocal struck
-        if struck or not data:
-            return data
-        struck = True
-        return tap(data)
-
-    return strike

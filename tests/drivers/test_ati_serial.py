@@ -10,8 +10,9 @@ from drivers.ati_serial import protocol
 from drivers.ati_serial.driver import Assumptions, AtiSerial
 from drivers.ati_serial.fake import AtiSerialFake, example_calibration
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
-from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
+from tests.drivers.taps import once
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,9 @@ from drivers.errors import (
     LinkError,
     LinkLostError,
 )
-from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
+from tests.drivers.taps import once
 
 POSITION = protocol.Register(132, 4)
 GOAL_POSITION = protocol.Register(116, 4)

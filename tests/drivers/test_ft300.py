@@ -8,8 +8,9 @@ from drivers.ft300 import protocol
 from drivers.ft300.driver import Ft300
 from drivers.ft300.fake import Ft300Fake
 from drivers.modbus import crc16, write_registers
-from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
+from tests.drivers.taps import once
 
 
 def test_the_request_for_the_stream_is_the_published_one() -> None:

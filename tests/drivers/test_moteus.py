@@ -19,8 +19,9 @@ from drivers.moteus import protocol
 from drivers.moteus.driver import Moteus, open_moteus
 from drivers.moteus.fake import MoteusFake
 from drivers.moteus.protocol import State
-from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
+from tests.drivers.taps import once
 
 EXAMPLE = "01000a07206000200150ff140400130d"
 """Source: moteus documentation, "CAN protocol", Example: a command and what is read with it."""

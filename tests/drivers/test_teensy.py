@@ -21,9 +21,10 @@ from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.protocol import Result
 from drivers.teensy.reference import REFERENCE, Limits
-from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import Board, SimulatedTransport
 from tests.drivers.bench_physics import START_SPINDLE, PlainBench
+from tests.drivers.taps import once
 
 GAINS = [20.0, 0.05, -1.0, 0.2, 10000.0]
 WIDEST = Limits()

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
-from drivers.transport.faulty import FaultyTransport, once
+from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 from drivers.usb520 import protocol
 from drivers.usb520.driver import Usb520
 from drivers.usb520.fake import Usb520Fake
+from tests.drivers.taps import once
 
 
 @pytest.mark.parametrize(
