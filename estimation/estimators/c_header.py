@@ -7,7 +7,6 @@ The result is that of `predict(recording, causal=True)` for gap-free samples.
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -35,25 +34,6 @@ class ExportError(EstimationError):
 
 
 Exported = BankEstimator | NetworkEstimator | ModelEstimator
-
-
-@dataclass(frozen=True)
-class _Row:
-    """The channels of a row and what they are computed from.
-
-    Attributes:
-        measured: Measured channels, in order.
-        windows: Channels that need the lowest value of a window.
-        pasts: Channels whose last values are kept.
-        sample_rate_hz: Rate of the calls.
-        signals: The machine's derived channels.
-    """
-
-    measured: Sequence[str]
-    windows: Sequence[str]
-    pasts: Sequence[str]
-    sample_rate_hz: float
-    signals: Signals
 
 
 def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
@@ -87,7 +67,6 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
     measured = derived.measured_channels(channels, signals)
     windows = [c for c in channels if c.endswith(derived.TRAVEL) or derived.FALL in c]
     pasts = _pasts(channels)
-    row = _Row(measured, windows, pasts, sample_rate_hz, signals)
     text = _template().render(
         estimator=estimator,
         bank=estimator.bank if isinstance(estimator, BankEstimator) else None,
@@ -102,7 +81,10 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         sections=np.delete(low_pass.sections(sample_rate_hz), 3, axis=1),
         tracker=tracker(sample_rate_hz),
         keep=_keep(pasts, measured),
-        fill="\n".join(_channel(k, c, row) for k, c in enumerate(channels)),
+        fill="\n".join(
+            _channel(k, c, measured, windows, pasts, sample_rate_hz, signals)
+            for k, c in enumerate(channels)
+        ),
     )
     return text.replace("NAME", name.upper()).replace("name_", f"{name}_")
 
@@ -175,9 +157,20 @@ def _value(channel: str, measured: Sequence[str]) -> str:
     raise ExportError(f"The channel {channel} cannot be computed in C.")
 
 
-def _channel(k: int, channel: str, row: _Row) -> str:
-    """Return the statement that computes one channel of a row."""
-    measured, windows, pasts = row.measured, row.windows, row.pasts
+def _channel(
+    k: int,
+    channel: str,
+    measured: Sequence[str],
+    windows: Sequence[str],
+    pasts: Sequence[str],
+    sample_rate_hz: float,
+    signals: Signals,
+) -> str:
+    """Return the statement that computes the channel at place k of a row.
+
+    Of the channels in `windows` the lowest value of a window is needed, of those in `pasts` the
+    last values are kept.
+    """
 
     def place(name: str) -> int:
         return measured.index(name)
@@ -188,7 +181,7 @@ def _channel(k: int, channel: str, row: _Row) -> str:
     def turned() -> str:
         return f"name_age(&s->window[{windows.index(TURNING_TRAVEL)}], s->tick)"
 
-    combination = row.signals.combination(channel)
+    combination = signals.combination(channel)
     if combination is not None:
         parts = [
             f"{share.times!r} * value[{place(share.channel)}] / {share.over!r}"
@@ -206,12 +199,12 @@ def _channel(k: int, channel: str, row: _Row) -> str:
         slot = windows.index(channel)
         value = f"name_travel(&s->window[{slot}], s->tick, {sign}value[{place(source)}])"
     elif channel == TURNING_TURNED and TURNING_TRAVEL in windows:
-        value = f"{turned()} / {row.sample_rate_hz!r}"
+        value = f"{turned()} / {sample_rate_hz!r}"
     elif derived.RISE in channel and TURNING_TRAVEL in windows:
         source = channel.replace(derived.RISE, "_")
         value = f"value[{place(source)}] - {ago(source, turned())}"
     elif (past := derived.AGO.match(channel)) is not None:
-        ticks = round(1e-3 * int(past["ms"]) * row.sample_rate_hz)
+        ticks = round(1e-3 * int(past["ms"]) * sample_rate_hz)
         value = ago(past["name"] + past["unit"], str(ticks))
     else:
         value = _value(channel, measured)

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from time import sleep
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -121,13 +120,8 @@ class Session:
             self._ways_out = ways_out.pop_all()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._ways_out.__exit__(kind, error, trace)
+    def __exit__(self, *raised: Any) -> None:
+        self._ways_out.__exit__(*raised)
 
     def _take_channels(self) -> None:
         """Add what a device measures besides a logger's counts."""
