@@ -27,15 +27,8 @@ RESIDUAL_LIMIT = 0.05
 """Greatest residual force that passes, share of the weight."""
 AXES = ("force_x_n", "force_y_n", "force_z_n", "torque_x_n_m", "torque_y_n_m", "torque_z_n_m")
 POSES = (
-    (0, 0, 1),
-    (0, 0, -1),
-    (1, 0, 0),
-    (-1, 0, 0),
-    (0, 1, 0),
-    (0, -1, 0),
-    (1, 1, 1),
-    (-1, 1, -1),
-)
+    (0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (1, 1, 1), (-1, 1, -1),
+)  # fmt: skip
 """Gravity's direction in the sensor's axes, not yet of length one."""
 
 

@@ -22,18 +22,9 @@ SAMPLE_RATE_HZ = 1000
 TICK_US = 1_000_000 // SAMPLE_RATE_HZ
 """Period of a control tick and of a sample, microseconds."""
 SAMPLE_DTYPE = layout(
-    *SAMPLE_FIELDS,
-    "motor i4",
-    "spindle i4",
-    "jaw i4",
-    "target i4",
-    "proximal i2",
-    "distal i2",
-    "current i2",
-    "fsr u2",
-    "command_e4 i2",
-    "load_ma i2",
-    "dropped u2",
+    *(*SAMPLE_FIELDS, "motor i4", "spindle i4", "jaw i4", "target i4"),
+    *("proximal i2", "distal i2", "current i2", "fsr u2"),
+    *("command_e4 i2", "load_ma i2", "dropped u2"),
 )
 """One sample, raw counts with the rig's raw signs.
 

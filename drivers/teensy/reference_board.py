@@ -7,21 +7,11 @@ from numpy.typing import NDArray
 from drivers.teensy.control import control_tick
 from drivers.teensy.logic import ENGAGED, STATE, BoardLogic
 from drivers.teensy.protocol import STATUS_ARMED
-from drivers.teensy.reference import REFERENCE
+from drivers.teensy.reference import INPUT_NAMES, REFERENCE
 
 (
-    MOTOR,
-    SPINDLE,
-    JAW,
-    PROXIMAL,
-    DISTAL,
-    CURRENT,
-    FSR,
-    COMMAND_E4,
-    LOAD_MA,
-    TARGET,
-    STATUS,
-) = range(11)
+    MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT, FSR, COMMAND_E4, LOAD_MA, TARGET, STATUS,
+) = range(11)  # fmt: skip
 """Columns of a tick's row: seven inputs, what the motors got, the target and the board's state."""
 COLUMNS = 11
 INT16 = (-(2**15), 2**15 - 1)
@@ -71,15 +61,12 @@ def run_ticks(
         drive_tick(rows[k], targets[k], loads_ma[k], state, control_state, gains)
 
 
+_FIELDS = (*INPUT_NAMES, "fsr", "command_e4", "load_ma", "target")
+"""Fields of a sample, in the order of the columns."""
+
 REFERENCE_LOGIC = BoardLogic(
     profile=REFERENCE,
-    columns={
-        name: column
-        for column, name in enumerate(
-            ("motor", "spindle", "jaw", "proximal", "distal", "current", "fsr")
-        )
-    }
-    | {"command_e4": COMMAND_E4, "load_ma": LOAD_MA, "target": TARGET},
+    columns={name: column for column, name in enumerate(_FIELDS)},
     status_column=STATUS,
     converted={PROXIMAL: INT16, DISTAL: INT16, CURRENT: INT16, FSR: (-(2**32), FSR_MAX)},
 )

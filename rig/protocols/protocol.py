@@ -208,17 +208,9 @@ class DwellRuns(_LoadedTable):
 
 
 AnyTable = (
-    SineRuns
-    | FourierRuns
-    | SpeedStaircaseRuns
-    | LoadStaircaseRuns
-    | StepHoldRuns
-    | ChirpRuns
-    | DwellRuns
-    | RestRuns
-    | JointHoldRuns
-    | JointSineRuns
-)
+    SineRuns | FourierRuns | SpeedStaircaseRuns | LoadStaircaseRuns | StepHoldRuns | ChirpRuns
+    | DwellRuns | RestRuns | JointHoldRuns | JointSineRuns
+)  # fmt: skip
 RunTable = Annotated[AnyTable, Field(discriminator="kind")]
 
 TABLES: tuple[type[Section], ...] = get_args(AnyTable)

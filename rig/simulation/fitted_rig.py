@@ -20,15 +20,9 @@ NOISE_ABOVE_HZ = 150.0
 """White noise is measured above this frequency, where the rig barely moves."""
 
 PLAYED = (
-    "target_angle_rad",
-    "load_command_a",
-    "motor_angle_rad",
-    "spindle_angle_rad",
-    "jaw_angle_rad",
-    "proximal_torque_n_m",
-    "distal_torque_n_m",
-    "motor_current_a",
-)
+    "target_angle_rad", "load_command_a", "motor_angle_rad", "spindle_angle_rad", "jaw_angle_rad",
+    "proximal_torque_n_m", "distal_torque_n_m", "motor_current_a",
+)  # fmt: skip
 """Channels that the recordings of a fitted rig need."""
 
 NOISY = {
@@ -123,16 +117,10 @@ def with_load_unit(plant: PlantParameters, runs: Sequence[Recording]) -> PlantPa
     Least squares of distal torque on the load's current, the smooth direction of the spindle and
     an offset. The plant is not changed where the load never varies.
     """
+    load, torque = "load_command_a", "distal_torque_n_m"
     table = np.concatenate(
         [
-            np.column_stack(
-                [
-                    run["load_command_a"],
-                    _direction(run),
-                    np.ones(len(run)),
-                    run["distal_torque_n_m"],
-                ]
-            )[::20]
+            np.column_stack([run[load], _direction(run), np.ones(len(run)), run[torque]])[::20]
             for run in runs
         ]
     )
