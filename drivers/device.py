@@ -4,7 +4,7 @@ A driver is made from an open link, controls one device, and does nothing in the
 passes in `read`. Simulation swaps the link and nothing else.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 from typing import Literal, Protocol, runtime_checkable
@@ -199,21 +199,6 @@ class Drive(Device, Protocol):
         """
 
 
-def stop_and_let_go(stop: Callable[[], None], let_go: Callable[[], None]) -> None:
-    """End a device's stream where it can still be reached, and let go of its link in any case.
-
-    Args:
-        stop: Ends the stream; a lost link is not an error here.
-        let_go: Closes the link.
-    """
-    try:
-        stop()
-    except LinkError:
-        pass  # it is gone already
-    finally:
-        let_go()
-
-
 class Clocked(Protocol):
     """The way to a device: a transport or a CAN bus."""
 
@@ -259,8 +244,18 @@ class LinkedDevice:
         """Let no more samples come."""
         raise NotImplementedError
 
+    def let_go(self) -> None:
+        """Close the way to the device."""
+        self._way.close()
+
     def close(self) -> None:
-        """Stop where that can still be done, and let go of the way."""
-        if not self._closed:
-            self._closed = True
-            stop_and_let_go(self.stop, self._way.close)
+        """Stop where that can still be done, and let go of the way in any case."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self.stop()
+        except LinkError:
+            pass  # it is gone already
+        finally:
+            self.let_go()

@@ -6,9 +6,7 @@ drive notices and takes its power stage out of force by itself.
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from drivers.counters import DeviceCounters
 from drivers.device import Axis, Channel, DeviceIdentity, SampleFlag
 from drivers.epos4 import protocol
 from drivers.epos4.faults import DriveFaultError, fault
@@ -18,9 +16,6 @@ from drivers.epos4.protocol import FAULTY, Feedback, Ratings, State
 from drivers.errors import DisarmUnconfirmedError, DriverError, LinkTimeoutError, MissingExtraError
 from drivers.polling import PolledDrive
 from drivers.transport.can_bus import CanBus
-
-if TYPE_CHECKING:
-    from drivers.epos4.canopen_link import CanopenLink
 
 
 class Epos4(PolledDrive):
@@ -33,6 +28,9 @@ class Epos4(PolledDrive):
         host_timeout_ms: Silence of the host after which the drive stops by itself; 0 for never.
         late_s: How late a SYNC may be and still be sent; later ones are counted as lost. Late ones
             follow each other at a higher rate until the schedule is met again.
+
+    Raises:
+        MissingExtraError: `canopen` is not installed.
     """
 
     name = "epos4"
@@ -63,7 +61,13 @@ class Epos4(PolledDrive):
         )
         self._bus = bus
         self._host_timeout_ms = host_timeout_ms
-        self._link = _link(bus, node_id, self._counters)
+        try:  # the library is an extra, loaded only here
+            from drivers.epos4.canopen_link import CanopenLink
+        except ModuleNotFoundError as error:
+            raise MissingExtraError(
+                "An EPOS4 needs the canopen library.", f"{error}.", "can"
+            ) from error
+        self._link = CanopenLink(bus, node_id, self._counters)
         self._node = Node(self._link, host_timeout_ms, self._counters)
         self._power = PowerStage(self._link, self._node)
         self._cycle = Cycle(self._link, rate_hz, late_s, self._counters)
@@ -307,18 +311,3 @@ class Epos4(PolledDrive):
             "Its enable or STO input changed, or somebody else commands it.",
             "Find out why, then arm again.",
         )
-
-
-def _link(bus: CanBus, node_id: int, counters: DeviceCounters) -> "CanopenLink":
-    """Return the link; the `canopen` library is an extra, loaded only here.
-
-    Raises:
-        MissingExtraError: It is not installed.
-    """
-    try:
-        from drivers.epos4.canopen_link import CanopenLink
-    except ModuleNotFoundError as error:
-        raise MissingExtraError(
-            "An EPOS4 needs the canopen library.", f"{error}.", "can"
-        ) from error
-    return CanopenLink(bus, node_id, counters)

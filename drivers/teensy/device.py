@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.counters import DeviceCounters
-from drivers.device import Batch, Channel, DeviceIdentity, flags_of, stop_and_let_go
+from drivers.device import Batch, Channel, DeviceIdentity, LinkedDevice, flags_of
 from drivers.registry import Driver
 from drivers.streaming import LONGEST_SILENCE_S, Arrivals
 from drivers.teensy.driver import TeensyLogger
@@ -51,7 +50,7 @@ def raw_channels(profile: Profile = REFERENCE) -> tuple[TeensyChannel, ...]:
     return tuple(raw_channel(f"{field}_count", field, profile) for field in inputs)
 
 
-class TeensyDevice:
+class TeensyDevice(LinkedDevice):
     """The logger's stream in units, time-stamped by its own clock. It is never armed.
 
     Args:
@@ -68,12 +67,10 @@ class TeensyDevice:
         wired: Sequence[TeensyChannel] | None = None,
         profile: Profile = REFERENCE,
     ) -> None:
-        self._transport = transport
+        super().__init__(transport, profile.rate_hz)
         self._wired = tuple(raw_channels(profile) if wired is None else wired)
         self.logger = TeensyLogger(transport, profile)
-        self._counters = DeviceCounters()
         self._arrivals = Arrivals(self._counters, LONGEST_SILENCE_S)
-        self._closed = False
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -83,7 +80,7 @@ class TeensyDevice:
     @property
     def counters(self) -> dict[str, int]:
         """The link's counters, and the silences of the stream."""
-        return self._counters.as_dict() | self.logger.counters.as_dict()
+        return super().counters | self.logger.counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
         """Read the board's identity and check its protocol version.
@@ -98,12 +95,12 @@ class TeensyDevice:
     def start(self) -> None:
         """Start the stream; sequence numbers begin at 0."""
         self.logger.start()
-        self._arrivals.restart(self._transport.now_s)
+        self._arrivals.restart(self._way.now_s)
 
     def read(self, timeout_s: float) -> Batch:
         """Return the samples that have come, with the board's own time."""
         batch = self.logger.read(timeout_s)
-        self._arrivals.number(len(batch.samples), self._transport.now_s)
+        self._arrivals.number(len(batch.samples), self._way.now_s)
         status = batch.samples["status"]
         return Batch(
             {
@@ -121,12 +118,9 @@ class TeensyDevice:
         """Stop the stream."""
         self.logger.stop()
 
-    def close(self) -> None:
-        """Stop the stream where the board can still be reached, and let go of the link."""
-        if self._closed:
-            return
-        self._closed = True
-        stop_and_let_go(self.stop, self.logger.close)
+    def let_go(self) -> None:
+        """Disarm where the board may be armed, and let go of the link."""
+        self.logger.close()
 
 
 def open_teensy(url: str) -> TeensyDevice:

@@ -138,13 +138,11 @@ class PythonCanBus(HostLink):
         if kind & _BUS_OFF:
             self.counters.bus_off += 1
             raise self._lose(
-                errors.BusOffError(
-                    f"The CAN controller of {self.url} has taken itself off the bus.",
-                    "It could not get its frames through: a short, a missing terminator,"
-                    " swapped wires, or another bit rate.",
-                    "Check CAN_H, CAN_L, both 120 ohm terminators and the bit rates,"
-                    " then start again.",
-                )
+                f"The CAN controller of {self.url} has taken itself off the bus.",
+                "It could not get its frames through: a short, a missing terminator,"
+                " swapped wires, or another bit rate.",
+                "Check CAN_H, CAN_L, both 120 ohm terminators and the bit rates, then start again.",
+                errors.BusOffError,
             )
 
     def _stuck(self) -> errors.LinkTimeoutError:
@@ -156,11 +154,9 @@ class PythonCanBus(HostLink):
 
     def _gone(self, error: Exception) -> errors.LinkLostError:
         return self._lose(
-            errors.LinkLostError(
-                f"The CAN bus {self.url} is gone.",
-                f"The interface was unplugged or taken down ({error}).",
-                "Check the adapter and start again.",
-            )
+            f"The CAN bus {self.url} is gone.",
+            f"The interface was unplugged or taken down ({error}).",
+            "Check the adapter and start again.",
         )
 
 

@@ -103,11 +103,9 @@ class SerialTransport(HostLink):
     def _gone(self, error: Exception) -> errors.LinkLostError:
         self._port.close()
         return self._lose(
-            errors.LinkLostError(
-                f"The link to {self.url} is gone.",
-                f"The device was unplugged or reset, or another program took the port ({error}).",
-                "Check the cable and start again.",
-            )
+            f"The link to {self.url} is gone.",
+            f"The device was unplugged or reset, or another program took the port ({error}).",
+            "Check the cable and start again.",
         )
 
 

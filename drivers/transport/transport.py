@@ -58,10 +58,12 @@ class HostLink:
         """The host's monotonic clock, seconds."""
         return monotonic()
 
-    def _lose(self, error: LinkLostError) -> LinkLostError:
+    def _lose(
+        self, what: str, why: str, fix: str, kind: type[LinkLostError] = LinkLostError
+    ) -> LinkLostError:
         """Take the link for gone: every later call raises this error again."""
-        self._lost = error
-        return error
+        self._lost = kind(what, why, fix)
+        return self._lost
 
     def _closes(self) -> None:
         self._lost = self._lost or LinkLostError(f"{self.url} is closed.")
