@@ -55,17 +55,9 @@ class FtSession:
         for number, pose in enumerate(POSES * self.repeats):
             down = np.array(pose, dtype=np.float64) / np.linalg.norm(pose)
             shown = ", ".join(f"{value:+.2f}" for value in down)
-            steps.append(
-                Step(
-                    f"pose-{number}",
-                    {
-                        f"gravity_{axis}_ratio": float(v)
-                        for axis, v in zip("xyz", down, strict=True)
-                    },
-                    f"Turn the sensor so that down is ({shown}) in its axes x, y, z; let go of it.",
-                    duration_s=1.0,
-                )
-            )
+            pull = {f"gravity_{k}_ratio": float(v) for k, v in zip("xyz", down, strict=True)}
+            text = f"Turn the sensor so that down is ({shown}) in its axes x, y, z; let go of it."
+            steps.append(Step(f"pose-{number}", pull, text, duration_s=1.0))
         return steps
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:

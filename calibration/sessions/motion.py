@@ -33,14 +33,10 @@ def moves(speeds_rad_s: Sequence[float], loads_a: Sequence[float], repeats: int)
     steps = []
     for repeat, load, speed in grid:
         angle = ramps(speed, TRAVEL_RAD)
-        steps.append(
-            Step(
-                f"move-{load:g}A-{speed:g}rad_s-{repeat}",
-                {"load_command_a": load, "speed_rad_s": speed},
-                target_angle_rad=angle,
-                load_command_a=np.full(angle.size, load),
-            )
-        )
+        name = f"move-{load:g}A-{speed:g}rad_s-{repeat}"
+        held = {"load_command_a": load, "speed_rad_s": speed}
+        loads = np.full(angle.size, load)
+        steps.append(Step(name, held, target_angle_rad=angle, load_command_a=loads))
     return steps
 
 

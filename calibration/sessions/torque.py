@@ -78,13 +78,10 @@ class TorqueSession:
         up = (0.0, *self.masses_kg)
         for number, mass in enumerate((0.0, *(up[1:] + up[-2::-1]) * self.repeats)):
             what = f"Hang {mass * 1e3:g} g on the arm" if mass else "Take every weight off the arm"
-            steps.append(
-                Step(
-                    f"{number:02d}-{mass * 1e3:g}g",
-                    {"sensor": self.sensor, "mass_kg": mass, "arm_m": self.arm_m},
-                    f"{what} of the {self.sensor} sensor and wait until it hangs still.",
-                )
-            )
+            held: dict[str, float | str] = {"sensor": self.sensor}
+            held |= {"mass_kg": mass, "arm_m": self.arm_m}
+            text = f"{what} of the {self.sensor} sensor and wait until it hangs still."
+            steps.append(Step(f"{number:02d}-{mass * 1e3:g}g", held, text))
         return steps
 
     def reading(self, measured: Sequence[Measurement], lines: CalibrationSet) -> str:

@@ -108,11 +108,8 @@ def _driver_problems(
     if not is_simulated(section.url) and on_can and driver.can is None:
         found.append(Problem(key, f"The driver {driver.name} is on no CAN bus.", "Change its url."))
     if not is_simulated(section.url) and driver.can is not None and not on_can:
-        found.append(
-            Problem(
-                key, f"The driver {driver.name} needs a CAN bus.", "Write e.g. can:socketcan:can0."
-            )
-        )
+        what = f"The driver {driver.name} needs a CAN bus."
+        found.append(Problem(key, what, "Write e.g. can:socketcan:can0."))
     return found
 
 
@@ -154,25 +151,16 @@ def _bus_problems(
         place = _OnBus(name, use.identifiers(options), section.bit_rate or use.bit_rate)
         said = dict(parse_qsl(query)).get("bitrate")
         if said is not None and said != str(place.bit_rate):
-            found.append(
-                Problem(
-                    _key(name),
-                    f"Its url sets {said} bit/s, the device has {place.bit_rate} bit/s.",
-                    f"Write one bit rate; set `bit_rate` in [{_key(name)}] to the device's own.",
-                )
-            )
+            what = f"Its url sets {said} bit/s, the device has {place.bit_rate} bit/s."
+            fix = f"Write one bit rate; set `bit_rate` in [{_key(name)}] to the device's own."
+            found.append(Problem(_key(name), what, fix))
         buses.setdefault(bus, []).append(place)
     for bus, places in buses.items():
         found += [p for one, other in combinations(places, 2) for p in _clash(bus, one, other)]
         if len(places) > 1 and bus.split(":")[1] in ("slcan", "gs_usb"):
             names = " and ".join(place.name for place in places)
-            found.append(
-                Problem(
-                    bus,
-                    f"{names} are on one adapter, which can be opened once.",
-                    "Use socketcan, or an adapter for each.",
-                )
-            )
+            what = f"{names} are on one adapter, which can be opened once."
+            found.append(Problem(bus, what, "Use socketcan, or an adapter for each."))
     return found
 
 
@@ -183,21 +171,13 @@ def _clash(bus: str, one: _OnBus, other: _OnBus) -> list[Problem]:
     if shared:
         numbers = ", ".join(f"{number:#05x}" for number in shared[:4])
         more = f" and {len(shared) - 4} more" if len(shared) > 4 else ""
-        found.append(
-            Problem(
-                bus,
-                f"{one.name} and {other.name} share the identifiers {numbers}{more}.",
-                "Give them two buses, or another base or node number (a NETCANOEM: base 0x68).",
-            )
-        )
+        what = f"{one.name} and {other.name} share the identifiers {numbers}{more}."
+        fix = "Give them two buses, or another base or node number (a NETCANOEM: base 0x68)."
+        found.append(Problem(bus, what, fix))
     if one.bit_rate != other.bit_rate:
-        found.append(
-            Problem(
-                bus,
-                f"{one.name} has {one.bit_rate} bit/s and {other.name} {other.bit_rate} bit/s.",
-                "Set both to one bit rate and write it as `bit_rate`, or give them two buses.",
-            )
-        )
+        what = f"{one.name} has {one.bit_rate} bit/s and {other.name} {other.bit_rate} bit/s."
+        fix = "Set both to one bit rate and write it as `bit_rate`, or give them two buses."
+        found.append(Problem(bus, what, fix))
     return found
 
 

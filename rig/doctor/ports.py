@@ -56,15 +56,8 @@ def port_findings(ports: Sequence[Port], root: Path = ROOT) -> list[Finding]:
     ours = [port for port in ports if port.usb[:9] in USB]
     findings = [one for port in ours for one in _port_findings(port, root)]
     if ours and _runs("ModemManager", root) and not all(has_rule(p.usb, root) for p in ours):
-        findings.append(
-            Finding(
-                "this computer",
-                "ModemManager",
-                Level.WARNING,
-                "ModemManager runs and talks to every new serial port for some seconds.",
-                INSTALL,
-            )
-        )
+        what = "ModemManager runs and talks to every new serial port for some seconds."
+        findings.append(Finding("this computer", "ModemManager", Level.WARNING, what, INSTALL))
     return findings
 
 
@@ -73,25 +66,15 @@ def _port_findings(port: Port, root: Path) -> list[Finding]:
     holders = port_holders(port.path)
     if holders:
         number = holders[0].split()[1]
-        findings.append(
-            Finding(
-                port.path,
-                "free",
-                Level.WARNING,
-                f"It is held by {', '.join(holders)}.",
-                f"Let that program end, or: kill -TERM {number}",
-            )
-        )
-    allowed = os.access(port.path, os.R_OK | os.W_OK)
-    rule = has_rule(port.usb, root)
-    if not allowed:
-        findings.append(
-            Finding(port.path, "permission", Level.ERROR, "You may not open it.", INSTALL)
-        )
-    if not rule:
-        findings.append(
-            Finding(port.path, "udev rule", Level.WARNING, "No udev rule names it.", INSTALL)
-        )
+        what = f"It is held by {', '.join(holders)}."
+        fix = f"Let that program end, or: kill -TERM {number}"
+        findings.append(Finding(port.path, "free", Level.WARNING, what, fix))
+    if not os.access(port.path, os.R_OK | os.W_OK):
+        what = "You may not open it."
+        findings.append(Finding(port.path, "permission", Level.ERROR, what, INSTALL))
+    if not has_rule(port.usb, root):
+        what = "No udev rule names it."
+        findings.append(Finding(port.path, "udev rule", Level.WARNING, what, INSTALL))
     findings += _latency_findings(port, root)
     if not findings:
         findings.append(Finding(port.path, "port", Level.OK, f"{port.usb} is free and yours."))
