@@ -13,16 +13,9 @@ from numpy.polynomial import polynomial
 from scipy import stats
 from scipy.linalg import block_diag
 
+from calibration import quality
 from calibration.fsr_curve import FsrCurve, is_monotone
-from calibration.quality import (
-    BadDataError,
-    check_change,
-    check_levels,
-    check_limit,
-    check_points,
-    check_rails,
-    finite,
-)
+from calibration.quality import BadDataError
 from calibration.record import Fit
 from calibration.regression import Regression, is_better, refuse_drift, regress
 from estimation.recording import FloatArray
@@ -54,7 +47,7 @@ class FsrRun:
     force_n: FloatArray
 
     def __post_init__(self) -> None:
-        columns = [finite(getattr(self, c), c) for c in ("time_s", "fsr_v", "force_n")]
+        columns = [quality.finite(getattr(self, c), c) for c in ("time_s", "fsr_v", "force_n")]
         if len({column.size for column in columns}) != 1 or columns[0].size < 2:
             raise BadDataError("points", f"{self.name}: columns of unequal length, or empty.")
         if not (np.diff(columns[0]) > 0).all():
@@ -118,7 +111,7 @@ def fit_fsr(
     hysteresis = hysteresis_ratio(runs)
     if hysteresis is not None:
         fix = "Condition the sensor by loading it to 110 % several times, and press more slowly."
-        check_limit("hysteresis", hysteresis, HYSTERESIS_LIMIT, "Hysteresis", fix)
+        quality.check_limit("hysteresis", hysteresis, HYSTERESIS_LIMIT, "Hysteresis", fix)
     tried = range(1, HIGHEST_DEGREE + 1) if degree is None else (degree,)
     fits = {d: _fitted(runs, d, force_at_zero_n) for d in tried}
     low, high = float(volts.min()), float(volts.max())
@@ -135,7 +128,7 @@ def fit_fsr(
             "Try a lower degree, or check the sign of the force.",
         )
     chosen = _lowest_as_good(fits)
-    check_levels(volts, chosen + 2, "The voltage")
+    quality.check_levels(volts, chosen + 2, "The voltage")
     fit = fits[chosen]
     known = 0 if force_at_zero_n is None else 1  # a coefficient held fixed has no variance
     covariance = block_diag(np.zeros((known, known)), fit.covariance)
@@ -188,7 +181,7 @@ def measure_creep(hold: FsrRun, start_s: float) -> Creep:
         BadDataError: The force is not constant to 2 %, or the time is less than a decade.
     """
     keep = hold.time_s >= start_s
-    check_points(int(keep.sum()), MINIMUM_POINTS, "samples")
+    quality.check_points(int(keep.sum()), MINIMUM_POINTS, "samples")
     time, volts, force = hold.time_s[keep], hold.fsr_v[keep], hold.force_n[keep]
     if start_s <= 0 or time[-1] / time[0] < 10:
         raise BadDataError("points", f"{hold.name}: creep needs a decade of time, from after 0 s.")
@@ -206,17 +199,17 @@ def measure_creep(hold: FsrRun, start_s: float) -> Creep:
 
 
 def _checked(runs: Sequence[FsrRun], degree: int, rail_v: float) -> tuple[FloatArray, FloatArray]:
-    check_points(len(runs), MINIMUM_RUNS, "runs")
+    quality.check_points(len(runs), MINIMUM_RUNS, "runs")
     if degree < 1:
         raise BadDataError("levels", f"A polynomial of degree {degree} does not rise.")
     volts = np.concatenate([run.fsr_v for run in runs])
     forces = np.concatenate([run.force_n for run in runs])
-    check_points(volts.size, MINIMUM_POINTS, "samples")
-    check_change(volts, 0.05 * rail_v, "The voltage")
-    check_change(forces, 1e-3, "The force")
-    check_rails(volts, None, rail_v, "the voltages")
-    check_rails(forces, None, None, "the forces")
-    check_levels(volts, degree + 2, "The voltage")
+    quality.check_points(volts.size, MINIMUM_POINTS, "samples")
+    quality.check_change(volts, 0.05 * rail_v, "The voltage")
+    quality.check_change(forces, 1e-3, "The force")
+    quality.check_rails(volts, None, rail_v, "the voltages")
+    quality.check_rails(forces, None, None, "the forces")
+    quality.check_levels(volts, degree + 2, "The voltage")
     return volts, forces
 
 

@@ -11,15 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from calibration.quality import (
-    BadDataError,
-    check_change,
-    check_levels,
-    check_limit,
-    check_points,
-    check_rails,
-    finite,
-)
+from calibration import quality
+from calibration.quality import BadDataError
 from calibration.record import LINE, Fit
 from estimation.recording import FloatArray
 
@@ -133,15 +126,15 @@ def fit_torque(steps: Sequence[Step]) -> TorqueResult:
     Raises:
         BadDataError: The data are not sufficient for a calibration; its `rule` is the reason.
     """
-    check_points(len(steps), MINIMUM_STEPS, "steps")
+    quality.check_points(len(steps), MINIMUM_STEPS, "steps")
     for k, step in enumerate(steps):
         _at_rest(step.counts, f"step {k + 1}")
-    torques = finite([step.torque_n_m for step in steps], "the torques")
+    torques = quality.finite([step.torque_n_m for step in steps], "the torques")
     counts = np.array([step.counts.mean() for step in steps])
     noise = float(np.median([step.counts.std(ddof=1) for step in steps]))
-    check_change(torques, 1e-9, "The torque")
-    check_levels(torques, MINIMUM_LEVELS, "The torque")
-    check_change(counts, max(10 * noise, 10.0), "The mean reading")
+    quality.check_change(torques, 1e-9, "The torque")
+    quality.check_levels(torques, MINIMUM_LEVELS, "The torque")
+    quality.check_change(counts, max(10 * noise, 10.0), "The mean reading")
 
     # the readings carry the error: fitted over the torques, then the line is turned round
     line = stats.linregress(torques, counts)
@@ -156,12 +149,12 @@ def fit_torque(steps: Sequence[Step]) -> TorqueResult:
     if torques[0] == 0.0 and torques[-1] == 0.0:
         drift = float(residual[-1] - residual[0]) / span
         fix = "Let the amplifier warm up, and repeat."
-        check_limit("drift", abs(drift), DRIFT_LIMIT, "Drift of the zero", fix)
+        quality.check_limit("drift", abs(drift), DRIFT_LIMIT, "Drift of the zero", fix)
     if hysteresis is not None:
         fix = "Look for friction in the arm and for a loose mounting."
-        check_limit("hysteresis", hysteresis, HYSTERESIS_LIMIT, "Hysteresis", fix)
+        quality.check_limit("hysteresis", hysteresis, HYSTERESIS_LIMIT, "Hysteresis", fix)
     fix = "Check the masses, and that the arm stays level."
-    check_limit("not_linear", linearity, LINEARITY_LIMIT, "The departure from a line", fix)
+    quality.check_limit("not_linear", linearity, LINEARITY_LIMIT, "The departure from a line", fix)
     apart = -float(torques.mean()) * line.stderr**2
     spread = np.array([[line.stderr**2, apart], [apart, line.intercept_stderr**2]])
     turned = np.diag([-(slope**2), 1.0])
@@ -181,9 +174,9 @@ def _at_rest(values: ArrayLike, name: str) -> FloatArray:
 
     Their halves may differ by the noise of one reading, and by a count.
     """
-    readings = finite(values, f"the readings of {name}")
-    check_points(readings.size, MINIMUM_READINGS, f"readings of {name}")
-    check_rails(readings, *RAILS_COUNTS, f"the readings of {name}", pile_up=False)
+    readings = quality.finite(values, f"the readings of {name}")
+    quality.check_points(readings.size, MINIMUM_READINGS, f"readings of {name}")
+    quality.check_rails(readings, *RAILS_COUNTS, f"the readings of {name}", pile_up=False)
     first, last = np.array_split(readings, 2)
     moved = abs(float(last.mean() - first.mean()))
     if moved > max(float(np.std(np.diff(readings))) / np.sqrt(2), 1.0):

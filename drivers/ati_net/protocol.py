@@ -5,7 +5,7 @@ Ethernet Axia.
 """
 
 import struct
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,14 +129,8 @@ def decode_records(datagram: bytes) -> NDArray[np.void]:
 
 def encode_calibration(calibration: Calibration) -> bytes:
     """Return the answer to `READ_CALIBRATION`."""
-    return _CALIBRATION.pack(
-        HEADER,
-        calibration.force_unit,
-        calibration.torque_unit,
-        calibration.counts_per_force,
-        calibration.counts_per_torque,
-        *calibration.scale_factors,
-    )
+    *units_and_counts, scale_factors = astuple(calibration)
+    return _CALIBRATION.pack(HEADER, *units_and_counts, *scale_factors)
 
 
 def decode_calibration(answer: bytes) -> Calibration:

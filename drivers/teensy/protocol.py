@@ -127,14 +127,8 @@ SAMPLE_FIELDS = ("version u1", "kind u1", "status u2", "sequence u4", "tick_us u
 """How every sample begins; it ends with `dropped`, the frames the board could not queue."""
 HEADER_DTYPE = layout(*HEADER_FIELDS)
 HELLO_REPLY_DTYPE = layout(
-    *HEADER_FIELDS,
-    "protocol_hash u4",
-    "firmware_version u4",
-    "build_hash u4",
-    "serial S24",
-    "boot u4",
-    "status u2",
-    "offer u4",
+    *(*HEADER_FIELDS, "protocol_hash u4", "firmware_version u4", "build_hash u4"),
+    *("serial S24", "boot u4", "status u2", "offer u4"),
 )
 SESSION_DTYPE = layout(*SESSION_FIELDS)
 LAYOUTS: dict[Kind, np.dtype[np.void]] = {

@@ -1,16 +1,10 @@
 """Why a board refuses a command, and what to do."""
 
 from drivers.errors import CommandRefusedError, ProtocolMismatchError
+from drivers.teensy import protocol
 from drivers.teensy.grasper import GRASPER
 from drivers.teensy.profile import Profile
-from drivers.teensy.protocol import (
-    FIRMWARE_VERSION,
-    QUEUE_CAPACITY,
-    Identity,
-    Kind,
-    Result,
-    version_text,
-)
+from drivers.teensy.protocol import Identity, Kind, Result
 from drivers.teensy.reference import REFERENCE
 
 FLASH = "Run: rig firmware flash"
@@ -23,7 +17,7 @@ _REASONS: dict[int, tuple[str, str]] = {
         "Check gains, limits and setpoints.",
     ),
     Result.QUEUE_FULL: (
-        f"Its queue holds {QUEUE_CAPACITY} setpoints and is full.",
+        f"Its queue holds {protocol.QUEUE_CAPACITY} setpoints and is full.",
         "Read samples, then queue on.",
     ),
     Result.NOT_REFERENCED: (
@@ -91,7 +85,7 @@ def other_layout(url: str, profile: Profile, why: str) -> ProtocolMismatchError:
 
 def other_protocol(url: str, profile: Profile, identity: Identity) -> ProtocolMismatchError:
     """Return the error of a board that speaks another protocol than this program."""
-    theirs, own = identity.protocol_hash, version_text(FIRMWARE_VERSION)
+    theirs, own = identity.protocol_hash, protocol.version_text(protocol.FIRMWARE_VERSION)
     named = [known.name for known in (REFERENCE, GRASPER) if theirs == known.protocol_hash]
     why = (
         f"The board {identity.serial} has firmware {identity.firmware_version},"
