@@ -20,19 +20,16 @@ PAUSE_S, TRAVEL_RAD = 0.3, 0.9
 KEPT_HZ = 100.0
 
 
-def ramps(speed_rad_s: float, travel_rad: float) -> FloatArray:
-    """Return closing and opening once at a constant speed, resting at both ends, rad."""
-    ramp = np.arange(0.0, travel_rad, speed_rad_s / RATE_HZ)
-    pause = np.zeros(round(PAUSE_S * RATE_HZ))
-    return np.concatenate([pause, ramp, pause + travel_rad, ramp[::-1], pause]) + START_RAD
-
-
 def moves(speeds_rad_s: Sequence[float], loads_a: Sequence[float], repeats: int) -> list[Step]:
-    """Return one step for every load, speed and repeat, each closing and opening once."""
-    grid = itertools.product(range(repeats), loads_a, speeds_rad_s)
+    """Return one step for every load, speed and repeat, each closing and opening once.
+
+    The speed is constant, and both ends are rested at.
+    """
     steps = []
-    for repeat, load, speed in grid:
-        angle = ramps(speed, TRAVEL_RAD)
+    pause = np.zeros(round(PAUSE_S * RATE_HZ))
+    for repeat, load, speed in itertools.product(range(repeats), loads_a, speeds_rad_s):
+        ramp = np.arange(0.0, TRAVEL_RAD, speed / RATE_HZ)
+        angle = START_RAD + np.concatenate([pause, ramp, pause + TRAVEL_RAD, ramp[::-1], pause])
         name = f"move-{load:g}A-{speed:g}rad_s-{repeat}"
         held = {"load_command_a": load, "speed_rad_s": speed}
         loads = np.full(angle.size, load)

@@ -147,12 +147,7 @@ class AtiCan(PolledDevice):
         self.bias = np.mean(taken, axis=0, dtype=np.float64)
 
     def _choose_calibration(self) -> None:
-        """Let the sensor use the calibration; it forgets it at a restart.
-
-        Raises:
-            FrameError: It does not.
-            LinkTimeoutError: It does not answer.
-        """
+        """Let the sensor use the calibration; it forgets it at a restart."""
         chosen = bytes([self._calibration])
         if self._ask(protocol.CALIBRATION, chosen)[0] != chosen:
             raise FrameError(f"The sensor does not use its calibration {self._calibration}.")
@@ -162,10 +157,6 @@ class AtiCan(PolledDevice):
         """Hold a row of the matrix in use against the one read at the start, each time the next.
 
         The calibration in use cannot be read: the request that selects it also sets it.
-
-        Raises:
-            DriverError: It is another one.
-            LinkTimeoutError: The sensor does not answer.
         """
         row = protocol.decode_matrix_row(self._ask(protocol.MATRIX_ROW, bytes([self._axis]), 3))
         if np.array_equal(row, matrix[self._axis]):
@@ -217,11 +208,7 @@ class AtiCan(PolledDevice):
                 self._counters.late += 1
 
     def _ask(self, operation: int, data: bytes = b"", frames: int = 1) -> list[bytes]:
-        """Return the data of an answer's frames.
-
-        Raises:
-            LinkTimeoutError: No whole answer to `TRIES` requests.
-        """
+        """Return the data of an answer's frames."""
         question = protocol.request(self._base, operation, data)
         for _ in self._counters.attempts():
             self.idle(0.0)

@@ -62,11 +62,7 @@ class AtiSerialFake(Outbox):
 
 
 def _server(block: bytes) -> "ModbusServer":
-    """Return the Modbus server; its library is an extra, loaded only here.
-
-    Raises:
-        MissingExtraError: It is not installed.
-    """
+    """Return the Modbus server; its library is an extra, loaded only here."""
     try:
         from drivers.ati_serial.fake_modbus import ModbusServer
     except ModuleNotFoundError as error:

@@ -234,11 +234,6 @@ def settings_bytes(profile: Profile, gains: Sequence[Any], limits: ArmLimits) ->
 
 
 def _library(path: Path | None) -> ctypes.CDLL:
-    """Return the loaded library.
-
-    Raises:
-        FirmwareMissingError: It is missing, or a build of other sources.
-    """
     path = path or firmware_library()
     if path is None or not path.is_file():
         raise FirmwareMissingError(

@@ -276,11 +276,7 @@ class TeensyLogger:
         return self._command(kind, protocol.encode(kind, self._number()))
 
     def _command(self, kind: Kind, payload: bytes) -> Ack:
-        """Send a command and return its acknowledgement.
-
-        Raises:
-            CommandRefusedError: The board refused it.
-        """
+        """Send a command and return its acknowledgement."""
         ack = protocol.decode_ack(self._request(Kind.ACK, payload))
         self.queue_free = ack.queue_free
         if ack.result != Result.OK:
@@ -288,11 +284,7 @@ class TeensyLogger:
         return ack
 
     def _request(self, expected: Kind, payload: bytes) -> np.void:
-        """Send a command and return the fields of the answer with its number.
-
-        Raises:
-            FrameError: The layout of the answer is unknown.
-        """
+        """Send a command and return the fields of the answer with its number."""
         number = payload[2:4]
         answer = self._link.request(
             payload, lambda reply: reply[1:2] in (bytes([expected]), _ACK) and reply[2:4] == number

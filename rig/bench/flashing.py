@@ -85,12 +85,7 @@ def _the_one(ports: Sequence[tuple[str, str]]) -> tuple[str, str]:
 
 
 def _state(port: str, profile: Profile) -> str:
-    """Return the state reported by the board.
-
-    Raises:
-        PortBusyError: Another program has it.
-        SafetyTripError: It is armed, or holds its motors.
-    """
+    """Return the state reported by the board."""
     try:
         link = open_transport(port)
     except PortBusyError as error:

@@ -111,11 +111,7 @@ def read_for(logger: TeensyLogger, duration_s: float, is_alive: bool = False) ->
 
 
 def _open_any(config: Config, pace: float | None) -> Transport:
-    """Return the way to any device: a drive behind the board's logic, or a sensor alone.
-
-    Raises:
-        UsageError: The device has no motor, and the profile is a drive's.
-    """
+    """Return the way to any device: a drive behind the board's logic, or a sensor alone."""
     section = config.logger
     if config.is_simulated:
         device = open_fake(section.driver)

@@ -280,11 +280,7 @@ class Session:
             yield reading
 
     def _arm(self, gains: Sequence[Any], limits: ArmLimits) -> None:
-        """Arm the board; one whose motors are warm is waited for.
-
-        Raises:
-            SafetyTripError: It has tripped before, and nobody has cleared that.
-        """
+        """Arm the board; one whose motors are warm is waited for."""
         give_up_s = self._transport.now_s + COOLING_S
         while True:
             try:
@@ -345,7 +341,10 @@ class Session:
         self.here = self.machine.here(reading.columns)
         self.newest = reading
         try:
-            self._require_no_trip(reading)
+            trip = tripped(reading)
+            if self._watch is not None and trip is not None:
+                state = "It holds the spindle with a low command" if trip[1] else "It is released"
+                raise self._tripped(self._logger.trip(), f"{state}, until it is cleared.")
             check_samples(self.config.limits, reading)
             crossing = self._watch.check(reading) if self._watch else None
             if crossing is not None:
@@ -369,18 +368,6 @@ class Session:
                 raise
             state = "It is in its safe state, until it is cleared."
             raise self._tripped(report, state) from error
-
-    def _require_no_trip(self, reading: Reading) -> None:
-        """Look for what the board itself tripped over.
-
-        Raises:
-            SafetyTripError: It did and is in its safe state; the message has the limit and the
-                delay.
-        """
-        trip = tripped(reading)
-        if self._watch is not None and trip is not None:
-            state = "It holds the spindle with a low command" if trip[1] else "It is released"
-            raise self._tripped(self._logger.trip(), f"{state}, until it is cleared.")
 
     def _to_counts(self, channel: str, values: NDArray[np.float64]) -> NDArray[np.int32]:
         line = self.calibrations.channels[channel]

@@ -131,11 +131,7 @@ def _columns(topic: Topic) -> Columns:
 
 
 def _table(topic: Topic) -> Any:
-    """Return the topic as an Arrow table whose fields carry unit and description.
-
-    Raises:
-        MissingExtraError: pyarrow is not installed.
-    """
+    """Return the topic as an Arrow table whose fields carry unit and description."""
     try:
         import pyarrow as pa
     except ImportError as error:
