@@ -59,10 +59,6 @@ class GearboxSession:
         """One move a load, speed and repeat."""
         return moves(self.speeds_rad_s, self.loads_a, self.repeats)
 
-    def _twist(self, measurement: Measurement) -> Twist:
-        run = steady(measurement, (TORQUE, MOTOR, SPINDLE))
-        return run[TORQUE], run[MOTOR] / self.gear_ratio - run[SPINDLE]
-
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
         """Return stiffness and backlash."""
         loads = condition(measurements, "load_command_a")
@@ -73,8 +69,9 @@ class GearboxSession:
                 "Backlash shows only where the gear leans to both sides.",
                 "Load both ways: some loads of each sign.",
             )
-        twists = [self._twist(m) for m in measurements]
-        every = joined([{TORQUE: torque} for torque, _ in twists], TORQUE)
+        runs = [steady(m, (TORQUE, MOTOR, SPINDLE)) for m in measurements]
+        twists = [(run[TORQUE], run[MOTOR] / self.gear_ratio - run[SPINDLE]) for run in runs]
+        every = joined(runs, TORQUE)
         check_change(every, 0.05, "The torque")
         zero_n_m, whole, without = _best_zero(twists)
         _refuse_no_slope(whole.values[0], whole.residual_rms, every)

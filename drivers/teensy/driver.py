@@ -7,7 +7,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.counters import LinkCounters
 from drivers.errors import CommandRefusedError, DisarmUnconfirmedError, DriverError, FrameError
 from drivers.link import FramedLink
 from drivers.teensy import protocol
@@ -63,7 +62,8 @@ class TeensyLogger:
     def __init__(self, transport: Transport, profile: Profile = REFERENCE) -> None:
         self._profile = profile
         self._link = FramedLink(transport, profile.sample.itemsize)
-        self._continuity = Continuity(self._link.counters)
+        self.counters = self._link.counters
+        self._continuity = Continuity(self.counters)
         self._identity: Identity | None = None
         self._command_number = 0
         self._session = 0
@@ -77,11 +77,6 @@ class TeensyLogger:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    @property
-    def counters(self) -> LinkCounters:
-        """Counters of the link."""
-        return self._link.counters
 
     def identify(self) -> Identity:
         """Read the board's identity and check its protocol version.

@@ -144,8 +144,7 @@ class Companion:
         self, sequence: NDArray[np.int64], time_s: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         if self._in_step:
-            host_s: NDArray[np.float64] = self._began_s + sequence / self.rate_hz
-            return host_s
+            return np.asarray(self._began_s + sequence / self.rate_hz)
         return time_s if self.line is None else self.line.to_host(sequence / self.rate_hz)
 
 

@@ -16,7 +16,7 @@ from estimation.channels import unit_of
 from rig.bench.interrupts import end_is_requested
 from rig.live.block import SampleBlock
 from rig.live.options import ShowOptions
-from rig.live.state import LiveState, Reading, Snapshot, Summary
+from rig.live.state import LiveState, Snapshot, Summary
 from rig.live.text import json_frame, plain_line, summary_lines
 from rig.live.view import View
 from rig.output.console import emit_json
@@ -185,11 +185,9 @@ class Display:
         options, keys = self._options, self._options.keys
         if keys is None:
             return View(snapshot, options)
-        snapshot = replace(snapshot, readings=self._chosen(snapshot.readings, keys.chosen))
+        readings = snapshot.readings
+        main = readings[keys.chosen % len(readings)]
+        usual = readings[: len(options.channels)]
+        shown = (main, *(reading for reading in usual if reading is not main))
+        snapshot = replace(snapshot, readings=shown)
         return View(snapshot, replace(options, footer=options.help) if keys.helps else options)
-
-    def _chosen(self, readings: tuple[Reading, ...], chosen: int) -> tuple[Reading, ...]:
-        """Return the chosen channel and the usual ones."""
-        main = readings[chosen % len(readings)]
-        usual = readings[: len(self._options.channels)]
-        return (main, *(reading for reading in usual if reading is not main))
