@@ -21,16 +21,15 @@ class PollSchedule:
     def __init__(self, rate_hz: float, counters: DeviceCounters) -> None:
         self._period_s = 1.0 / rate_hz
         self._counters = counters
-        self._began_s = 0.0
-        self.asked = 0
-        """Number of the next question, and so of its sample."""
-        self.lost = 0
-        """Questions since `restart` that brought no sample."""
+        self.restart(0.0)
 
     def restart(self, now_s: float) -> None:
         """Number the questions from 0, the first being due now."""
         self._began_s = now_s
-        self.asked = self.lost = 0
+        self.asked = 0
+        """Number of the next question, and so of its sample."""
+        self.lost = 0
+        """Questions since `restart` that brought no sample."""
 
     def wait_s(self, now_s: float) -> float:
         """Return the time until the next question is due, 0 when it is."""

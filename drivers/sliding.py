@@ -31,9 +31,7 @@ class SlidingFrames:
         self._check = check
         self._counters = counters
         self._agree = agree
-        self._held = b""
-        self._in_step = False
-        self._was_in_step = False
+        self.restart()
 
     def restart(self) -> None:
         """Forget what is held, and expect a stream that may begin within a frame."""

@@ -36,18 +36,14 @@ class RecordSequence:
 
     def __init__(self, counters: DeviceCounters) -> None:
         self._counters = counters
-        self._newest: int | None = None
-        self._next = 0
-        self._may_restart = 0
-        self.lost = 0
-        """Records lost since `restart`."""
+        self.restart()
 
     def restart(self) -> None:
         """Give the next record the number 0."""
-        self._newest = None
-        self._next = 0
-        self._may_restart = 0
+        self._newest: int | None = None
+        self._next = self._may_restart = 0
         self.lost = 0
+        """Records lost since `restart`."""
 
     def expect_restart(self) -> None:
         """Let the device's numbers restart once, because the host has requested it."""
@@ -109,15 +105,12 @@ class StreamWatch:
         self._url = url
         self._counters = counters
         self._most_repeats = max(LEAST_REPEATS, round(FROZEN_S * rate_hz))
-        self._heard_s = self._asked_s = 0.0
-        self._internal: int | None = None
-        self._repeats = 0
-        self._frozen = False
+        self.restart(0.0)
 
     def restart(self, now_s: float) -> None:
         """Expect a stream that was requested now."""
         self._heard_s = self._asked_s = now_s
-        self._internal = None
+        self._internal: int | None = None
         self._repeats = 0
         self._frozen = False
 

@@ -93,19 +93,15 @@ class Epos4Fake:
         self._network[node_id] = self._node
         self._id = node_id
         self._position = 0
-        self._host_node = self._host_limit_ms = 0
         self._host_silent_ms: int | None = None
         self.state = State.SWITCH_ON_DISABLED
         """Where its state machine is."""
-        self._factory = _factory(node_id) | (objects or {})
-        self._store_all(self._factory)
-        self._needs_communication_reset = False
         self._ramp_ms = 0
+        self._factory = _factory(node_id) | (objects or {})
+        self._restart(_RESET_NODE)
         self._node.add_write_callback(self._written)  # type: ignore[no-untyped-call]
         self._node.add_read_callback(self._asked)  # type: ignore[no-untyped-call]
         self._network.subscribe(0x80, lambda *_: self._synchronise())
-        self._node.nmt.state = "INITIALISING"  # reports that it has booted
-        self._node.nmt.state = "PRE-OPERATIONAL"
 
     # drivers.transport.simulated_can.CanNode
 
@@ -239,7 +235,7 @@ class Epos4Fake:
         self._needs_communication_reset = False
         self._host_node = self._host_limit_ms = 0
         self._host_silent_ms = None
-        self._node.nmt.state = "INITIALISING"
+        self._node.nmt.state = "INITIALISING"  # reports that it has booted
         self._node.nmt.state = "PRE-OPERATIONAL"
 
     @property
