@@ -10,17 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 INTEGRAL, PREVIOUS_MOTOR_COUNT, MOTOR_VELOCITY, PRIMED = range(4)
-"""Places in the controller's state."""
+"""Places in the controller's state, which begins with zeros."""
 
 KP, KI, KD, VELOCITY_FILTER, LIMIT = range(5)
 """Places in the gains: command ticks a spindle count, command ticks a spindle count and tick,
 command ticks a motor count and tick, weight of the newest velocity (0..1), limit in command ticks.
 One command tick is 1e-4 of full scale."""
-
-
-def new_state() -> NDArray[np.float64]:
-    """Return the initial state of a controller."""
-    return np.zeros(4)
 
 
 @numba.njit(cache=True)

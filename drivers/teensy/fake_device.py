@@ -33,7 +33,8 @@ class HandMovedBench:
         counts[:, at.DISTAL] = -700 * turn
         counts[:, at.CURRENT] = 3 * np.cos(2 * np.pi * 50 * time_s)
         counts[:, at.FSR] = 300 * np.maximum(turn, 0.0)
-        at.run_ticks(counts, target, load_ma, *drive.arrays)
+        for row, *setpoint in zip(counts, target, load_ma, strict=True):
+            at.drive_tick(row, *setpoint, *drive.arrays)
         return counts
 
 

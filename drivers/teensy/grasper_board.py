@@ -49,22 +49,6 @@ def grasper_tick(
     row[STATUS] = state[STATE]
 
 
-@numba.njit(cache=True)
-def run_ticks(
-    rows: NDArray[np.int32],
-    targets: NDArray[np.int32],
-    state: NDArray[np.int64],
-    control_state: NDArray[np.float64],
-    gains: NDArray[np.float64],
-) -> None:
-    """Do a tick behind every row, for benches whose inputs do not follow the motors.
-
-    Targets are of shape (n, 3).
-    """
-    for k in range(len(rows)):
-        grasper_tick(rows[k], targets[k], state, control_state, gains)
-
-
 _PARTS = {
     "motor_{}": MOTOR,
     "current_{}": CURRENT,

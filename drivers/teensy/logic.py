@@ -1,13 +1,12 @@
 """What the plain simulated board does a tick, by profile."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy.control import new_state
 from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import STATUS_ARMED
 
@@ -25,9 +24,9 @@ class Drive:
         gains: Gains of each controller, shape (motors, 5).
     """
 
-    state: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, np.int64))
-    control_state: NDArray[np.float64] = field(default_factory=lambda: new_state()[None])
-    gains: NDArray[np.float64] = field(default_factory=lambda: np.zeros((1, 5)))
+    state: NDArray[np.int64]
+    control_state: NDArray[np.float64]
+    gains: NDArray[np.float64]
 
     @classmethod
     def armed(cls, gains: Any, engaged: bool = True) -> "Drive":
@@ -38,8 +37,7 @@ class Drive:
             engaged: Whether its motors move.
         """
         rows = np.atleast_2d(np.array(gains, np.float64))
-        state = np.array((STATUS_ARMED, engaged), np.int64)
-        return cls(state, np.stack([new_state()] * len(rows)), rows)
+        return cls(np.array((STATUS_ARMED, engaged), np.int64), np.zeros((len(rows), 4)), rows)
 
     @classmethod
     def idle(cls, motors: int = 1) -> "Drive":

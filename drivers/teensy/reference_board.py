@@ -47,20 +47,6 @@ def drive_tick(
     row[STATUS] = state[STATE]
 
 
-@numba.njit(cache=True)
-def run_ticks(
-    rows: NDArray[np.int32],
-    targets: NDArray[np.int32],
-    loads_ma: NDArray[np.int32],
-    state: NDArray[np.int64],
-    control_state: NDArray[np.float64],
-    gains: NDArray[np.float64],
-) -> None:
-    """Do a tick behind every row, for benches whose inputs do not follow the motors."""
-    for k in range(len(rows)):
-        drive_tick(rows[k], targets[k], loads_ma[k], state, control_state, gains)
-
-
 _FIELDS = (*INPUT_NAMES, "fsr", "command_e4", "load_ma", "target")
 """Fields of a sample, in the order of the columns."""
 

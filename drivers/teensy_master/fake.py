@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from drivers.device import Device
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_board import COLUMNS, GRASPER_LOGIC, INPUTS, run_ticks
+from drivers.teensy.grasper_board import COLUMNS, GRASPER_LOGIC, INPUTS, grasper_tick
 from drivers.teensy.logic import Drive
 from drivers.teensy_master.driver import TeensyMaster
 from drivers.transport.faulty import Faults, FaultyTransport
@@ -36,7 +36,8 @@ class TurnedByHand:
         for k, turn_hz in enumerate(TURN_HZ):
             turned = np.sin(2 * np.pi * turn_hz * time_s)
             rows[:, INPUTS - 3 + k] = np.round(MIDDLE + REACH * turned)
-        run_ticks(rows, np.column_stack((one, two, three)), *drive.arrays)
+        for row, targets in zip(rows, np.column_stack((one, two, three)), strict=True):
+            grasper_tick(row, targets, *drive.arrays)
         return rows
 
 

@@ -91,7 +91,7 @@ def controlling_board(board, tick_us, inputs, outputs):  # type: ignore[no-untyp
 def test_a_board_called_by_pointer_closes_the_same_loop() -> None:
     _, expected = run(2)
     bench = SimulatedBench(seed=2)
-    memory = np.concatenate([control.new_state(), GAINS])
+    memory = np.concatenate([np.zeros(4), GAINS])
     address = controlling_board.address
     bench.advance_with_board(250, address, memory.ctypes.data, 0)
     bench.advance_with_board(TICKS - 250, address, memory.ctypes.data, 250_000)
