@@ -191,8 +191,7 @@ class HiddenTorque:
     def __call__(self, motion: Motion) -> FloatArray:
         """Return the torque along a motion, shape (n, joints)."""
         columns = [part(_joint(motion, k)) for k, part in enumerate(self.parts)]
-        torque: FloatArray = self.amplitude * np.column_stack(columns)
-        return torque
+        return self.amplitude * np.column_stack(columns)
 
 
 def draw_hidden(family: str, rng: Random, motion: Motion, rms: FloatArray) -> HiddenTorque:
@@ -242,8 +241,7 @@ def bouc_wen(
         loads: Share of the loop that differs by direction; with 1 the loop is Dahl's
             ("Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976).
     """
-    state: FloatArray = _bouc_wen(np.ascontiguousarray(position), reach, sharpness, loads)
-    return state
+    return np.asarray(_bouc_wen(np.ascontiguousarray(position), reach, sharpness, loads))
 
 
 @numba.njit(cache=True)

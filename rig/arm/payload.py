@@ -151,8 +151,7 @@ def _samples_a_period(run: Recording, length: int) -> int:
 
 
 def _left(path: Prepared, kept: Sequence[str], values: FloatArray) -> FloatArray:
-    left: FloatArray = (path.torque[:, : path.joints] - path.estimate(kept, values))[:, LIFTING]
-    return left
+    return (path.torque[:, : path.joints] - path.estimate(kept, values))[:, LIFTING]
 
 
 def _unit(run: Recording, point_m: tuple[float, float, float], length: int) -> FloatArray:
@@ -164,8 +163,7 @@ def _unit(run: Recording, point_m: tuple[float, float, float], length: int) -> F
     every = max(1, round(rate_hz / (RATE_SHARE * LOW_PASS.cutoff_hz)))
     start = round(EDGE_S * rate_hz)
     filtered = smoothed(torque[:, LIFTING, None], rate_hz)[start::every, :, 0]
-    kept: FloatArray = filtered[:length]
-    return kept
+    return filtered[:length]
 
 
 def page(study: Payload) -> Page:

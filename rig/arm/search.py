@@ -112,8 +112,7 @@ class Prepared:
     @property
     def filtered(self) -> FloatArray:
         """The thesis' base columns, filtered as the torque is; shape (n, joints, base)."""
-        columns: FloatArray = self.table[:, : self.joints, : self.thesis.shape[2]]
-        return columns
+        return self.table[:, : self.joints, : self.thesis.shape[2]]
 
     @cached_property
     def products(self) -> Products:
@@ -131,8 +130,7 @@ class Prepared:
         largest = np.abs(self.torque).max(axis=0)
         weights = np.divide(1.0, largest, out=np.zeros_like(largest), where=largest > 0)
         weights[self.joints :] *= GRIPPER_SHARE
-        scaled: FloatArray = weights
-        return scaled
+        return np.asarray(weights)
 
     def of(self, kept: Sequence[str]) -> list[Block]:
         """Return the blocks of the base and of some effects."""
@@ -147,8 +145,7 @@ class Prepared:
         """Return the error of each joint on this path with parameters of any path, %."""
         at = np.concatenate([block.at for block in self.of(kept)])
         spread = np.ptp(self.torque[:, : self.joints], axis=0)
-        error: FloatArray = 100 * self.products.rms(at, values)[: self.joints] / spread
-        return error
+        return np.asarray(100 * self.products.rms(at, values)[: self.joints] / spread)
 
     def estimate(self, kept: Sequence[str], values: FloatArray) -> FloatArray:
         """Return the torque of the joints with parameters of any path, shape (n, joints)."""

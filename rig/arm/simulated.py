@@ -238,8 +238,7 @@ def _touching(rng: np.random.Generator, motion: Motion) -> tuple[FloatArray, Flo
 
 def _torsion(rng: np.random.Generator, motion: Motion) -> FloatArray:
     time = np.arange(len(motion)) * motion.period_s
-    wave: FloatArray = np.sin(2 * np.pi * 0.3 * time + rng.uniform(0, 6.28))
-    return wave
+    return np.asarray(np.sin(2 * np.pi * 0.3 * time + rng.uniform(0, 6.28)))
 
 
 def _of_tip(motion: Motion, force: FloatArray, twist: FloatArray) -> FloatArray:

@@ -95,8 +95,7 @@ def draw(rng: np.random.Generator, family: str = OWN) -> HydraulicArm:
     """Draw an arm, whose hidden friction is of a family of `rig.arm.hidden`."""
 
     def around(values: FloatArray) -> FloatArray:
-        drawn: FloatArray = values * np.exp(SPREAD * rng.normal(size=values.shape))
-        return drawn
+        return values * np.exp(SPREAD * rng.normal(size=values.shape))
 
     mass, length = around(MASS_KG), LENGTH_M
     zero = np.zeros_like(mass)
@@ -136,8 +135,7 @@ def friction(arm: HydraulicArm, motion: Motion) -> FloatArray:
     """Return the hidden friction along a motion, shape (n, joints)."""
     if arm.form is not None:
         return arm.form(motion)
-    torque: FloatArray = arm.hidden * bouc_wen(motion.position, np.full(5, SLIP_RAD))
-    return torque
+    return arm.hidden * bouc_wen(motion.position, np.full(5, SLIP_RAD))
 
 
 def measured_torque(
@@ -150,12 +148,10 @@ def measured_torque(
     hidden = friction(arm, motion)
     hidden[:, 0] += hose_drag(motion, arm.hose)
     noise = PRESSURE_NOISE_N_M * rng.normal(size=inner.shape)
-    shown: FloatArray = (inner + outer + hidden) / arm.constants + noise
-    return shown
+    return np.asarray((inner + outer + hidden) / arm.constants + noise)
 
 
 def hose_drag(motion: Motion, stiffness: float) -> FloatArray:
     """Return the hoses' torque on joint 1: they pull back, and harder the further they bend."""
     turn = motion.position[:, 0]
-    drag: FloatArray = stiffness * turn * (1 + turn**2)
-    return drag
+    return stiffness * turn * (1 + turn**2)

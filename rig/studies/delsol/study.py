@@ -220,7 +220,5 @@ def tip_force(motion: Motion, external: FloatArray) -> FloatArray:
     """
     smooth = zero_phase(external, RATE_HZ, LOW_PASS)
     jacobians = tip_jacobians(HYDRAULIC, motion.position)[:, :3]
-    force: FloatArray = np.einsum(
-        "nij,nj->ni", np.linalg.pinv(jacobians.transpose(0, 2, 1)), smooth
-    )
-    return force
+    inverse = np.linalg.pinv(jacobians.transpose(0, 2, 1))
+    return np.asarray(np.einsum("nij,nj->ni", inverse, smooth))

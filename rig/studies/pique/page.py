@@ -99,15 +99,8 @@ def _figures(study: Study) -> Mapping[str, Markup]:
 
 
 def _mean(study: Study, model: str) -> np.ndarray:
-    errors: np.ndarray = np.mean(
-        [
-            row.nrmsd_percent
-            for row in study.rows
-            if row.model == model and row.tested_on in study.paths
-        ],
-        axis=0,
-    )
-    return errors
+    rows = (r for r in study.rows if r.model == model and r.tested_on in study.paths)
+    return np.asarray(np.mean([row.nrmsd_percent for row in rows], axis=0))
 
 
 def _percent(values: tuple[float, ...] | np.ndarray) -> list[str]:

@@ -219,10 +219,7 @@ def _our_columns(effects: Sequence[ArmEffect], run: ArmRun) -> FloatArray:
 
 def _smoothed(values: FloatArray, derivative: int = 0) -> FloatArray:
     """Return the result of a window of past samples, half a window late, as `LiveWrench` does."""
-    late: FloatArray = savgol_filter(
-        values, WINDOW, ORDER, deriv=derivative, delta=1 / RATE_HZ, axis=0
-    )[CUT]
-    return late
+    return savgol_filter(values, WINDOW, ORDER, deriv=derivative, delta=1 / RATE_HZ, axis=0)[CUT]
 
 
 def _causal_columns(effects: Sequence[ArmEffect], run: ArmRun) -> FloatArray:
@@ -249,5 +246,5 @@ def ati(wrench: FloatArray, rng: np.random.Generator) -> FloatArray:
     mixing = np.eye(6) + 0.01 * rng.uniform(-1, 1, (6, 6)) * full[:, None] / full
     drift = np.linspace(0, 1, len(wrench))[:, None] * 0.01 * full * rng.normal(size=6)
     bias = 0.005 * full * rng.normal(size=6)
-    shown: FloatArray = seen @ mixing.T + bias + drift + 0.004 * full * rng.normal(size=seen.shape)
-    return shown
+    noise = 0.004 * full * rng.normal(size=seen.shape)
+    return np.asarray(seen @ mixing.T + bias + drift + noise)

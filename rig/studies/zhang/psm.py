@@ -230,14 +230,13 @@ def gripper_torque(kind: Kind, position: FloatArray, velocity: FloatArray) -> Fl
 
     Where it is closed its jaws press on one another.
     """
-    torque: FloatArray = (
+    return (
         kind.offset_n_m
         + kind.spring_n_m_rad * position
         + kind.friction_n_m * np.tanh(velocity / RUB_RAD_S)
         + kind.memory_n_m * bouc_wen(position[:, None], np.array([GRIPPER_SLIP_RAD]))[:, 0]
         - PRESS_N_M * np.clip(1 - position / CLOSED_RAD, 0, 1)
     )
-    return torque
 
 
 def ringing(velocity: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -246,8 +245,7 @@ def ringing(velocity: FloatArray, rng: np.random.Generator) -> FloatArray:
     strength = np.where(turned, rng.uniform(-1, 1, len(velocity)) ** 5, 0.0)
     pole = np.exp(-1 / (RINGING_S * RATE_HZ) + 2j * np.pi * RINGING_HZ / RATE_HZ)
     answer = signal.lfilter([1.0], [1.0, -2 * pole.real, abs(pole) ** 2], strength)
-    rung: FloatArray = np.asarray(answer, dtype=np.float64)
-    return rung
+    return np.asarray(answer, dtype=np.float64)
 
 
 def memory(psm: Psm, motion: Motion) -> FloatArray:
@@ -273,5 +271,4 @@ def _declared(values: FloatArray, motion: Motion) -> FloatArray:
 
 def _slips() -> FloatArray:
     lower, upper, _ = PSM.limits
-    slips: FloatArray = SLIP_SHARE * (upper - lower)
-    return slips
+    return SLIP_SHARE * (upper - lower)

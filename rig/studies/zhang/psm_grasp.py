@@ -62,15 +62,13 @@ class Grasp:
         first = int(np.argmax(self.scored))
         angle = self.motion.position[:, GRIPPER] + off - off[first]
         deep = np.maximum(TOUCH_RAD - angle, 0.0)
-        force: FloatArray = np.where(self.scored, JAW_N_RAD * deep, 0.0)
-        return force
+        return np.where(self.scored, JAW_N_RAD * deep, 0.0)
 
     def sensed(self, force: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return the reading of a force-sensing resistor for a force, N."""
         gain = 1 + SENSOR_GAIN * rng.normal()
         late = SENSOR_HYSTERESIS_N * bouc_wen(force[:, None], np.array([0.5]))[:, 0]
-        told: FloatArray = gain * force + late + SENSOR_NOISE_N * rng.normal(size=len(force))
-        return told
+        return gain * force + late + SENSOR_NOISE_N * rng.normal(size=len(force))
 
 
 def grasp_and_release(rng: np.random.Generator) -> Grasp:
@@ -139,17 +137,14 @@ def _run(
 
 
 def _random_pose(rng: np.random.Generator) -> FloatArray:
-    pose: FloatArray = 0.4 * (random_path(rng, 1.0)[0] - _middle()) + _middle()
-    return pose
+    return np.asarray(0.4 * (random_path(rng, 1.0)[0] - _middle()) + _middle())
 
 
 def _middle() -> FloatArray:
     lower, upper, _ = PSM.limits
-    middle: FloatArray = (lower + upper) / 2
-    return middle
+    return (lower + upper) / 2
 
 
 def _ease(start: FloatArray, stop: FloatArray, samples: int) -> FloatArray:
-    share = (1 - np.cos(np.linspace(0, np.pi, samples))) / 2
-    eased: FloatArray = start + share[:, None] * (stop - start)
-    return eased
+    share = np.asarray((1 - np.cos(np.linspace(0, np.pi, samples))) / 2)
+    return start + share[:, None] * (stop - start)

@@ -30,15 +30,13 @@ def random_path(rng: np.random.Generator, seconds: float) -> FloatArray:
     raw = _smooth_random(rng, seconds, len(lower))
     fastest = np.abs(np.gradient(raw, 1 / RATE_HZ, axis=0)).max(axis=0)
     size = np.minimum(SHARE * (upper - lower) / 2, SPEED_SHARE * speed / fastest)
-    path: FloatArray = (lower + upper) / 2 + size * raw
-    return path
+    return np.asarray((lower + upper) / 2 + size * raw)
 
 
 def moving_gripper(rng: np.random.Generator, seconds: float, open_rad: float) -> FloatArray:
     """Return a path of a gripper that opens and closes at random, shape (n,)."""
     share = (_smooth_random(rng, seconds, 1)[:, 0] + 1) / 2
-    path: FloatArray = open_rad * (LEAST_OPEN + (1 - LEAST_OPEN) * share)
-    return path
+    return open_rad * (LEAST_OPEN + (1 - LEAST_OPEN) * share)
 
 
 def with_gripper(path: FloatArray, gripper: FloatArray | float, open_rad: float) -> Motion:
@@ -79,5 +77,4 @@ def _smooth_random(rng: np.random.Generator, seconds: float, columns: int) -> Fl
         raw = signal.sosfilt(low_pass, raw, axis=0)
     smooth = raw[settle:]
     middle = (smooth.max(axis=0) + smooth.min(axis=0)) / 2
-    span: FloatArray = (smooth - middle) / (np.ptp(smooth, axis=0) / 2)
-    return span
+    return np.asarray((smooth - middle) / (np.ptp(smooth, axis=0) / 2))

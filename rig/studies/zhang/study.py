@@ -106,8 +106,7 @@ class ZhangStudy:
 
     def median(self, cell: str) -> FloatArray:
         """Return the medians over the arms with the simulation's own torque, shape (numbers,)."""
-        middle: FloatArray = np.median(self.values(cell), axis=0)
-        return middle
+        return np.median(self.values(cell), axis=0)
 
     def near(self, condition: str) -> list[bool | None]:
         """Return for each of the paper's numbers whether its method comes near it here.
