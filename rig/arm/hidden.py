@@ -73,12 +73,6 @@ def _sized(x: FloatArray, form: FloatArray) -> Callable[[FloatArray], FloatArray
     return lambda values: np.interp(np.abs(values), at, form)
 
 
-def _signed(reference: Joint, level: Torque) -> Torque:
-    """Return friction of a level."""
-    width = SIGN_SHARE * float(np.percentile(np.abs(reference.speed), 99.5))
-    return lambda joint: level(joint) * np.tanh(joint.speed / width)
-
-
 def _loop(random: Random, reference: Joint) -> Torque:
     span = float(np.ptp(np.percentile(reference.angle, [0.5, 99.5])))
     kind, reach, weights = bank(random, span * float(np.exp(random.uniform(*np.log([0.02, 0.15])))))
@@ -92,9 +86,24 @@ def _loop(random: Random, reference: Joint) -> Torque:
     return lambda j: _relays(j.angle, on, off) @ weights
 
 
-def _falling(random: Random, reference: Joint) -> Torque:
-    level = _sized(reference.speed, falling(random, grid() / random.uniform(0.05, 0.3)))
-    return _signed(reference, lambda j: level(j.speed))
+def _friction(
+    variable: str,
+    form: Callable[[Random], FloatArray],
+    over: Callable[[FloatArray, FloatArray], Callable[[FloatArray], FloatArray]],
+) -> Drawer:
+    """Return the drawer of a friction whose level is a form over one variable of a joint."""
+
+    def draw(random: Random, reference: Joint) -> Torque:
+        level = over(getattr(reference, variable), form(random))
+        return _signed(reference, lambda joint: level(getattr(joint, variable)))
+
+    return draw
+
+
+def _signed(reference: Joint, level: Torque) -> Torque:
+    """Return friction of a level."""
+    width = SIGN_SHARE * float(np.percentile(np.abs(reference.speed), 99.5))
+    return lambda joint: level(joint) * np.tanh(joint.speed / width)
 
 
 def _along(random: Random) -> FloatArray:
@@ -103,36 +112,19 @@ def _along(random: Random) -> FloatArray:
     return np.asarray(form - form.min())
 
 
-def _by_angle(random: Random, reference: Joint) -> Torque:
-    level = _over(reference.angle, _along(random))
-    return _signed(reference, lambda j: level(j.angle))
+def _course(random: Random) -> FloatArray:
+    form = course(random, grid())
+    return np.asarray(form - form.min())
+
+
+def _pushed(random: Random) -> FloatArray:
+    form = falling(random, grid() / random.uniform(0.05, 0.2))
+    return form if random.random() < 0.5 else 1.0 - form
 
 
 def _drag(random: Random, reference: Joint) -> Torque:
     size = _sized(reference.speed, power(random, 1.7, 3.0)(grid()))
     return lambda j: size(j.speed) * np.sign(j.speed)
-
-
-def _by_time(random: Random, reference: Joint) -> Torque:
-    form = course(random, grid())
-    level = _sized(reference.time_s, form - form.min())
-    return _signed(reference, lambda j: level(j.time_s))
-
-
-def _by_other(random: Random, reference: Joint) -> Torque:
-    level = _over(reference.other, _along(random))
-    return _signed(reference, lambda j: level(j.other))
-
-
-def _tight(random: Random, reference: Joint) -> Torque:
-    level = _over(reference.angle, spots(random))
-    return _signed(reference, lambda j: level(j.angle))
-
-
-def _pushed(random: Random, reference: Joint) -> Torque:
-    form = falling(random, grid() / random.uniform(0.05, 0.2))
-    level = _sized(reference.acceleration, form if random.random() < 0.5 else 1.0 - form)
-    return _signed(reference, lambda j: level(j.acceleration))
 
 
 def _beyond(random: Random, reference: Joint) -> Torque:
@@ -149,19 +141,21 @@ def _switched(random: Random, reference: Joint) -> Torque:
     return _signed(reference, lambda j: _relays(np.abs(j.speed), *thresholds)[:, 0])
 
 
+_falling = _friction("speed", lambda r: falling(r, grid() / r.uniform(0.05, 0.3)), _sized)
+
 IN_CATALOGUE: Mapping[str, tuple[tuple[str, ...], Drawer]] = {
     "loop after reversals": (LOOPS, _loop),
     "friction that falls with speed": (("friction.stribeck",), _falling),
-    "friction along the angle": (("friction.position",), _by_angle),
+    "friction along the angle": (("friction.position",), _friction("angle", _along, _over)),
     "curved drag": (("friction.drag",), _drag),
-    "friction that changes with time": (("friction.warmup",), _by_time),
+    "friction that changes with time": (("friction.warmup",), _friction("time_s", _course, _sized)),
 }
 """Family to the catalogue's names of it. The catalogue has the family, not the drawn form."""
 
 NOT_IN_CATALOGUE: Mapping[str, Drawer] = {
-    "friction by another joint's angle": _by_other,
-    "friction at tight spots": _tight,
-    "friction by acceleration": _pushed,
+    "friction by another joint's angle": _friction("other", _along, _over),
+    "friction at tight spots": _friction("angle", spots, _over),
+    "friction by acceleration": _friction("acceleration", _pushed, _sized),
     "drag on a part of the travel": _beyond,
     "friction switched by speed": _switched,
 }

@@ -130,6 +130,7 @@ def _mass(
     height_error_m: float,
 ) -> AddedMass:
     path, kept = prepare(run, tried), [effect.name for effect in tried]
+    third = len(path.torque) // LEAST_PERIODS  # in place of a period where the motion repeats less
     straight = _unit(run, (0.0, height_m, 0.0), len(path.torque))
 
     def beside(x_m: float, z_m: float) -> FloatArray:
@@ -140,14 +141,8 @@ def _mass(
         (straight, beside(SIDE_STEP_M, 0.0), beside(0.0, SIDE_STEP_M)),
         _unit(run, (0.0, height_m + height_error_m, 0.0), len(path.torque)),
         noise,
-        _samples_a_period(run, len(path.torque)),
+        min(round(period_of(run) or third), third),
     )
-
-
-def _samples_a_period(run: Recording, length: int) -> int:
-    """Return the thinned samples of a period of the motion; of a third of it if it repeats less."""
-    third = length // LEAST_PERIODS
-    return min(round(period_of(run) or third), third)
 
 
 def _left(path: Prepared, kept: Sequence[str], values: FloatArray) -> FloatArray:

@@ -86,7 +86,6 @@ class Prepared:
 
     Attributes:
         name: The run.
-        position: Filtered positions, shape (n, joints).
         torque: Filtered torque, shape (n, rows): joints, then the gripper.
         thesis: Base columns of filtered motion, as the thesis makes them, shape (n, joints, base).
         closed: The same of the arm with its loops.
@@ -96,7 +95,6 @@ class Prepared:
     """
 
     name: str
-    position: FloatArray
     torque: FloatArray
     thesis: FloatArray
     closed: FloatArray
@@ -188,10 +186,9 @@ def prepare(
     own = regressor(PSM, fine)[:, :, base.columns]
     padded = np.pad(own, ((0, 0), (0, rows - own.shape[1]), (0, 0)))
     parts = [padded, gripper(PSM, fine), *(effect.columns(fine) for effect in effects)]
-    own_block = base_block(damping, parts[1].shape[2])
+    own_block = base_block(damping, [False, True, True, True][: parts[1].shape[2]])
     return Prepared(
         name=recording.name,
-        position=coarse.position[kept, : len(PSM.joints)],
         torque=zero_phase(torque[:, :rows], rate_hz, LOW_PASS)[kept],
         thesis=regressor(PSM, coarse)[kept][:, :, base.columns],
         closed=regressor(PSM_CLOSED, coarse)[kept][:, :, base_of(PSM_CLOSED).columns],
@@ -201,11 +198,16 @@ def prepare(
     )
 
 
-def base_block(damping: float, own_gripper: int = 0) -> Block:
-    """Return the block of an arm's base columns and of its gripper's own, frictions bounded."""
+def base_block(damping: float, further: Sequence[bool] = ()) -> Block:
+    """Return the block of an arm's base columns, frictions bounded.
+
+    Args:
+        damping: Of its fits, as a share of a column's squared length.
+        further: Of each column behind those of the arm, whether it is a friction.
+    """
     friction = [name.startswith("F") and len(name) == 3 for name in base_of(PSM).names]
-    frictions = np.array([*friction, *([False, True, True, True][:own_gripper])])
-    return Block("base", np.arange(len(frictions)), frictions, damping, own_length=True)
+    bounded = np.array([*friction, *further])
+    return Block("base", np.arange(len(bounded)), bounded, damping, own_length=True)
 
 
 def blocks_of(
@@ -235,7 +237,7 @@ def of_columns(
         joints: Rows that are scored.
     """
     none = table[:, :joints, :0]
-    return Prepared(name, np.zeros((len(torque), joints)), torque, none, none, table, blocks, 1.0)
+    return Prepared(name, torque, none, none, table, blocks, 1.0)
 
 
 def search(

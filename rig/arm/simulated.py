@@ -119,9 +119,8 @@ def hidden_torque(arm: SimulatedArm, motion: Motion) -> FloatArray:
     share = np.abs(middle) / np.abs(middle).max(axis=0)
     cross = friction * np.roll(share, 1, axis=1)
     drift = np.linspace(-0.5, 0.5, len(motion))[:, None] * np.ones(6)
-    hidden: FloatArray = arm.hidden[0] * friction + arm.hidden[1] * cross
-    hidden += 0.3 * arm.hidden[2] * drift
-    return hidden
+    hidden = arm.hidden[0] * friction + arm.hidden[1] * cross
+    return np.asarray(hidden + 0.3 * arm.hidden[2] * drift)
 
 
 _LINKS = {"m": (4.0, 2.0, 0.4), "lz": (0.3, -0.3, -0.13), "ly": (0.2, -0.25, 0.02)}
@@ -151,8 +150,7 @@ def _plausible(name: str) -> float:
 def excitation(rng: np.random.Generator, seconds: float = 60.0) -> Motion:
     """Return a finite Fourier series of five harmonics of 0.1 Hz, equation 2.14, within limits."""
     time = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
-    harmonics: FloatArray = 0.1 * np.arange(1.0, 6.0)
-    return _fourier(rng, time, harmonics)
+    return _fourier(rng, time, 0.1 * np.arange(1.0, 6.0))
 
 
 def smooth_motion(
@@ -196,7 +194,7 @@ def contact(rng: np.random.Generator, motion: Motion) -> FloatArray:
     """Return spatial wrenches of touching and letting go in turns: up to 7 N, smooth."""
     waves, touching = _touching(rng, motion)
     force = waves * (touching * rng.uniform(5, 7) / np.abs(waves).max())[:, None]
-    return _of_tip(motion, force, 0.1 * touching * _torsion(rng, motion))
+    return _of_tip(rng, motion, force, 0.1 * touching)
 
 
 def pin(
@@ -215,7 +213,7 @@ def pin(
     """
     waves, touching = _touching(rng, motion)
     force = waves * touching[:, None] * np.array(largest_n) / np.abs(waves).max(axis=0)
-    return _of_tip(motion, force, torsion_n_m * touching * _torsion(rng, motion))
+    return _of_tip(rng, motion, force, torsion_n_m * touching)
 
 
 def passed_on(motion: Motion, wrench: FloatArray) -> FloatArray:
@@ -236,13 +234,12 @@ def _touching(rng: np.random.Generator, motion: Motion) -> tuple[FloatArray, Flo
     return waves, touching
 
 
-def _torsion(rng: np.random.Generator, motion: Motion) -> FloatArray:
+def _of_tip(
+    rng: np.random.Generator, motion: Motion, force: FloatArray, torsion_n_m: FloatArray
+) -> FloatArray:
+    """Return the spatial wrench of a force at the tip and of a torsion of a size to and fro."""
     time = np.arange(len(motion)) * motion.period_s
-    return np.asarray(np.sin(2 * np.pi * 0.3 * time + rng.uniform(0, 6.28)))
-
-
-def _of_tip(motion: Motion, force: FloatArray, twist: FloatArray) -> FloatArray:
-    """Return the spatial wrench of a force at the tip and a torsion about the shaft."""
+    twist = torsion_n_m * np.sin(2 * np.pi * 0.3 * time + rng.uniform(0, 6.28))
     axis, tip = _shaft(motion)
     return np.hstack([force, np.cross(tip, force) + twist[:, None] * axis])
 

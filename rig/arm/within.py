@@ -40,15 +40,9 @@ def chosen_within(path: Prepared, run: Recording, tried: Sequence[ArmEffect]) ->
     samples = np.arange(len(path.torque))
     period = period_of(run) or len(samples)
     first = np.floor(samples / period * STRETCHES) % 2 == 0
+    arrays = ("torque", "thesis", "closed", "table")
     one, other = (
-        replace(
-            path,
-            position=path.position[kept],
-            torque=path.torque[kept],
-            thesis=path.thesis[kept],
-            closed=path.closed[kept],
-            table=path.table[kept],
-        )
+        replace(path, **{name: getattr(path, name)[kept] for name in arrays})
         for kept in (first, ~first)
     )
     return search((one, other), (other, one), tried)[1]

@@ -69,7 +69,8 @@ def test_free_motion_identifies_the_error_of_the_coupling_matrix():
     wanted = ("wrist drive hysteresis", "cable slip J7", "long slip J3")
     effects = [effect for effect in tried if effect.name in wanted]
     values = zhang_physics.fitted(psm.table, effects, runs, network=False).values
-    declared = len(zhang_physics.base_block().at)  # last of them the shares in joints 3 to 6
+    base = zhang_physics.base_block(1.0, zhang_physics.GRIPPER_FRICTIONS)
+    declared = len(base.at)  # last of them the shares in joints 3 to 6
     true = psm.leak[1:3, 3] / psm.leak[3, 3]
     assert np.abs(true).min() > 0.1
     np.testing.assert_allclose(values[declared - 2 : declared], true, atol=0.02)

@@ -22,13 +22,12 @@ from estimation.arm.effects import ArmEffect, on_joint
 from estimation.arm.elements import slip
 from estimation.arm.motion import Motion
 from estimation.arm.regressor import regressor
-from estimation.arm.signed import Block
 from estimation.arm.tables import PSM, Arm
 from estimation.arm.wrist import candidates, gripper
 from estimation.networks.network import Network
 from estimation.networks.training import Settings, train
 from estimation.recording import FloatArray
-from rig.arm.search import DAMPING, Prepared, blocks_of, of_columns, search
+from rig.arm.search import DAMPING, Prepared, base_block, blocks_of, of_columns, search
 from rig.studies.zhang.psm import GRIPPER, JOINTS, RATE_HZ, PsmRun
 
 EVERY = 5
@@ -46,6 +45,9 @@ CLOSED_RAD = 0.03
 
 LEAKS = (2, 3, 4, 5)
 """Joints (from 0) that show a share of the gripper's torque."""
+
+GRIPPER_FRICTIONS = (False, False, True, True, False, False, *(False for _ in LEAKS))
+"""Of each declared column behind those of the arm, whether it is a friction."""
 
 LONG_SLIP_SHARE = (0.01, 0.03, 0.1, 0.2)
 """Thresholds of slip, as shares of half a joint's range."""
@@ -96,14 +98,6 @@ def base_columns(arm: Arm, run: PsmRun, motion: Motion) -> FloatArray:
         ],
         axis=2,
     )
-
-
-def base_block() -> Block:
-    """Return the bounds of the declared columns: frictions are not negative."""
-    names = base_of(PSM).names
-    own = [name.startswith("F") and len(name) == 3 for name in names]
-    signs = np.array([*own, False, False, True, True, False, False, *(False for _ in LEAKS)])
-    return Block("base", np.arange(len(signs)), signs, DAMPING, own_length=True)
 
 
 def of_long_slips() -> list[ArmEffect]:
@@ -185,7 +179,8 @@ def prepared(name: str, arm: Arm, runs: Sequence[PsmRun], effects: Sequence[ArmE
         widths = [part.shape[2] for part in parts[1:]]
         tables.append(np.concatenate(parts, axis=2))
         torques.append(run.torque[kept])
-    blocks = blocks_of(base_block(), effects, widths)
+    base = base_block(DAMPING, GRIPPER_FRICTIONS)
+    blocks = blocks_of(base, effects, widths)
     return of_columns(name, np.concatenate(torques), np.concatenate(tables), blocks, JOINTS)
 
 
