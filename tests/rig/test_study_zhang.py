@@ -16,7 +16,7 @@ from rig.studies.zhang import free as zhang_free
 from rig.studies.zhang import networks as zhang_networks
 from rig.studies.zhang import physics as zhang_physics
 from rig.studies.zhang.psm import GRIPPER, KINDS, simulate, with_instrument
-from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
+from rig.studies.zhang.psm_motion import LEAD_SAMPLES, moving_gripper, random_path, with_gripper
 from rig.studies.zhang.study import PAPER, one_arm, run
 
 pytestmark = pytest.mark.long
@@ -34,7 +34,7 @@ def psm():
 def test_shown_torque_is_the_true_one_through_both_couplings(psm):
     motion = with_gripper(random_path(np.random.default_rng(1), 4.0), 0.3, 0.8)
     free, held = (
-        simulate(psm, motion, np.random.default_rng(2), grip_n_m=grip, lead=lead_samples())
+        simulate(psm, motion, np.random.default_rng(2), grip_n_m=grip, lead=LEAD_SAMPLES)
         for grip in (None, np.full(len(motion), 0.1))
     )
     leaked = np.mean(held.torque - free.torque, axis=0)
@@ -64,7 +64,7 @@ def test_free_motion_identifies_the_error_of_the_coupling_matrix():
     runs = []
     for gripper in (moving_gripper(rng, 60.0, psm.kind.open_rad), 0.0):
         motion = with_gripper(random_path(rng, 60.0), gripper, psm.kind.open_rad)
-        runs.append(simulate(psm, motion, rng, lead=lead_samples()))
+        runs.append(simulate(psm, motion, rng, lead=LEAD_SAMPLES))
     tried = [*candidates(psm.table), *zhang_physics.of_long_slips()]
     wanted = ("wrist drive hysteresis", "cable slip J7", "long slip J3")
     effects = [effect for effect in tried if effect.name in wanted]

@@ -13,13 +13,14 @@ from rig.studies.zhang.networks import JointNetwork
 from rig.studies.zhang.physics import Physics
 from rig.studies.zhang.psm import GRIPPER, RATE_HZ, Psm, PsmRun, simulate
 from rig.studies.zhang.psm_grasp import (
+    ARM_M,
     CONFIGURATIONS_DEG,
     Grasp,
     configurations,
     contact_path,
     grasp_and_release,
 )
-from rig.studies.zhang.psm_motion import lead_samples
+from rig.studies.zhang.psm_motion import LEAD_SAMPLES
 
 EVERY = 5
 """Of the samples, so many are kept of what is drawn over time."""
@@ -82,8 +83,8 @@ def _grasped(
 ) -> tuple[PsmRun, FloatArray, np.ndarray]:
     """Return a run with a grasp, the force of the resistive sensor, and the scored samples."""
     force = grasp.force(psm)
-    run = simulate(psm, grasp.motion, rng, grip_n_m=-grasp.arm_m * force, lead=lead_samples())
-    return run, grasp.sensed(force, rng)[lead_samples() :], grasp.scored[lead_samples() :]
+    run = simulate(psm, grasp.motion, rng, grip_n_m=-ARM_M * force, lead=LEAD_SAMPLES)
+    return run, grasp.sensed(force, rng)[LEAD_SAMPLES:], grasp.scored[LEAD_SAMPLES:]
 
 
 def _scale(external: FloatArray, sensed: FloatArray, scored: np.ndarray) -> float:
@@ -96,7 +97,7 @@ def turning(learnt: Learnt, rng: np.random.Generator) -> Cells:
     """Return the mean error of grip force in each configuration, N; the scale is found at C1."""
     grasp, place = configurations(rng)
     run, sensed, _ = _grasped(learnt.psm, grasp, rng)
-    place = place[lead_samples() :]
+    place = place[LEAD_SAMPLES:]
     cells: Cells = {"C1 to C5 | sensor, N | measured": _means(sensed, place)}
     for method, external in learnt.external(run).items():
         scale = _scale(external, sensed, place == 0)
@@ -115,10 +116,10 @@ def in_contact(learnt: Learnt, rng: np.random.Generator) -> tuple[Cells, Cells]:
     The grasp's scale is found before the tip touches.
     """
     grasp = contact_path(rng)
-    psm, lead = learnt.psm, lead_samples()
+    psm, lead = learnt.psm, LEAD_SAMPLES
     spatial = contact(rng, grasp.motion) * grasp.touching[:, None]
     force = grasp.force(psm)
-    run = simulate(psm, grasp.motion, rng, wrench=spatial, grip_n_m=-grasp.arm_m * force, lead=lead)
+    run = simulate(psm, grasp.motion, rng, wrench=spatial, grip_n_m=-ARM_M * force, lead=lead)
     sensed, touching = grasp.sensed(force, rng)[lead:], grasp.touching[lead:]
     jacobians = body_jacobians(PSM, run.position[:, :GRIPPER])
     truth = in_tip_frame(PSM, spatial, grasp.motion.position[:, :GRIPPER])[lead:]

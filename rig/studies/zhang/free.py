@@ -20,7 +20,7 @@ from rig.studies.zhang.psm import (
     simulate,
     with_instrument,
 )
-from rig.studies.zhang.psm_motion import lead_samples, moving_gripper, random_path, with_gripper
+from rig.studies.zhang.psm_motion import LEAD_SAMPLES, moving_gripper, random_path, with_gripper
 
 NETWORKS, BARE, OURS = "paper's networks", "physical model alone", "physical model and network"
 SHORT = "paper's networks on our minutes"
@@ -74,7 +74,7 @@ def _free(psm: Psm, rng: np.random.Generator, seconds: float, moving: bool) -> P
     path, open_rad = random_path(rng, seconds), psm.kind.open_rad
     gripper = moving_gripper(rng, seconds, open_rad) if moving else 0.0
     motion = with_gripper(path, gripper, open_rad)
-    return simulate(psm, motion, rng, lead=lead_samples())
+    return simulate(psm, motion, rng, lead=LEAD_SAMPLES)
 
 
 def table_1(splits: dict[str, Split], seed: int) -> tuple[tuple[JointNetwork, ...], Cells]:
@@ -162,7 +162,7 @@ def figure_3(psm: Psm, rng: np.random.Generator) -> Cells:
     for name, (gripper, torque) in cases.items():
         motion = with_gripper(path, gripper, open_rad)
         held = None if torque is None else np.full(len(motion), torque)
-        run = simulate(psm, motion, rng, grip_n_m=held, lead=lead_samples())
+        run = simulate(psm, motion, rng, grip_n_m=held, lead=LEAD_SAMPLES)
         shown[name] = run.torque[:, :GRIPPER]
     still = shown.pop("0 degrees")
     return {

@@ -78,17 +78,8 @@ def trained(
         gripper: Whether the gripper moves in them.
         seed: Of the first weights.
     """
-    names = input_names(joint, gripper)
-    settings = replace(SETTINGS, seed=seed)
-    rows, torque = _table(joint, runs, names)
-    network = train(
-        rows,
-        torque,
-        (names, ("torque",)),
-        settings,
-        validation=_table(joint, validation, names),
-    ).network
-    return JointNetwork(joint, network)
+    names, settings = input_names(joint, gripper), replace(SETTINGS, seed=seed)
+    return _learnt(joint, runs, validation, names, settings)
 
 
 def transferred(
@@ -96,16 +87,20 @@ def transferred(
 ) -> JointNetwork:
     """Train a network on with runs of another instrument."""
     names = source.network.inputs
-    rows, torque = _table(source.joint, runs, names)
-    network = train(
-        rows,
-        torque,
-        (names, ("torque",)),
-        TRANSFER,
-        validation=_table(source.joint, validation, names),
-        start=source.network,
-    ).network
-    return JointNetwork(source.joint, network)
+    return _learnt(source.joint, runs, validation, names, TRANSFER, source.network)
+
+
+def _learnt(
+    joint: int,
+    runs: Sequence[PsmRun],
+    validation: Sequence[PsmRun],
+    names: Sequence[str],
+    settings: Settings,
+    start: Network | None = None,
+) -> JointNetwork:
+    (rows, torque), held_out = (_table(joint, some, names) for some in (runs, validation))
+    done = train(rows, torque, (names, ("torque",)), settings, validation=held_out, start=start)
+    return JointNetwork(joint, done.network)
 
 
 def _table(

@@ -251,7 +251,9 @@ def ringing(velocity: FloatArray, rng: np.random.Generator) -> FloatArray:
 def memory(psm: Psm, motion: Motion) -> FloatArray:
     """Return the torque of friction with memory, of joints and of the motors' cables, (n, 7)."""
     shown = np.zeros((len(motion), JOINTS))
-    shown[:, :GRIPPER] = psm.memory * bouc_wen(motion.position[:, :GRIPPER], _slips())
+    lower, upper, _ = PSM.limits
+    slips = SLIP_SHARE * (upper - lower)
+    shown[:, :GRIPPER] = psm.memory * bouc_wen(motion.position[:, :GRIPPER], slips)
     motors = motion.position[:, WRIST] @ np.linalg.inv(psm.true_coupling).T
     friction = psm.cable_n_m * bouc_wen(motors, np.full(4, CABLE_SLIP_RAD))
     shown[:, WRIST] += friction @ np.linalg.inv(psm.nominal_coupling)
@@ -267,8 +269,3 @@ def _declared(values: FloatArray, motion: Motion) -> FloatArray:
         )
         parts.append(regressor(PSM, part) @ values)
     return np.concatenate(parts)
-
-
-def _slips() -> FloatArray:
-    lower, upper, _ = PSM.limits
-    return SLIP_SHARE * (upper - lower)

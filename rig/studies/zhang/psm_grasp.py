@@ -44,13 +44,11 @@ class Grasp:
 
     Attributes:
         motion: The arm's motion as it is measured, lead included.
-        arm_m: Lever from the gripper's axis to what it holds.
         touching: Whether, or how far, the tip may touch its surroundings, shape (n,).
         scored: Samples of the experiment itself, shape (n,).
     """
 
     motion: Motion
-    arm_m: float
     touching: FloatArray
     scored: np.ndarray
 
@@ -78,7 +76,7 @@ def grasp_and_release(rng: np.random.Generator) -> Grasp:
     deepest = PEAK_N / JAW_N_RAD
     cycles = (1 - np.cos(2 * np.pi * time / (seconds / rng.integers(3, 6)))) / 2
     closed = 1.1 * deepest * np.minimum(cycles, 1 / 1.1)
-    pose = _random_pose(rng)
+    pose = 0.4 * (random_path(rng, 1.0)[0] - _middle()) + _middle()
     return _run(rng, np.tile(pose, (len(time), 1)), TOUCH_RAD - closed, np.zeros(len(time)))
 
 
@@ -120,24 +118,16 @@ def _run(
     opened = moving_gripper(rng, FREE_S, OPEN_RAD)
     coming = round(COMING_S * RATE_HZ)
     way = _ease(free[-1], path[0], coming)
-    closing = np.concatenate(
-        [
-            _ease(opened[-1:], np.array([OPEN_RAD]), coming)[:, 0],
-            _ease(np.array([OPEN_RAD]), gripper[:1], coming)[:, 0],
-        ]
-    )
+    wide = np.array([OPEN_RAD])
+    opening, closing = _ease(opened[-1:], wide, coming), _ease(wide, gripper[:1], coming)
     motion = with_gripper(
         np.concatenate([free, way, np.repeat(path[:1], coming, axis=0), path]),
-        np.concatenate([opened, closing, gripper]),
+        np.concatenate([opened, opening[:, 0], closing[:, 0], gripper]),
         OPEN_RAD,
     )
     before = len(motion) - len(path)
     padded = np.concatenate([np.zeros(before), touching])
-    return Grasp(motion, ARM_M, padded, np.arange(len(motion)) >= before)
-
-
-def _random_pose(rng: np.random.Generator) -> FloatArray:
-    return np.asarray(0.4 * (random_path(rng, 1.0)[0] - _middle()) + _middle())
+    return Grasp(motion, padded, np.arange(len(motion)) >= before)
 
 
 def _middle() -> FloatArray:

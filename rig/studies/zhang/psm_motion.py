@@ -12,7 +12,7 @@ from estimation.arm.tables import PSM
 from estimation.recording import FloatArray
 from rig.studies.zhang.psm import RATE_HZ
 
-LEAD_S = 4.0
+LEAD_SAMPLES = round(4.0 * RATE_HZ)
 """Before a run: the gripper closes from open, so that its cables are in a known state."""
 
 HELD_S = 0.8
@@ -47,23 +47,13 @@ def with_gripper(path: FloatArray, gripper: FloatArray | float, open_rad: float)
         gripper: Of the gripper, shape (n,), or the angle at which it is held, rad.
         open_rad: Where the gripper starts from.
     """
-    lead = lead_samples()
     held = np.broadcast_to(gripper, len(path))
-    ease = (1 - np.cos(np.linspace(0, np.pi, lead))) / 2
+    ease = (1 - np.cos(np.linspace(0, np.pi, LEAD_SAMPLES))) / 2
     closing = open_rad + ease * (held[0] - open_rad)
-    position = np.column_stack(
-        [
-            np.vstack([np.repeat(path[:1], lead, axis=0), path]),
-            np.concatenate([closing, held]),
-        ]
-    )
+    whole = np.vstack([np.repeat(path[:1], LEAD_SAMPLES, axis=0), path])
+    position = np.column_stack([whole, np.concatenate([closing, held])])
     velocity = np.gradient(position, 1 / RATE_HZ, axis=0)
     return Motion(position, velocity, np.gradient(velocity, 1 / RATE_HZ, axis=0), 1 / RATE_HZ)
-
-
-def lead_samples() -> int:
-    """Return the number of samples of the lead."""
-    return round(LEAD_S * RATE_HZ)
 
 
 def _smooth_random(rng: np.random.Generator, seconds: float, columns: int) -> FloatArray:
