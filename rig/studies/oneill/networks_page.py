@@ -28,10 +28,9 @@ def notes(study: NetworkStudy) -> list[str]:
     settings = study.settings
     every = " and ".join(f"one of {n} ({pose})" for pose, n in study.every.items())
     told = [
-        f"Networks: trained on {every} closing samples, scored on all held-out ones."
-        f" Converged means that the error fell by less than {settings.tolerance:.1%} in"
-        f" {settings.patience} steps; at most {settings.iterations} steps. Truth is the sensor"
-        " filtered without lag.",
+        f"Networks: trained on {every} closing samples, scored on all held-out ones. Converged"
+        f" means that the error fell by less than {settings.tolerance:.1%} in {settings.patience}"
+        f" steps; at most {settings.iterations} steps. Truth is the sensor filtered without lag.",
         *study.notes,
     ]
     if study.grip_force is not None:

@@ -27,7 +27,21 @@ TITLE = "Joint torques of a patient-side manipulator: table 3.2 of Piqué 2018, 
 def page(study: Study) -> Page:
     """Return the study's page."""
     paragraphs = [_lead(study), f"Arm: {study.arm}.", *_notes(study)]
-    return Page(TITLE, paragraphs, _tables(study), study.provenance, lambda: _figures(study))
+    others = [_others(study)] if any(r.tested_on not in study.paths for r in study.rows) else []
+    added = "Gain: mean over the joints of the relative fall of NRMSD, when the effect was added."
+    dropped = (
+        "Gain had the effect been added to those kept; negative: it made the estimate worse. An"
+        " effect that gains in the first column only was found and not confirmed."
+    )
+    tables = [
+        _errors(study),
+        *others,
+        _trials(study, True, "Effects kept, in order", added),
+        _trials(study, False, "Effects tried and dropped", dropped),
+        _parameters(study),
+        coverage("pique"),
+    ]
+    return Page(TITLE, paragraphs, tables, study.provenance, lambda: _figures(study))
 
 
 def _lead(study: Study) -> str:
@@ -35,11 +49,10 @@ def _lead(study: Study) -> str:
     models = list(dict.fromkeys(row.model for row in study.rows))
     before, after = (_mean(study, model) for model in (models[0], EFFECTS))
     return (
-        f"With effects beyond the thesis' model, the joint torques of a path that was not fitted"
-        f" are estimated to {np.mean(after):.2f} % of their range, mean over joints and both"
+        "With effects beyond the thesis' model, the joint torques of a path that was not fitted are"
+        f" estimated to {np.mean(after):.2f} % of their range, mean over joints and both"
         f" directions; the thesis' model reaches {np.mean(before):.2f} %. With effects chosen on"
-        f" the fitted path alone it is {np.mean(_mean(study, WITHIN)):.2f} %."
-        f"{_reached(study)}"
+        f" the fitted path alone it is {np.mean(_mean(study, WITHIN)):.2f} %.{_reached(study)}"
     )
 
 
@@ -73,19 +86,6 @@ def _notes(study: Study) -> list[str]:
         " Frictions, slip and creep cannot be negative. The gripper's torque takes part in the fit"
         " and is not scored."
         f" Fits with effects are damped by {DAMPING:g} of a column's squared length.",
-    ]
-
-
-def _tables(study: Study) -> list[TextTable]:
-    """Return the study's tables."""
-    others = [_others(study)] if any(r.tested_on not in study.paths for r in study.rows) else []
-    return [
-        _errors(study),
-        *others,
-        _kept(study),
-        _dropped(study),
-        _parameters(study),
-        coverage("pique"),
     ]
 
 
@@ -142,32 +142,15 @@ def _way(row: Row) -> str:
     return f"{row.model}, {row.fitted_on} to {row.tested_on}"
 
 
-def _kept(study: Study) -> TextTable:
+def _trials(study: Study, kept: bool, title: str, note: str) -> TextTable:
     rows = [
         [t.effect, t.what, f"{t.gain_percent:+.1f}", f"{t.other_way_percent:+.1f}"]
         for t in study.trials
-        if t.kept_in_round is not None
+        if (t.kept_in_round is not None) == kept
     ]
-    note = "Gain: mean over the joints of the relative fall of NRMSD, when the effect was added."
-    return TextTable("Effects kept, in order", ["effect", "what", *_ways(study)], rows, note)
-
-
-def _dropped(study: Study) -> TextTable:
-    rows = [
-        [t.effect, t.what, f"{t.gain_percent:+.1f}", f"{t.other_way_percent:+.1f}"]
-        for t in study.trials
-        if t.kept_in_round is None
-    ]
-    note = (
-        "Gain had the effect been added to those kept; negative: it made the estimate worse. An"
-        " effect that gains in the first column only was found and not confirmed."
-    )
-    return TextTable("Effects tried and dropped", ["effect", "what", *_ways(study)], rows, note)
-
-
-def _ways(study: Study) -> list[str]:
     first, second = study.paths
-    return [f"gain on {second}, %", f"gain on {first} (to confirm), %"]
+    columns = ["effect", "what", f"gain on {second}, %", f"gain on {first} (to confirm), %"]
+    return TextTable(title, columns, rows, note)
 
 
 def _parameters(study: Study) -> TextTable:

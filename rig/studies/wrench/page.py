@@ -65,9 +65,20 @@ ADJUSTED = TextTable(
 
 
 def page(study: WrenchStudy) -> Page:
-    """Return the study's page."""
+    """Return the study's page: the comparison by family, then one table for each of the thesis'."""
+    columns = [f"{name.split(',')[0]} {label}" for name in TABLES for label in _columns(name)]
+    count = f"{study.seeds} arms a family"
+    tables = [
+        ratios(f"Ours over the thesis' method, {count}", columns, _ratios(study)),
+        ratios(f"The same, causal, {count}", columns, _ratios(study, CAUSAL)),
+        *(_table(study, name, paper) for name, paper in TABLES.items()),
+        _body(study),
+        _effects(study),
+        ADJUSTED,
+        coverage("pique", "wrench"),
+    ]
     paragraphs = [_lead(study), *NOTES]
-    return Page(TITLE, paragraphs, _tables(study), study.provenance, lambda: _figures(study))
+    return Page(TITLE, paragraphs, tables, study.provenance, lambda: _figures(study))
 
 
 def _lead(study: WrenchStudy) -> str:
@@ -79,21 +90,6 @@ def _lead(study: WrenchStudy) -> str:
     )
 
 
-def _tables(study: WrenchStudy) -> list[TextTable]:
-    """Return the comparison by family, then one table for each of the thesis'."""
-    columns = [f"{name.split(',')[0]} {label}" for name in TABLES for label in _columns(name)]
-    count = f"{study.seeds} arms a family"
-    return [
-        ratios(f"Ours over the thesis' method, {count}", columns, _ratios(study)),
-        ratios(f"The same, causal, {count}", columns, _ratios(study, CAUSAL)),
-        *(_table(study, name, paper) for name, paper in TABLES.items()),
-        _body(study),
-        _effects(study),
-        ADJUSTED,
-        coverage("pique", "wrench"),
-    ]
-
-
 def _figures(study: WrenchStudy) -> Mapping[str, Markup]:
     """Draw the median errors of each table by method, over all families."""
     drawn = {}
@@ -102,24 +98,19 @@ def _figures(study: WrenchStudy) -> Mapping[str, Markup]:
             np.median(np.vstack([study.errors(f, name, method) for f in FAMILIES]), axis=0)
             for method in (THESIS, OURS)
         )
-        pairs = {label: (thesis[k], ours[k]) for k, label in enumerate(_columns(name))}
-        drawn[f"wrench-3-{number}"] = paired_bars(
-            pairs, ("thesis' method", "ours"), "NRMSD, %", f"Table {name}, medians"
-        )
+        pairs = dict(zip(_columns(name), zip(thesis, ours, strict=True), strict=True))
+        sides, caption = ("thesis' method", "ours"), f"Table {name}, medians"
+        drawn[f"wrench-3-{number}"] = paired_bars(pairs, sides, "NRMSD, %", caption)
     return drawn
 
 
 def _ratios(study: WrenchStudy, method: str = OURS) -> Mapping[str, FloatArray]:
     """Return the errors of a method over the thesis', by family, shape (arms, 18)."""
-    return {
-        family: np.hstack(
-            [
-                study.errors(family, table, method) / study.errors(family, table, THESIS)
-                for table in TABLES
-            ]
-        )
-        for family in FAMILIES
-    }
+
+    def ratio(family: str, table: str) -> FloatArray:
+        return study.errors(family, table, method) / study.errors(family, table, THESIS)
+
+    return {f: np.hstack([ratio(f, table) for table in TABLES]) for f in FAMILIES}
 
 
 def _near(study: WrenchStudy, table: str) -> list[bool]:
