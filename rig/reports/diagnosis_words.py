@@ -90,7 +90,7 @@ def _first_line(family: str) -> str:
 def check_of(finding: Finding) -> str:
     """Return the checks at the rig for a finding, one sentence at least."""
     if finding.verdict in ("identified", "one_of"):
-        checks = [_check(family) for family in (finding.family, *finding.alternatives)]
+        checks = [advice(family) for family in (finding.family, *finding.alternatives)]
         if any(checks):
             return " Then: ".join(dict.fromkeys(c[0].upper() + c[1:] for c in checks if c))
     words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
@@ -105,12 +105,12 @@ def check_of(finding: Finding) -> str:
     )
 
 
-def _check(family: str) -> str:
-    """Return the advice in the description of an effect; empty without."""
+def advice(family: str) -> str:
+    """Return the check at the rig in the description of an effect; empty without."""
     known = catalogue().get(family)
     text = inspect.getdoc(type(known)) or "" if known else ""
-    advice = next((p for p in text.split("\n\n") if p.startswith("Check: ")), "")
-    return " ".join(advice.removeprefix("Check: ").split())
+    check = next((p for p in text.split("\n\n") if p.startswith("Check: ")), "")
+    return " ".join(check.removeprefix("Check: ").split())
 
 
 def sizes_of(finding: Finding) -> dict[str, str]:
@@ -175,8 +175,8 @@ def _others(finding: Finding) -> str:
         said = "Another effect of the catalogue does not fit as well."
     else:
         said = "A smooth function of its variables fits better than any effect of the catalogue."
-    advice = {family: _check(family) for family in (finding.family, *finding.alternatives)}
-    return " ".join([said, *(f"To check {name}: {text}" for name, text in advice.items() if text)])
+    checks = {family: advice(family) for family in (finding.family, *finding.alternatives)}
+    return " ".join([said, *(f"To check {name}: {text}" for name, text in checks.items() if text)])
 
 
 def next_sentence(diagnosis: Diagnosis) -> str:

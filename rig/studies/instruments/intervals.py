@@ -159,21 +159,15 @@ def _adapted(label: str, source: BankEstimator, runs: Sequence[RunEvidence], cou
     draw = np.random.default_rng(0)
     at_random = [draw.choice(len(runs), count, replace=False) for _ in range(len(runs))]
     choices = [np.array([k]) for k in range(len(runs))] if count == 1 else at_random
-    scored = [
-        _on_others(source, runs, choice) for choice in [np.array(spread_out(runs, count)), *choices]
-    ]
+    scored = []
+    for choice in [np.array(spread_out(runs, count)), *choices]:
+        new = adapted_states(source, [runs[k] for k in choice])
+        scored.append([_on_run(new, run) for k, run in enumerate(runs) if k not in choice])
     errors = [np.sqrt(np.mean([run.square for run in part])) for part in scored]
     usual = np.median(errors[1:])
     left_out = f"{count} run{'s' if count > 1 else ''}"
     held = _held(label, source.target, left_out, scored[:1])
     return replace(held, rmse_ratio=errors[0] / usual, worst_ratio=max(errors[1:]) / usual)
-
-
-def _on_others(
-    source: BankEstimator, runs: Sequence[RunEvidence], choice: NDArray[np.int_]
-) -> "list[_Run]":
-    new = adapted_states(source, [runs[k] for k in choice])
-    return [_on_run(new, run) for k, run in enumerate(runs) if k not in choice]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from estimation.estimator import Recipe
 from estimation.estimators.adaptation import adapted_states, evidence, reduced
 from estimation.estimators.bank import BankEstimator, BankRecipe
 from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
-from estimation.estimators.run_evidence import RunEvidence
 from estimation.networks.training import Settings, has_torch
 from rig.models.adapt import Adaptation, open_source, run_adaptation
 from rig.output.provenance import Provenance
@@ -80,11 +79,9 @@ def recipes(networks: bool) -> dict[str, Recipe]:
     """Return the recipe of each kind; networks only if requested and torch is installed."""
     found: dict[str, Recipe] = {"products of physical states": BankRecipe(TARGET, Bank(LOAD))}
     if networks and has_torch():
-        inputs = (*STATE_INPUTS, LOAD)
+        inputs, few = (*STATE_INPUTS, LOAD), Settings(nodes=12)
         found |= {
-            "network with physical states": NetworkRecipe(
-                inputs, TARGET, Settings(nodes=12), every=EVERY
-            ),
+            "network with physical states": NetworkRecipe(inputs, TARGET, few, every=EVERY),
             "paper's network": NetworkRecipe(PAPER_INPUTS, TARGET, every=EVERY),
         }
     return found
@@ -155,30 +152,18 @@ def drawn(
         return ()
     draw = np.random.default_rng(seed)
     threes = [tuple(draw.choice(len(runs), THREE, replace=False)) for _ in range(DRAWS)]
-    return tuple(
-        _drawn_row(source, instrument, runs, choices)
-        for choices in ([(k,) for k in range(len(runs))], threes)
-    )
-
-
-def _drawn_row(
-    source: BankEstimator,
-    instrument: str,
-    runs: Sequence[RunEvidence],
-    choices: Sequence[tuple[int, ...]],
-) -> DrawnRow:
-    errors, shares = [], []
-    for choice in choices:
-        new = adapted_states(source, [runs[k] for k in choice])
-        rest = [run for k, run in enumerate(runs) if k not in choice]
-        design, truth = (
-            np.concatenate([run.design for run in rest]),
-            np.concatenate([run.truth for run in rest]),
-        )
-        error = design @ new.weights - truth
-        errors.append(float(np.sqrt(np.mean(error**2))))
-        if new.interval is not None:
-            places = np.concatenate([run.places for run in rest])
-            shares.append(covered_share(error, new.interval.half_width(design, places)) or 0.0)
-    covered = float(np.mean(shares)) if shares else None
-    return DrawnRow(instrument, len(choices[0]), tuple(sorted(errors)), covered)
+    rows = []
+    for choices in ([(k,) for k in range(len(runs))], threes):
+        errors, shares = [], []
+        for choice in choices:
+            new = adapted_states(source, [runs[k] for k in choice])
+            rest = [run for k, run in enumerate(runs) if k not in choice]
+            design = np.concatenate([run.design for run in rest])
+            error = design @ new.weights - np.concatenate([run.truth for run in rest])
+            errors.append(float(np.sqrt(np.mean(error**2))))
+            if new.interval is not None:
+                places = np.concatenate([run.places for run in rest])
+                shares.append(covered_share(error, new.interval.half_width(design, places)) or 0.0)
+        covered = float(np.mean(shares)) if shares else None
+        rows.append(DrawnRow(instrument, len(choices[0]), tuple(sorted(errors)), covered))
+    return tuple(rows)

@@ -19,11 +19,8 @@ def _lead(study: LoopStudy) -> str:
         f"{row.task.name} over {row.task.samples} samples {_mn_m(row.linear)} to {_mn_m(row.rmse)}"
         for row in study.rows
     ]
-    return (
-        f"On {len(study.sealed.confirm)} held-out test runs, errors in mN m before and after: "
-        + "; ".join(parts)
-        + "."
-    )
+    runs = len(study.sealed.confirm)
+    return f"On {runs} held-out test runs, errors in mN m before and after: {'; '.join(parts)}."
 
 
 def _notes(study: LoopStudy) -> list[str]:
@@ -45,35 +42,15 @@ def _notes(study: LoopStudy) -> list[str]:
 
 
 def _errors(study: LoopStudy) -> TextTable:
-    rows = [
-        [
-            row.task.name,
-            row.task.samples,
-            _mn_m(row.linear),
-            _mn_m(row.rmse),
-            _mn_m(row.rmse_without_means),
-            _mn_m(row.task.to_reach),
-            _mn_m(row.task.beyond),
-            str(row.parameters),
-            f"{row.runs_improved} of {len(row.rmse_by_run)}",
-        ]
-        for row in study.rows
-    ]
-    return TextTable(
-        "Errors on the held-out test runs, mN m",
-        (
-            "estimate",
-            "samples",
-            "linear",
-            "with effects",
-            "run means removed",
-            "to reach",
-            "beyond",
-            "parameters",
-            "runs improved",
-        ),
-        rows,
-    )
+    rows = []
+    for row in study.rows:
+        task = row.task
+        found = (row.linear, row.rmse, row.rmse_without_means, task.to_reach, task.beyond)
+        improved = f"{row.runs_improved} of {len(row.rmse_by_run)}"
+        rows.append([task.name, task.samples, *map(_mn_m, found), str(row.parameters), improved])
+    columns = ["estimate", "samples", "linear", "with effects", "run means removed", "to reach"]
+    columns += ["beyond", "parameters", "runs improved"]
+    return TextTable("Errors on the held-out test runs, mN m", columns, rows)
 
 
 def _effects(row: Row) -> TextTable:

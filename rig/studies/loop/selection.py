@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.effects import Effect, Parameter
+from estimation.effects import Effect
 from estimation.fit_problem import FitError, FitRun, prepared
 from estimation.fitting import fit
 from estimation.model import Estimate, Model, Term
@@ -111,20 +111,16 @@ def _scored(
             if not all(np.isfinite(c).all() and c.any() for c in columns):
                 continue
             grams = _grams([np.hstack(pair) for pair in zip(base, columns, strict=True)], aims)
-            if not _within_bounds(grams, term.effect.amplitudes):
-                continue
+            bounds = term.effect.amplitudes
+            fitted = _solved(grams.sum(axis=0))[-len(bounds) :]
+            if not all(p.lower <= x <= p.upper for p, x in zip(bounds, fitted, strict=True)):
+                continue  # its amplitudes, fitted with all others, are not physically meaningful
             values = {p.name: Estimate(x) for p, x in zip(term.effect.shape, shape, strict=True)}
             yield _left_out(grams), replace(term, values=amplitudes | values)
 
 
 def _table(terms: Sequence[Term], run: FitRun) -> FloatArray:
     return np.hstack([t.sign * run.columns(t, t.numbers(t.effect.shape)) for t in terms])
-
-
-def _within_bounds(grams: FloatArray, bounds: Sequence[Parameter]) -> bool:
-    """Whether the last columns' amplitudes, fitted with all others, are physically meaningful."""
-    own = _solved(grams.sum(axis=0))[-len(bounds) :]
-    return all(p.lower <= x <= p.upper for p, x in zip(bounds, own, strict=True))
 
 
 def _left_out(grams: FloatArray) -> float:

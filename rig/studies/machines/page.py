@@ -15,54 +15,39 @@ NOTE = (
 
 
 def page(study: MachineStudy) -> Page:
-    """Return the study's page."""
-    found = [row for row in study.rows if row.found_percent < row.declared_percent]
+    """Return the study's page: the published estimates made again, errors, and findings."""
+    better = sum(row.found_percent < row.declared_percent for row in study.rows)
     lead = (
         f"{len(study.rows)} equations of {len({row.case for row in study.rows})} machines;"
-        f" effects were found in {len(found)}."
+        f" effects were found in {better}."
     )
     cards = sorted({case.card for case in CASES})
     linked = "Cards: " + ", ".join(f"[{card}](../machines/{card}.md)" for card in cards) + "."
     skipped = ["Not studied: " + " ".join(study.skipped)] if study.skipped else []
-    return Page(TITLE, [lead, *skipped, linked], _tables(study), study.provenance)
-
-
-def _tables(study: MachineStudy) -> list[TextTable]:
-    """Return the published estimates made again, errors, and findings."""
-    errors = [
-        [
-            f"{row.case}, {row.equation}",
-            row.published,
-            f"{row.declared_percent:.2f}",
-            f"{row.found_percent:.2f}",
-            f"{row.runs[0]} + {row.runs[1]}",
-        ]
-        for row in study.rows
-    ]
+    errors, found = [], []
+    for row in study.rows:
+        name = f"{row.case}, {row.equation}"
+        percents = (f"{value:.2f}" for value in (row.declared_percent, row.found_percent))
+        errors.append([name, row.published, *percents, f"{row.runs[0]} + {row.runs[1]}"])
+        found.append([name, " ".join(row.findings), " ".join(row.checks) or "none"])
     heads = ("machine, equation", "published", "declared %", "with effects %", "runs + held out")
-    found = [
-        [f"{row.case}, {row.equation}", " ".join(row.findings), " ".join(row.checks) or "none"]
-        for row in study.rows
+    tables = [
+        *([_reproduced(study)] if study.reproduced else []),
+        TextTable("Errors on held-out runs", heads, errors, NOTE),
+        TextTable("Findings", ("machine, equation", "finding", "to check"), found),
     ]
-    made = [TextTable("Errors on held-out runs", heads, errors, NOTE)]
-    if study.reproduced:
-        again = [
-            [
-                name,
-                ", ".join(f"{key} {value:.4f}" for key, value in one.parameters.items()),
-                f"{one.percent:.3f}",
-            ]
-            for name, one in study.reproduced
-        ]
-        made.insert(
-            0,
-            TextTable(
-                "EMPS: the authors' estimates made again",
-                ("model", "parameters", "relative error %"),
-                again,
-                "Published: 95.1089 kg, 203.5034 N s/m, 20.3935 N, -3.1648 N, 4.083 %; by direction"
-                " 166.7 and 240.4 N s/m, 3.112 %.",
-            ),
-        )
-    made.append(TextTable("Findings", ("machine, equation", "finding", "to check"), found))
-    return made
+    return Page(TITLE, [lead, *skipped, linked], tables, study.provenance)
+
+
+def _reproduced(study: MachineStudy) -> TextTable:
+    rows = []
+    for name, one in study.reproduced:
+        values = ", ".join(f"{key} {value:.4f}" for key, value in one.parameters.items())
+        rows.append([name, values, f"{one.percent:.3f}"])
+    return TextTable(
+        "EMPS: the authors' estimates made again",
+        ("model", "parameters", "relative error %"),
+        rows,
+        "Published: 95.1089 kg, 203.5034 N s/m, 20.3935 N, -3.1648 N, 4.083 %; by direction 166.7"
+        " and 240.4 N s/m, 3.112 %.",
+    )

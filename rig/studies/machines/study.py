@@ -1,6 +1,5 @@
 """Diagnosing published recordings of other people's machines with their machine files."""
 
-import inspect
 import math
 import tempfile
 import time
@@ -12,8 +11,6 @@ import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.causes.verdict import Answer
-from estimation.diagnosis.result import Finding
-from estimation.effects import catalogue
 from estimation.errors import EstimationError
 from estimation.model import Model
 from rig.diagnosis.ledger import Ledger
@@ -23,7 +20,7 @@ from rig.importers.table.open import open_table, read_runs
 from rig.machines.recordings import with_motion
 from rig.machines.shipped import equations_of, place_of
 from rig.output.provenance import Provenance
-from rig.reports.diagnosis_words import sentences
+from rig.reports.diagnosis_words import advice, sentences
 from rig.studies.machines.cases import CASES, Case, unpacked
 from rig.studies.machines.published import Published, by_direction, standard
 
@@ -104,10 +101,8 @@ def run_study(
                 rows += _rows(case, _opened(case, folder), seed)
             except EstimationError as error:
                 skipped.append(f"{case.name}: not decided. {error}")
-    seconds = time.monotonic() - began
-    return MachineStudy(
-        tuple(rows), tuple(reproduced), tuple(skipped), seconds, Provenance.now(seed)
-    )
+    seconds, made = time.monotonic() - began, Provenance.now(seed)
+    return MachineStudy(tuple(rows), tuple(reproduced), tuple(skipped), seconds, made)
 
 
 def _opened(case: Case, folder: Path) -> Campaign:
@@ -119,17 +114,15 @@ def _opened(case: Case, folder: Path) -> Campaign:
 
 def _published(folder: Path) -> list[tuple[str, Published]]:
     mapping = read_mapping(place_of(Path("emps")), [(("runs",), {}, "whole files")])
-    found = []
-    for recording in read_runs(folder, mapping, []):
-        found.append((f"{recording.name}, standard model", standard(recording)))
-        found.append((f"{recording.name}, friction by direction", by_direction(recording)))
-    return found
+    models = {"standard model": standard, "friction by direction": by_direction}
+    runs = read_runs(folder, mapping, [])
+    return [(f"{run.name}, {name}", fit(run)) for run in runs for name, fit in models.items()]
 
 
 def _rows(case: Case, campaign: Campaign, seed: int) -> list[Row]:
     """Return a row for each equation of a machine."""
-    models = equations_of(Path(case.machine))
-    models = [model for model in models if case.equation in ("", model.balance)]
+    whole = equations_of(Path(case.machine))
+    models = [model for model in whole if case.equation in ("", model.balance)]
     campaign = with_motion(campaign, models)
     with tempfile.TemporaryDirectory(prefix="study-") as place:
         answer, _ = run_diagnosis(
@@ -160,15 +153,5 @@ def _row(case: Case, model: Model, answer: Answer) -> Row:
         declared_percent=100.0 * before / size,
         found_percent=100.0 * after / size,
         findings=tuple(words) or (f"{name}: no unmodelled effect found.",),
-        checks=tuple(check for f in own if (check := check_of(f))),
+        checks=tuple(f"{f.family}: {text}" for f in own if (text := advice(f.family))),
     )
-
-
-def check_of(finding: Finding) -> str:
-    """Return the check by hand for a finding; empty where nothing is named."""
-    effect = next((e for e in catalogue().values() if e.family == finding.family), None)
-    if effect is None:
-        return ""
-    text = inspect.cleandoc(type(effect).__doc__ or "")
-    part = next((p for p in text.split("\n\n") if p.startswith("Check:")), "")
-    return f"{finding.family}: {' '.join(part.removeprefix('Check:').split())}" if part else ""
