@@ -7,7 +7,7 @@ adds to that slope, to all places alike, so the answer does not need it declared
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -20,7 +20,7 @@ from rig.grasper.current_force import FILTER, CurrentForce
 from rig.grasper.inputs import hold
 from rig.grasper.plant import PROTOTYPES, RATE_HZ
 from rig.studies.seeds import Keeper, kept_outcomes
-from rig.studies.zhao.methods import Axes, axes_of, declared, fitted, record
+from rig.studies.zhao.methods import Axes, axes_of, declared, fitted, on_object, record
 
 MATERIALS_N_M_RAD = {"wood": 2.0, "foam": 0.3, "sponge": 0.06}
 """Stiffness at the joint. Assumed; the paper gives none."""
@@ -103,10 +103,19 @@ def haptics_of(
 def run_haptics(prototype: str, spread: float, model: Model, seed: int) -> tuple[Answer, ...]:
     """Return the answers of the paper's method, of ours, and of ours with friction not declared."""
     axes = axes_of(PROTOTYPES[prototype], DOF, seed, spread)
+    method, arm_m = CurrentForce(axes[0].arm_m), axes[0].arm_m
+
+    def of_model(model: Model) -> Estimate:
+        made = fitted(DOF, axes, seed, model)
+        return lambda run: (predict(made, run, causal=True) / arm_m, _low(run, made.low_pass))
+
+    def of_current(run: Recording) -> tuple[FloatArray, FloatArray]:
+        return method.force_n(run[f"{DOF}_current_a"], RATE_HZ), _low(run, FILTER)
+
     methods = {
-        "paper's method": _of_current(axes),
-        "ours": _of_model(fitted(DOF, axes, seed, model), axes),
-        "ours, friction not declared": _of_model(fitted(DOF, axes, seed, declared(DOF)), axes),
+        "paper's method": of_current,
+        "ours": of_model(model),
+        "ours, friction not declared": of_model(declared(DOF)),
     }
     return tuple(_answer(name, way, axes, seed) for name, way in methods.items())
 
@@ -144,8 +153,7 @@ def _grasped(
 ) -> Stiffness:
     slopes = []
     for _ in range(GRASPS):
-        contact = float(random.uniform(0.08, 0.12))
-        held = tuple(replace(a, contact_n_m_rad=stiffness, contact_rad=contact) for a in axes)
+        held = on_object(axes, stiffness, float(random.uniform(0.08, 0.12)))
         asked = hold(held[0], PEAK_N, 0.5, RISE_S)
         run = record(name, DOF, held, asked, int(random.integers(1_000_000)))
         force, angle = estimate(run)
@@ -169,22 +177,6 @@ def _confidence(high: Sequence[float], low: Sequence[float]) -> float:
     """Return one less the one-sided p-value of Welch's test that the first mean is greater."""
     found = stats.ttest_ind(high, low, equal_var=False, alternative="greater")
     return float(1.0 - found.pvalue)
-
-
-def _of_current(axes: Axes) -> Estimate:
-    method = CurrentForce(axes[0].arm_m)
-
-    def estimate(run: Recording) -> tuple[FloatArray, FloatArray]:
-        return method.force_n(run[f"{DOF}_current_a"], RATE_HZ), _low(run, FILTER)
-
-    return estimate
-
-
-def _of_model(model: Model, axes: Axes) -> Estimate:
-    def estimate(run: Recording) -> tuple[FloatArray, FloatArray]:
-        return predict(model, run, causal=True) / axes[0].arm_m, _low(run, model.low_pass)
-
-    return estimate
 
 
 def _low(run: Recording, low_pass: LowPass) -> FloatArray:

@@ -6,6 +6,7 @@ differ in stiffness and place from run to run: with one object the angle alone w
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy import ndimage
@@ -108,25 +109,21 @@ def calibration_runs(dof: str, axes: Axes, seed: int) -> list[Recording]:
     """Return two runs of each kind, on objects that differ in stiffness and place, at 250 Hz."""
     random = np.random.default_rng(seed + 77)
     runs: list[Recording] = []
-    for repeat in range(2):
-        for force_n in LEVELS_N:
-            for number, kind in enumerate(INPUTS):
-                stiffness = float(np.exp(random.uniform(np.log(0.15), np.log(0.6))))
-                contact = float(random.uniform(0.05, 0.25))
-                held = tuple(
-                    replace(axis, contact_n_m_rad=stiffness, contact_rad=contact) for axis in axes
-                )
-                run = record(
-                    f"{kind}-{force_n:g}N-{repeat}",
-                    dof,
-                    held,
-                    _target(kind, held[0], force_n),
-                    seed * 1000 + len(runs),
-                    input_ratio=float(number),
-                    force_n=force_n,
-                )
-                runs.append(_averaged(run))
+    for repeat, force_n, (number, kind) in product(range(2), LEVELS_N, enumerate(INPUTS)):
+        stiffness = float(np.exp(random.uniform(np.log(0.15), np.log(0.6))))
+        held = on_object(axes, stiffness, float(random.uniform(0.05, 0.25)))
+        target, run_seed = target_of(kind, held[0], force_n), seed * 1000 + len(runs)
+        conditions = {"input_ratio": float(number), "force_n": force_n}
+        run = record(f"{kind}-{force_n:g}N-{repeat}", dof, held, target, run_seed, **conditions)
+        runs.append(_averaged(run))
     return runs
+
+
+def on_object(axes: Axes, stiffness_n_m_rad: float, contact_rad: float) -> Axes:
+    """Return axes that grasp an object of a stiffness from an angle on."""
+    return tuple(
+        replace(a, contact_n_m_rad=stiffness_n_m_rad, contact_rad=contact_rad) for a in axes
+    )
 
 
 def lacking(dof: str, axes: Axes, seed: int) -> Lacking:
@@ -168,26 +165,20 @@ def of_current(dof: str, method: CurrentForce) -> ToForce:
 
 def report_runs(dof: str, axes: Axes, seed: int) -> dict[str, list[Recording]]:
     """Return the runs that are reported, by kind of input, at 2 kHz."""
-    return {
-        kind: [
-            record(
-                f"{kind}-{force_n:g}N",
-                dof,
-                axes,
-                _target(kind, axes[0], force_n),
-                seed + 10 * k + j,
-            )
-            for j, force_n in enumerate(LEVELS_N)
-        ]
-        for k, kind in enumerate(INPUTS)
-    }
+    found: dict[str, list[Recording]] = {kind: [] for kind in INPUTS}
+    for k, kind in enumerate(INPUTS):
+        for j, force_n in enumerate(LEVELS_N):
+            target = target_of(kind, axes[0], force_n)
+            run = record(f"{kind}-{force_n:g}N", dof, axes, target, seed + 10 * k + j)
+            found[kind].append(run)
+    return found
 
 
 def slope(dof: str, axes: Axes, method: CurrentForce, seed: int) -> float:
     """Return the slope of estimate over force at the ends of long steady grasps (Figure 11 b)."""
     points = []
     for k, force_n in enumerate(LEVELS_N):
-        run = record("long", dof, axes, _target("long", axes[0], force_n), seed + k)
+        run = record("long", dof, axes, target_of("long", axes[0], force_n), seed + k)
         kept = _between(run, *end_of_hold(LONG_S))
         estimate = of_current(dof, method)(run)
         force = run[f"{dof}_torque_n_m"] / axes[0].arm_m
@@ -217,7 +208,8 @@ def outcome(
     return Outcome((errors[0], errors[1], errors[2]), float(np.mean(delays)))
 
 
-def _target(kind: str, axis: AxisParameters, force_n: float) -> FloatArray:
+def target_of(kind: str, axis: AxisParameters, force_n: float) -> FloatArray:
+    """Return the path of the master of one of `INPUTS` up to a force, rad, shape (n,)."""
     if kind == "periodic":
         return periodic(axis, force_n)
     return hold(axis, force_n, LONG_S if kind == "long" else SHORT_S)

@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from markupsafe import Markup
+from numpy.typing import NDArray
 
 from estimation.recording import FloatArray
 from rig.grasper.current_force import CurrentForce
 from rig.grasper.hidden import FAMILIES, NOT_IN_CATALOGUE, OWN
-from rig.grasper.inputs import hold, periodic
 from rig.grasper.plant import PROTOTYPES, RATE_HZ
 from rig.output.figures import bars, over_time
 from rig.output.page import Page
@@ -17,7 +17,15 @@ from rig.output.table import TextTable
 from rig.studies.coverage import coverage
 from rig.studies.families import ratios, verdict
 from rig.studies.zhao.haptics import LEVEL, Answer
-from rig.studies.zhao.methods import FILTER, Outcome, axes_of, fitted, of_model, record
+from rig.studies.zhao.methods import (
+    FILTER,
+    Outcome,
+    axes_of,
+    fitted,
+    of_model,
+    record,
+    target_of,
+)
 from rig.studies.zhao.paper import DOFS, INPUTS, PAPER_COEFFICIENTS, PAPER_DELAYS_MS, PAPER_ERRORS_N
 from rig.studies.zhao.study import LOOKED_AT, Cell, Study
 
@@ -51,16 +59,33 @@ def page(study: Study, haptics: Sequence[Sequence[Answer]] = ()) -> Page:
         study: The study.
         haptics: The haptic experiments, one list of answers a grasper.
     """
-    paragraphs = [_lead(study), *_notes(study)]
-    made = Provenance.now(0)
-    return Page(TITLE, paragraphs, _tables(study, haptics), made, lambda: _figures(study, haptics))
+    tests = [f"{dof}, {kind}" for dof in DOFS for kind in INPUTS]
+    graspers = len(study.cells[DOFS[0]]) // len(FAMILIES)
+    title = (
+        f"Ours over the paper's method, {graspers} graspers a family; errors under {LEAST_N} N"
+        f" count as {LEAST_N} N"
+    )
+    tables = [
+        ratios(title, tests, _ratios(study), NOT_IN_CATALOGUE),
+        _found(study),
+        _slopes(study),
+        _errors(study),
+        _delays(study),
+        ADJUSTED,
+        coverage("zhao"),
+    ]
+    if haptics:
+        tables += [_answers(haptics), _materials(haptics[0]), _places(haptics[0])]
+    paragraphs, made = [_lead(study), *_notes(study)], Provenance.now(0)
+    return Page(TITLE, paragraphs, tables, made, lambda: _figures(study, haptics))
 
 
 def _lead(study: Study) -> str:
     """Return the study's result in a sentence or two."""
     near = (
         f" On the graspers that were matched to it ({study.prototype}) the paper's method lands"
-        f" within {NEAR:.0%} of the paper's errors in {_near(study)} of 9 cells (mean)."
+        f" within {NEAR:.0%} of the paper's errors in"
+        f" {sum(int(_near(study, dof).sum()) for dof in DOFS)} of 9 cells (mean)."
         if study.prototype == THIRD
         else f" The paper states no errors of this prototype ({study.prototype})."
     )
@@ -87,27 +112,6 @@ def _notes(study: Study) -> list[str]:
     ]
 
 
-def _tables(study: Study, haptics: Sequence[Sequence[Answer]]) -> list[TextTable]:
-    tests = [f"{dof}, {kind}" for dof in DOFS for kind in INPUTS]
-    graspers = len(study.cells[DOFS[0]]) // len(FAMILIES)
-    title = (
-        f"Ours over the paper's method, {graspers} graspers a family; errors under {LEAST_N} N"
-        f" count as {LEAST_N} N"
-    )
-    made = [
-        ratios(title, tests, _ratios(study), NOT_IN_CATALOGUE),
-        _found(study),
-        _slopes(study),
-        _errors(study),
-        _delays(study),
-        ADJUSTED,
-        coverage("zhao"),
-    ]
-    if haptics:
-        made += [_answers(haptics), _materials(haptics[0]), _places(haptics[0])]
-    return made
-
-
 def _figures(study: Study, haptics: Sequence[Sequence[Answer]]) -> Mapping[str, Markup]:
     """Draw the paper's kinds of figures for one grasper: Figures 12 to 14 and 16."""
     seed = 0
@@ -119,8 +123,8 @@ def _figures(study: Study, haptics: Sequence[Sequence[Answer]]) -> Mapping[str, 
     method = CurrentForce(arm_m, coefficient=1 / mean)
     stem = "zhao" if short == "third" else f"zhao-{short}"
     drawn = {}
-    inputs = {"long": hold(axes[0], 1.5, 26.0), "short": hold(axes[0], 1.5, 2.0)}
-    for name, target in {**inputs, "periodic": periodic(axes[0], 1.5)}.items():
+    for name in INPUTS:
+        target = target_of(name, axes[0], 1.5)
         run = record(name, "grasp", axes, target, seed + 1)
         series = {
             "force": run["grasp_torque_n_m"] / arm_m,
@@ -159,28 +163,19 @@ def _ratios(study: Study) -> Mapping[str, FloatArray]:
 
 
 def _found(study: Study) -> TextTable:
-    rows = [
-        [
-            family,
-            *(
-                ", ".join(f"{name} ({word})" for name, word in study.lacking[family, dof].findings)
-                or "nothing"
-                for dof in DOFS
-            ),
-        ]
-        for family in FAMILIES
-    ]
+    rows = []
+    for family in FAMILIES:
+        found = (study.lacking[family, dof].findings for dof in DOFS)
+        told = (", ".join(f"{name} ({word})" for name, word in each) for each in found)
+        rows.append([family, *(names or "nothing" for names in told)])
     return TextTable("Found by the diagnosis, and added", ["hidden friction", *DOFS], rows)
 
 
-def _near(study: Study) -> int:
-    return sum(
-        abs(found - paper) <= NEAR * abs(paper)
-        for dof in DOFS
-        for found, paper in zip(
-            _values(study, dof, lambda c: c.paper).mean(axis=0), PAPER_ERRORS_N[dof], strict=True
-        )
-    )
+def _near(study: Study, dof: str) -> NDArray[np.bool_]:
+    """Return whether the mean of the paper's method is near the paper, by kind of input."""
+    stated = np.array(PAPER_ERRORS_N[dof])
+    found = _values(study, dof, lambda cell: cell.paper).mean(axis=0)
+    return np.asarray(np.abs(found - stated) <= NEAR * np.abs(stated))
 
 
 def _range(values: FloatArray, form: str = "{:+.2f}") -> str:
@@ -191,43 +186,29 @@ def _range(values: FloatArray, form: str = "{:+.2f}") -> str:
 def _slopes(study: Study) -> TextTable:
     rows = []
     for dof in DOFS:
-        slopes = np.array([cell.slope for cell in _own(study, dof)])
         paper = PAPER_COEFFICIENTS[dof]
         shown = "missing in our copy" if paper is None else f"{paper:.2f}"
-        shown = shown if study.prototype == THIRD else "not stated"
-        rows.append([dof, shown, _range(slopes, "{:.2f}")])
+        slopes = _range(np.array([cell.slope for cell in _own(study, dof)]), "{:.2f}")
+        rows.append([dof, shown if study.prototype == THIRD else "not stated", slopes])
     columns = ["degree of freedom", "paper", "mean (least to greatest)"]
     return TextTable("Table 2: slope of estimate over force in long steady grasps", columns, rows)
 
 
 def _errors(study: Study) -> TextTable:
+    is_stated = study.prototype == THIRD
     rows = []
     for dof in DOFS:
-        paper = _values(study, dof, lambda c: c.paper)
-        ours = _values(study, dof, lambda c: c.ours)
-        bare = _values(study, dof, lambda c: c.undeclared)
-        for k, kind in enumerate(INPUTS):
-            stated = PAPER_ERRORS_N[dof][k]
-            is_near = abs(paper[:, k].mean() - stated) <= NEAR * abs(stated)
-            is_stated = study.prototype == THIRD
-            rows.append(
-                [
-                    f"{dof}, {kind}",
-                    f"{stated:+.2f}" if is_stated else "not stated",
-                    _range(paper[:, k]),
-                    ("yes" if is_near else "no") if is_stated else "",
-                    _range(ours[:, k]),
-                    _range(bare[:, k]),
-                ]
-            )
-    columns = [
-        "test",
-        "paper, N",
-        "its method here, N",
-        f"within {NEAR:.0%}",
-        "ours, N",
-        "declared model alone, N",
-    ]
+        paper, ours, bare = (
+            _values(study, dof, of)
+            for of in (lambda c: c.paper, lambda c: c.ours, lambda c: c.undeclared)
+        )
+        for k, (kind, near) in enumerate(zip(INPUTS, _near(study, dof), strict=True)):
+            stated = f"{PAPER_ERRORS_N[dof][k]:+.2f}" if is_stated else "not stated"
+            lands = ("yes" if near else "no") if is_stated else ""
+            errors = _range(ours[:, k]), _range(bare[:, k])
+            rows.append([f"{dof}, {kind}", stated, _range(paper[:, k]), lands, *errors])
+    columns = ["test", "paper, N", "its method here, N", f"within {NEAR:.0%}", "ours, N"]
+    columns.append("declared model alone, N")
     return TextTable("Table 3: estimation error", columns, rows, "Mean (least to greatest).")
 
 
