@@ -1,13 +1,13 @@
 """The page of how often intervals hold."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from rig.output.page import Page
 from rig.output.table import TextTable
 from rig.studies.instruments.intervals import CHOSEN_ON, COUNTS, Held, IntervalStudy
-from rig.studies.oneill.paper import SHOWN
+from rig.studies.oneill.paper import SHOWN, shown
 
 TITLE = "How often the intervals hold"
 AIM = (0.93, 0.97)
@@ -20,8 +20,34 @@ LEFT_OUT = {
 
 
 def page(study: IntervalStudy) -> Page:
-    """Return the study's page."""
-    return Page(TITLE, [" ".join(_lead(study))], _tables(study), study.provenance)
+    """Return the study's page: the table of levels left out and that of other instruments."""
+    usual = _usual(study)
+    columns = ["instrument", "estimate", "left out", "runs", "RMSE", "covered", "standard error"]
+    columns += ["median run", "worst run", "worst fit", "half width", "of that on unseen runs"]
+    columns += ["none stated"]
+    levels = [
+        _cells(row, f"{row.half_width / usual[row.instrument, row.target]:.2f}")
+        for row in study.levels
+    ]
+    note = (
+        "Closing samples; each run counts alike. One fold of runs, or one level, is left out of a"
+        " fit. Worst fit: the smallest mean share of what one fit left out. At rest and on opening"
+        " no width is stated."
+    )
+    moved = [
+        _cells(row, f"{row.rmse_ratio:.2f}", f"{row.worst_ratio:.2f}") for row in study.adapted
+    ]
+    more = [*columns[:2], "adapted with", *columns[3:11], "error over median", "worst over median"]
+    more += ["none stated"]
+    about = (
+        "The rule reads angle, load and speed of the runs, not the target. Error over median: of"
+        " every single run, or of as many threes drawn at random; worst: the worst of these."
+    )
+    tables = [
+        TextTable("Runs, frequencies, loads and jaw stops left out", columns, levels, note),
+        TextTable("Adapted to another instrument", more, moved, about),
+    ]
+    return Page(TITLE, [" ".join(_lead(study))], tables, study.provenance)
 
 
 def _lead(study: IntervalStudy) -> list[str]:
@@ -82,45 +108,14 @@ def _usual(study: IntervalStudy) -> dict[tuple[str, str], float]:
     return {(row.instrument, row.target): row.half_width for row in runs}
 
 
-def _tables(study: IntervalStudy) -> list[TextTable]:
-    """Return the table of levels left out and that of other instruments."""
-    usual = _usual(study)
-    columns = ["instrument", "estimate", "left out", "runs", "RMSE", "covered", "standard error"]
-    columns += ["median run", "worst run", "worst fit", "half width", "of that on unseen runs"]
-    columns += ["none stated"]
-    levels = [
-        [*_cells(row), f"{row.half_width / usual[row.instrument, row.target]:.2f}", _none(row)]
-        for row in study.levels
-    ]
-    note = (
-        "Closing samples; each run counts alike. One fold of runs, or one level, is left out of a"
-        " fit. Worst fit: the smallest mean share of what one fit left out. At rest and on opening"
-        " no width is stated."
-    )
-    moved = [
-        [*_cells(row), f"{row.rmse_ratio:.2f}", f"{row.worst_ratio:.2f}", _none(row)]
-        for row in study.adapted
-    ]
-    more = [*columns[:2], "adapted with", *columns[3:11], "error over median", "worst over median"]
-    more += ["none stated"]
-    about = (
-        "The rule reads angle, load and speed of the runs, not the target. Error over median: of"
-        " every single run, or of as many threes drawn at random; worst: the worst of these."
-    )
-    return [
-        TextTable("Runs, frequencies, loads and jaw stops left out", columns, levels, note),
-        TextTable("Adapted to another instrument", more, moved, about),
-    ]
-
-
-def _cells(row: Held) -> Iterator[str]:
-    name, unit, scale = SHOWN[row.target]
-    yield from (row.instrument, f"{name}, {unit}", row.left_out, str(row.runs))
-    yield f"{scale * row.rmse:.2f}"
+def _cells(row: Held, *compared: str) -> list[str]:
+    name, unit, _ = SHOWN[row.target]
     shares = (row.covered, row.spread, row.median, row.worst_run, row.worst_level)
-    yield from (f"{s:.1%}" if np.isfinite(s) else "-" for s in shares)
-    yield f"{scale * row.half_width:.2f}" if np.isfinite(row.half_width) else "-"
-
-
-def _none(row: Held) -> str:
-    return f"{row.no_width:.0%}"
+    return [
+        *(row.instrument, f"{name}, {unit}", row.left_out, str(row.runs)),
+        shown(row.target, row.rmse, 2),
+        *(f"{s:.1%}" if np.isfinite(s) else "-" for s in shares),
+        shown(row.target, row.half_width, 2) if np.isfinite(row.half_width) else "-",
+        *compared,
+        f"{row.no_width:.0%}",
+    ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from estimation.bank.interval import COVERAGE
 from rig.output.table import TextTable
 from rig.studies.oneill.networks import NetworkStudy
-from rig.studies.oneill.paper import CONDITIONS, DISTAL, JAW, PROXIMAL, SHOWN
+from rig.studies.oneill.paper import CONDITIONS, DISTAL, JAW, PROXIMAL, SHOWN, shown
 from rig.studies.oneill.state_rows import StateJob, StateRow
 from rig.studies.oneill.states import StateStudy
 
@@ -49,11 +49,6 @@ class Reached:
         return f"{job.pose}: {name}, {unit}, from {job.surrogate}"
 
     @property
-    def surrogate(self) -> str:
-        """What stands for the load."""
-        return self.live.job.surrogate
-
-    @property
     def missed(self) -> list[str]:
         """What is not reached, in words."""
         goal, _ = GOALS[self.live.job.pose, self.live.job.target]
@@ -65,9 +60,9 @@ class Reached:
         ]
         if self.live.score.rmse > LAG * self.without_lag.score.rmse:
             told.append("cost of live filters")
-        for protocol, what in (("lofo", "unseen frequency"), ("lopo", "unseen power")):
-            row = self.unseen.get(protocol)
-            if row is not None and row.score.rmse > UNSEEN * self.live.score.rmse:
+        for protocol, row in self.unseen.items():
+            if row.score.rmse > UNSEEN * self.live.score.rmse:
+                what = {"lofo": "unseen frequency", "lopo": "unseen power"}[protocol]
                 told.append(f"{what}, {row.score.rmse / self.live.score.rmse - 1:+.1%}")
         return told
 
@@ -87,7 +82,8 @@ def reached(study: StateStudy, deep: NetworkStudy | None) -> list[Reached]:
                 for protocol in CONDITIONS
                 if (job := StateJob(pose, surrogate, target, "live", protocol)) in rows
             }
-            found.append(Reached(live, whole, unseen, _network(deep, live.job)))
+            row = (pose, "end-to-end", surrogate, "run-wise", target)
+            found.append(Reached(live, whole, unseen, deep.rmse(*row) if deep else None))
     return found
 
 
@@ -97,8 +93,8 @@ def lead(found: list[Reached]) -> Iterator[str]:
     if not neutral:
         return
     errors = []
-    for surrogate in dict.fromkeys(one.surrogate for one in neutral):
-        own = [_error(one) for one in neutral if one.surrogate == surrogate]
+    for surrogate in dict.fromkeys(one.live.job.surrogate for one in neutral):
+        own = [_error(one) for one in neutral if one.live.job.surrogate == surrogate]
         errors.append(f"from {surrogate} {', '.join(own)}")
     yield (
         "The best estimator is a sum of products of physical states. On whole runs that it was not"
@@ -121,8 +117,9 @@ def _error(one: Reached) -> str:
 def _intervals(found: list[Reached]) -> str:
     """Return the coverage of the intervals in words, live."""
     told = [f"{_share([one.live.covered for one in found])} on runs not seen, aimed at 93 to 97 %"]
-    wrong = [one for one in found if not _by_chance(one.live)]
-    told[0] += f" (further from 95 % than by chance: {len(wrong)} of {len(found)} estimates)"
+    ranges = [one.live.covered_between for one in found]
+    wrong = sum(not low <= COVERAGE <= high for low, high in ranges)
+    told[0] += f" (further from 95 % than by chance: {wrong} of {len(found)} estimates)"
     levels = [row.levels for one in found for row in one.unseen.values() if len(row.levels) > 2]
     if levels:
         between = [level.covered for own in levels for level in own[1:-1]]
@@ -130,11 +127,6 @@ def _intervals(found: list[Reached]) -> str:
         told.append(f"{_share(between)} on a frequency or power left out between others")
         told.append(f"{_share(beyond)} on the lowest or highest left out, outside the fitted range")
     return f"Intervals of 95 %, live, cover {'; '.join(told)}."
-
-
-def _by_chance(row: StateRow) -> bool:
-    low, high = row.covered_between
-    return low <= COVERAGE <= high
 
 
 def _share(shares: list[float]) -> str:
@@ -145,20 +137,11 @@ def table(found: list[Reached]) -> TextTable:
     """Return the results and the goals."""
     cells = []
     for one in found:
-        goal, beyond = GOALS[one.live.job.pose, one.live.job.target]
-        cells.append([
-            one.name,
-            _cell(one, one.network, 2),
-            f"{goal:g}",
-            f"{beyond:g}",
-            _cell(one, one.live.score.rmse),
-            _cell(one, one.without_lag.score.rmse),
-            *(
-                _cell(one, row.score.rmse) if (row := one.unseen.get(p)) is not None else ""
-                for p in CONDITIONS
-            ),
-            ", ".join(one.missed) or "nothing",
-        ])  # fmt: skip
+        aims = (f"{aim:g}" for aim in GOALS[one.live.job.pose, one.live.job.target])
+        rows = [one.live, one.without_lag, *map(one.unseen.get, CONDITIONS)]
+        errors = ("" if row is None else _cell(one, row.score.rmse) for row in rows)
+        missed = ", ".join(one.missed) or "nothing"
+        cells.append([one.name, _cell(one, one.network, 2), *aims, *errors, missed])
     columns = ["RMSE on runs not seen", "paper's network", "goal", "beyond", "live", "without lag"]
     columns += ["live, unseen frequency", "live, unseen power", "missed"]
     note = (
@@ -169,17 +152,5 @@ def table(found: list[Reached]) -> TextTable:
     return TextTable("Aimed at, and reached", columns, cells, note)
 
 
-def _network(deep: NetworkStudy | None, job: StateJob) -> float | None:
-    for row in deep.rows if deep is not None else ():
-        own = (row.pose, row.surrogate, row.target, row.way, row.protocol)
-        if own == (job.pose, job.surrogate, job.target, "end-to-end", "run-wise"):
-            return row.score.rmse
-    return None
-
-
 def _cell(one: Reached, error: float | None, digits: int | None = None) -> str:
-    if error is None:
-        return ""
-    target = one.live.job.target
-    places = digits or (3 if target == JAW else 2)
-    return f"{SHOWN[target][2] * error:.{places}f}"
+    return "" if error is None else shown(one.live.job.target, error, digits)

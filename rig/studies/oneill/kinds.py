@@ -94,14 +94,11 @@ def run_kinds(
                 pairs = found.setdefault((kind, filters), [])
                 pairs += closing_pairs(estimator, fold.test, filters == "live")
             on_fit(count * len(wanted) + place + 1, len(folds) * len(wanted))
-    return tuple(
-        KindRow(
-            kind,
-            filters,
-            score(np.concatenate([e for e, _ in pairs]), np.concatenate([t for _, t in pairs])),
-        )
-        for (kind, filters), pairs in found.items()
-    )
+    rows = []
+    for (kind, filters), pairs in found.items():
+        estimate, truth = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+        rows.append(KindRow(kind, filters, score(estimate, truth)))
+    return tuple(rows)
 
 
 def _kept(estimator: Estimator) -> Estimator:

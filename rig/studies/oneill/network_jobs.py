@@ -63,8 +63,10 @@ class Job:
         return 30 if self.way in ("end-to-end", "staged") else STATE_NODES
 
     @property
-    def stages(self) -> tuple["Job", "Job"]:
-        """The networks of a staged job: surrogate to torque, and torque to what is wanted."""
+    def stages(self) -> tuple["Job", ...]:
+        """The networks of a job; of a staged one surrogate to torque, and torque to the targets."""
+        if self.way != "staged":
+            return (self,)
         first = replace(self, way="end-to-end", targets=(PROXIMAL,))
         return first, replace(self, way="end-to-end", surrogate="sensor")
 
@@ -76,8 +78,7 @@ Kind = tuple[str, str, str, tuple[str, ...]]
 def jobs(poses: tuple[str, ...]) -> list[Job]:
     """Return the rows of the study, the most telling ones first."""
     both = (DISTAL, JAW)
-    paper: list[Kind] = []
-    paper += [("neutral", "end-to-end", s, (PROXIMAL,)) for s in tuple(LOADS)[:4]]
+    paper: list[Kind] = [("neutral", "end-to-end", s, (PROXIMAL,)) for s in tuple(LOADS)[:4]]
     paper += [("neutral", "end-to-end", s, both) for s in LOADS]
     paper += [("neutral", "staged", s, both) for s in tuple(LOADS)[:4]]
     posed = [(p, "end-to-end", s, both) for p in ("pitch", "roll") for s in LOADS]
@@ -90,7 +91,10 @@ def jobs(poses: tuple[str, ...]) -> list[Job]:
     posed_states = [(p, "+ travel", "command", (t,)) for p in ("pitch", "roll") for t in both]
     order: list[tuple[str, Sequence[Kind]]] = [
         ("random", paper),
-        *(("run-wise", _of(s, [*ways["+ travel"], *motor])) for s in ("command", "current")),
+        *(
+            ("run-wise", [kind for kind in [*ways["+ travel"], *motor] if kind[2] == surrogate])
+            for surrogate in ("command", "current")
+        ),
         ("lofo", ways["+ travel"]),
         ("lopo", ways["+ travel"]),
         ("run-wise", [*ways["causal"], *ways["+ acceleration"]]),
@@ -114,7 +118,3 @@ def jobs(poses: tuple[str, ...]) -> list[Job]:
 
 def _motor(kinds: Sequence[Kind]) -> list[Kind]:
     return [kind for kind in kinds if kind[1:3] in MOTOR]
-
-
-def _of(surrogate: str, kinds: Sequence[Kind]) -> list[Kind]:
-    return [kind for kind in kinds if kind[2] == surrogate]

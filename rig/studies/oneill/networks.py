@@ -20,14 +20,7 @@ from estimation.scores import Score, score
 from rig.output.provenance import Provenance
 from rig.studies.oneill.data import ClosingTable, closing_table, held_out_masks, pose_runs
 from rig.studies.oneill.network_jobs import CHANNELS, Job, jobs
-from rig.studies.oneill.paper import (
-    DISTAL,
-    FOLDS,
-    GRIP_ARM_M,
-    PAPER_POSE_SAMPLES,
-    POSES,
-    PROXIMAL,
-)
+from rig.studies.oneill.paper import DISTAL, FOLDS, GRIP_ARM_M, PAPER_POSE_SAMPLES, POSES, PROXIMAL
 from rig.studies.seeds import begin_learning, in_processes
 
 SCHEMA = "rig.study.network/1"
@@ -76,11 +69,13 @@ class NetworkStudy:
     @property
     def grip_force(self) -> tuple[float, float] | None:
         """Error of the grip force in N and as a share of its peak, command, random split."""
-        for row in self.rows:
-            own = (row.pose, row.way, row.surrogate, row.protocol, row.target)
-            if own == ("neutral", "end-to-end", "command", "random", DISTAL):
-                return row.score.rmse / GRIP_ARM_M, row.score.rmse / self.peak_torque_n_m
-        return None
+        error = self.rmse("neutral", "end-to-end", "command", "random", DISTAL)
+        return None if error is None else (error / GRIP_ARM_M, error / self.peak_torque_n_m)
+
+    def rmse(self, *row: str) -> float | None:
+        """Return the error of a row: pose, way, surrogate, protocol and target; None without it."""
+        rows = {(r.pose, r.way, r.surrogate, r.protocol, r.target): r for r in self.rows}
+        return rows[row].score.rmse if row in rows else None
 
 
 @dataclass(frozen=True)
@@ -88,10 +83,9 @@ class Task:
     """One network to train: all a worker needs."""
 
     job: Job
-    fold: int
-    train: str  # place of the mapped table
+    train: Path  # of the mapped table
     columns: tuple[str, ...]
-    path: str
+    path: Path
     rows: np.ndarray
     settings: Settings
 
@@ -146,47 +140,44 @@ class Trainer:
 
     def tasks(self, job: Job) -> Iterator[Task]:
         """Yield the networks of a job that are still to be trained."""
-        for part in job.stages if job.way == "staged" else (job,):
+        for part in job.stages:
             for fold, mask in enumerate(self.masks(part)):
                 path = self.path(part, fold)
                 if not path.exists():
                     yield Task(
                         part,
-                        fold,
-                        str(self._places[part.pose]),
+                        self._places[part.pose],
                         self.tables[part.pose].columns,
-                        str(path),
+                        path,
                         np.flatnonzero(~mask)[:: self.step(part.pose)],
-                        replace(self.training.settings, nodes=part.nodes, seed=self.training.seed),
+                        self._settings(part),
                     )
+
+    def _settings(self, job: Job) -> Settings:
+        return replace(self.training.settings, nodes=job.nodes, seed=self.training.seed)
 
     def path(self, job: Job, fold: int) -> Path:
         """Return where a network is kept: the name changes with all that made it."""
         data = self.tables[job.pose].digest((*job.inputs, *job.targets))
-        settings = replace(self.training.settings, nodes=job.nodes, seed=self.training.seed)
         made_of = (
             SCHEMA, data, job.inputs, job.targets, job.protocol, fold,
-            self.step(job.pose), FOLDS, sorted(asdict(settings).items()),
+            self.step(job.pose), FOLDS, sorted(asdict(self._settings(job)).items()),
         )  # fmt: skip
-        return (
-            self.training.state / f"{hashlib.sha256(repr(made_of).encode()).hexdigest()[:24]}.npz"
-        )
+        name = hashlib.sha256(repr(made_of).encode()).hexdigest()[:24]
+        return self.training.state / f"{name}.npz"
 
     def rows(self, job: Job) -> list[NetworkRow]:
         """Return the errors of a job whose networks are all trained."""
         table = self.tables[job.pose]
         estimates, truths = [], []
         converged = 0
+        *before, last = job.stages
         for fold, mask in enumerate(self.masks(job)):
-            rows = table[job.inputs][mask] if job.way != "staged" else np.empty((0, 0))
-            if job.way == "staged":
-                first, second = job.stages
+            rows = table[last.inputs][mask]
+            for first in before:
                 torque = _kept(self.path(first, fold))[0](table[first.inputs][mask])
-                rows = table[second.inputs][mask]
-                rows[:, second.inputs.index(PROXIMAL)] = torque[:, 0]
-                network, done = _kept(self.path(second, fold))
-            else:
-                network, done = _kept(self.path(job, fold))
+                rows[:, last.inputs.index(PROXIMAL)] = torque[:, 0]
+            network, done = _kept(self.path(last, fold))
             converged += done
             estimates.append(network(rows))
             truths.append(table[job.targets][mask])
@@ -233,16 +224,12 @@ def network_tables(
 
 def train_task(task: Task) -> None:
     """Train one network and keep it."""
-    table = ClosingTable.mapped(Path(task.train), task.columns)
-    job = task.job
-    trained = train(
-        table[job.inputs][task.rows],
-        table[job.targets][task.rows],
-        (job.inputs, job.targets),
-        task.settings,
-    )
+    table = ClosingTable.mapped(task.train, task.columns)
+    names = (task.job.inputs, task.job.targets)
+    rows, targets = (table[columns][task.rows] for columns in names)
+    trained = train(rows, targets, names, task.settings)
     arrays = {"converged": np.array(trained.converged), **net.to_arrays(trained.network)}
-    net.write_arrays(Path(task.path), SCHEMA, arrays)
+    net.write_arrays(task.path, SCHEMA, arrays)
 
 
 def _kept(path: Path) -> tuple[Network, int]:

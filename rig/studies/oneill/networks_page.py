@@ -12,6 +12,7 @@ from rig.studies.oneill.paper import (
     PAPER_GRIP_N,
     PAPER_GRIP_SHARE,
     SHOWN,
+    shown,
 )
 
 WAYS = {
@@ -52,8 +53,8 @@ def notes(study: NetworkStudy) -> list[str]:
 
 def tables(study: NetworkStudy) -> list[TextTable]:
     """Return the errors by what was held out, a table for each pose."""
-    shown = [_held_out_table(study, pose) for pose in study.samples]
-    return [table for table in shown if table.rows]
+    found = [_held_out_table(study, pose) for pose in study.samples]
+    return [table for table in found if table.rows]
 
 
 def _held_out_table(study: NetworkStudy, pose: str) -> TextTable:
@@ -63,8 +64,8 @@ def _held_out_table(study: NetworkStudy, pose: str) -> TextTable:
             found.setdefault((row.target, row.surrogate, row.way), {})[row.protocol] = row
     rows = []
     for (target, surrogate, way), by in sorted(found.items(), key=_order):
-        name, unit, scale = SHOWN[target]
-        cells = [f"{scale * by[p].score.rmse:.2f}" if p in by else "" for p in HELD_OUT]
+        name, unit, _ = SHOWN[target]
+        cells = [shown(target, by[p].score.rmse, 2) if p in by else "" for p in HELD_OUT]
         rows.append([f"{name}, {unit}: {surrogate}, {way}", *cells])
     columns = ["RMSE", *HELD_OUT.values()]
     note = f"Runs: {FOLDS} folds of whole runs. " + "; ".join(f"{k}: {v}" for k, v in WAYS.items())

@@ -21,6 +21,12 @@ SHOWN = {
 }
 """Name, unit and scale of each target."""
 
+
+def shown(target: str, value: float, digits: int | None = None) -> str:
+    """Return a value of a target in the unit it is shown in, by default to its own digits."""
+    return f"{SHOWN[target][2] * value:.{digits or (3 if target == JAW else 2)}f}"
+
+
 SURROGATES = {
     "command": "motor_command_ratio",
     "current": "motor_current_a",

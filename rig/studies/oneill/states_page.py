@@ -6,7 +6,7 @@ from estimation.bank.fitting import CHOICES
 from estimation.bank.states import EFFECTS
 from estimation.derived import TRAVEL_WINDOW_S
 from rig.output.table import TextTable
-from rig.studies.oneill.paper import CONDITIONS, FOLDS, HELD_OUT, JAW, SHOWN
+from rig.studies.oneill.paper import CONDITIONS, FOLDS, HELD_OUT, SHOWN, shown
 from rig.studies.oneill.state_rows import Level, StateRow, ablated
 from rig.studies.oneill.states import StateStudy
 
@@ -42,9 +42,7 @@ def _name(row: StateRow) -> str:
 def _scaled(row: StateRow | None, value: str = "rmse") -> str:
     if row is None:
         return ""
-    number = row.score.rmse if value == "rmse" else getattr(row, value)
-    digits = 3 if row.job.target == JAW else 2
-    return f"{SHOWN[row.job.target][2] * number:.{digits}f}"
+    return shown(row.job.target, row.score.rmse if value == "rmse" else getattr(row, value))
 
 
 def _worse(row: StateRow | None, first: StateRow) -> str:
@@ -79,10 +77,8 @@ def _levels(study: StateStudy) -> TextTable:
     for row in study.rows:
         if row.levels and row.job.filters == "live":
             parts = (row.levels[:1], row.levels[1:-1], row.levels[-1:])
-            cells.append([
-                f"{_name(row)}, {row.job.protocol}",
-                *(cell for part in parts for cell in _level_cells(row, part)),
-            ])  # fmt: skip
+            told = (cell for part in parts for cell in _level_cells(row, part))
+            cells.append([f"{_name(row)}, {row.job.protocol}", *told])
     columns = ["left out", "the lowest", "covers", "one between", "covers", "the highest", "covers"]
     note = (
         "RMSE of the frequency (lofo) or power level (lopo) left out, and what its interval of 95 %"
@@ -98,8 +94,7 @@ def _level_cells(row: StateRow, levels: Sequence[Level]) -> list[str]:
         return ["", ""]
     square = sum(level.samples * level.rmse**2 for level in levels) / samples
     covered = sum(level.samples * level.covered for level in levels) / samples
-    scale, digits = SHOWN[row.job.target][2], 3 if row.job.target == JAW else 2
-    return [f"{scale * square**0.5:.{digits}f}", f"{covered:.0%}"]
+    return [shown(row.job.target, square**0.5), f"{covered:.0%}"]
 
 
 def _intervals(study: StateStudy) -> TextTable:
@@ -114,32 +109,21 @@ def _intervals(study: StateStudy) -> TextTable:
         for row in study.rows
         if not row.job.without
     ]
-    columns = [
-        "interval of 95 %",
-        "covers",
-        "by chance",
-        "median run",
-        "worst run",
-        "valid",
-        "RMSE where valid",
-    ]
+    columns = ["interval of 95 %", "covers", "by chance", "median run", "worst run", "valid"]
+    columns.append("RMSE where valid")
     note = (
         "Covers: share of the samples of held-out runs inside their interval; by chance: what 95 %"
         " of campaigns drawn from these runs would cover. Valid: share inside"
         " the range of position, load, speed and acceleration that was fitted."
     )
-    return TextTable(
-        "Physical states: intervals and validity on held-out runs", columns, cells, note
-    )
+    title = "Physical states: intervals and validity on held-out runs"
+    return TextTable(title, columns, cells, note)
 
 
 def _ablation(study: StateStudy) -> TextTable:
     by_target = {target: ablated(study.rows, target) for target in SHOWN}
     cells = [
-        [
-            effect or "nothing",
-            *(_scaled(by.get(effect)) for by in by_target.values()),
-        ]
+        [effect or "nothing", *(_scaled(by.get(effect)) for by in by_target.values())]
         for effect in ("", *EFFECTS)
         if any(effect in by for by in by_target.values())
     ]

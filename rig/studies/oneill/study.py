@@ -170,8 +170,8 @@ def _surrogates(campaign: Campaign, notes: list[str]) -> dict[str, str]:
         for name, channel in SURROGATES.items()
         if set(measured_channels([channel])) <= columns
     }
-    for name in SURROGATES.keys() - found.keys():
-        notes.append(f"The recordings carry no {name}; its rows are left out.")
+    missing = SURROGATES.keys() - found.keys()
+    notes += [f"The recordings carry no {name}; its rows are left out." for name in missing]
     if not found:
         raise DataError(
             "The recordings carry none of the paper's torque surrogates.",
@@ -213,19 +213,12 @@ def _rows(
     tried = {"authors": (whole, [(late, late)])}
     tried |= {name: (kept, [(~mask, mask) for mask in own]) for name, own in splits.items() if own}
     for protocol, (table, parts) in tried.items():
-        lines, found = _fitted(table.column(channel), table.column(PROXIMAL), parts)
+        x, y = table.column(channel), table.column(PROXIMAL)
+        lines = [fit_line(x[fitted], y[fitted]) for fitted, _ in parts]
+        estimates = [line(x[scored]) for line, (_, scored) in zip(lines, parts, strict=True)]
+        found = score(np.concatenate(estimates), np.concatenate([y[scored] for _, scored in parts]))
         offset, gain = lines[0].coef.tolist() if len(lines) == 1 else (None, None)
         yield Row(surrogate, protocol, len(table.names), gain, unit, offset, found)
-
-
-def _fitted(
-    x: FloatArray, y: FloatArray, splits: list[tuple[Mask, Mask]]
-) -> tuple[list[Polynomial], Score]:
-    """Fit a line on the first samples of each split; return all, and the score on the second."""
-    lines = [fit_line(x[fitted], y[fitted]) for fitted, _ in splits]
-    estimates = [line(x[scored]) for line, (_, scored) in zip(lines, splits, strict=True)]
-    truths = [y[scored] for _, scored in splits]
-    return lines, score(np.concatenate(estimates), np.concatenate(truths))
 
 
 def _rmse_by_run(table: ClosingTable, channel: str, masks: list[Mask]) -> dict[str, float]:

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 
+from estimation.scores import Score
 from rig.output.table import TextTable
 from rig.studies.oneill.networks import NetworkStudy
-from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROTOCOLS, PROXIMAL, SHOWN
+from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROTOCOLS, PROXIMAL, SHOWN, PaperRow
 from rig.studies.oneill.study import Study
 
 ORDER = {
@@ -45,22 +46,8 @@ def _linear(study: Study) -> Iterator[list[str]]:
         for row in study.rows:
             if row.protocol != protocol:
                 continue
-            stated = [""] * 5
-            if protocol == "random":
-                printed = study.paper[row.surrogate]
-                stated = [
-                    *_cells(1e3, printed.mae, printed.p95, printed.rmse),
-                    f"{printed.pearson_r:.2f}",
-                    f"{printed.spearman_rho:.2f}",
-                ]
-            found = row.score
-            yield [
-                f"{kind}: {row.surrogate}",
-                *_cells(1e3, found.mae, found.p95, found.rmse),
-                f"{found.pearson_r:.2f}",
-                f"{found.spearman_rho:.2f}",
-                *stated,
-            ]
+            stated = _scored(study.paper[row.surrogate]) if protocol == "random" else [""] * 5
+            yield [f"{kind}: {row.surrogate}", *_scored(row.score), *stated]
 
 
 def _linear_note(study: Study) -> str:
@@ -82,17 +69,11 @@ def _block(deep: NetworkStudy, pose: str, way: str, target: str) -> Iterator[lis
     label = "network" if target == PROXIMAL else way if pose == "neutral" else f"varied {pose}"
     for p, w, t, surrogate in PAPER:
         if (p, w, t) == (pose, way, target) and surrogate in trained:
-            score = trained[surrogate].score
-            yield [
-                f"{label}: {surrogate}",
-                *_cells(SHOWN[target][2], score.mae, score.p95, score.rmse),
-                f"{score.pearson_r:.3f}",
-                f"{score.spearman_rho:.3f}",
-                *_cells(1.0, *PAPER[p, w, t, surrogate]),
-                "",
-                "",
-            ]
+            found = _scored(trained[surrogate].score, SHOWN[target][2], 3)
+            stated = [f"{value:.2f}" for value in PAPER[p, w, t, surrogate]]
+            yield [f"{label}: {surrogate}", *found, *stated, "", ""]
 
 
-def _cells(scale: float, *values: float) -> list[str]:
-    return [f"{scale * value:.2f}" for value in values]
+def _scored(found: Score | PaperRow, scale: float = 1e3, digits: int = 2) -> list[str]:
+    errors = (f"{scale * value:.2f}" for value in (found.mae, found.p95, found.rmse))
+    return [*errors, *(f"{r:.{digits}f}" for r in (found.pearson_r, found.spearman_rho))]
