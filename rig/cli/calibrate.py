@@ -80,10 +80,15 @@ def session(make: "Callable[..., Procedure]") -> None:
     shared = inspect.signature(Keeping)
 
     def command(**options: Any) -> None:
+        from calibration.quality import BadDataError
         from rig.cli.calibrate_session import conduct
 
         how = Keeping(**{name: options.pop(name) for name in shared.parameters})
-        conduct(_made(make, options), how)
+        try:
+            procedure = make(**options)
+        except BadDataError as error:  # what its options cannot be is a slip of whoever typed them
+            raise UsageError(error.what, error.why, error.fix) from error
+        conduct(procedure, how)
 
     parameters = [*shared.parameters.values(), *own.parameters.values()]
     keyword = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in parameters]
@@ -164,9 +169,8 @@ def gearbox(
     from calibration.chain import GEAR
     from calibration.sessions.gearbox import GearboxSession
 
-    loads = tuple(_numbers(loads_a, "--loads-a"))
     return GearboxSession(
-        loads_a=loads,
+        loads_a=tuple(_numbers(loads_a, "--loads-a")),
         repeats=repeats,
         gear_ratio=ratio or GEAR.ratio,
         stiffness_only=stiffness_only,
@@ -198,11 +202,12 @@ def ft(
     """Force sensor: bias, weight and centre of mass of its tool, and the lever arm to the jaw."""
     from calibration.sessions.ft import FtSession
 
-    jaw, turn = _three(jaw_mm, "--jaw-mm"), _three(jaw_turn_deg, "--jaw-turn-deg")
+    x, y, z = _three(jaw_mm, "--jaw-mm")
+    about_x, about_y, about_z = map(radians, _three(jaw_turn_deg, "--jaw-turn-deg"))
     return FtSession(
         repeats=repeats,
-        jaw_m=(jaw[0] / 1e3, jaw[1] / 1e3, jaw[2] / 1e3),
-        jaw_turn_rad=(radians(turn[0]), radians(turn[1]), radians(turn[2])),
+        jaw_m=(x / 1e3, y / 1e3, z / 1e3),
+        jaw_turn_rad=(about_x, about_y, about_z),
     )
 
 
@@ -241,16 +246,6 @@ def fsr(
 
 for function in (check, add, list_, show, diff, use, diagnose):
     calibrate_app.command(function.__name__.rstrip("_"), rich_help_panel="Records")(function)
-
-
-def _made(make: "Callable[..., Procedure]", options: dict[str, Any]) -> "Procedure":
-    """Make a procedure of its options; what they cannot be is a slip of whoever typed them."""
-    from calibration.quality import BadDataError
-
-    try:
-        return make(**options)
-    except BadDataError as error:
-        raise UsageError(error.what, error.why, error.fix) from error
 
 
 def _numbers(words: str, option: str) -> list[float]:

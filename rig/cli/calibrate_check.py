@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -87,9 +87,10 @@ def check(
 def _check_records(
     config: Path | None, sim: bool, log: Path | None, store: Path | None, json: bool
 ) -> int:
-    """Check the active records of a rig."""
-    from calibration.rules import judge, judge_raw
+    from calibration.rules import judge, judge_range, judge_raw
     from rig.configuration.chosen import choose_rig
+    from rig.log.reader import read_log
+    from rig.log.streams import COUNTS
 
     settings = choose_rig(config, sim)
     kept = store_of(store, settings)
@@ -100,7 +101,9 @@ def _check_records(
         v for record in active for v in (*judge(record, now, settings.serials), *judge_raw(record))
     ]
     if log is not None:
-        verdicts += _range_verdicts(log, active)
+        counts = read_log(log, topics=(COUNTS,)).topics[COUNTS]
+        read = [record for record in active if record.input in counts.columns]
+        verdicts += [v for record in read for v in judge_range(record, counts.rows[record.input])]
     said = [
         f"{'error' if v.is_error else 'warning'}: {v.channel} {v.record}: {v.message} ({v.rule})"
         for v in verdicts
@@ -110,20 +113,6 @@ def _check_records(
     data = {"store": kept.folder, "ok": not bad, "verdicts": verdicts}
     present(json, data, *said, f"Active records: {len(active)}; {fault}.")
     return int(bad)
-
-
-def _range_verdicts(log: Path, records: "list[CalibrationRecord]") -> list[Any]:
-    from calibration.rules import judge_range
-    from rig.log.reader import read_log
-    from rig.log.streams import COUNTS
-
-    topic = read_log(log, topics=(COUNTS,)).topics[COUNTS]
-    return [
-        verdict
-        for record in records
-        if record.input in topic.columns
-        for verdict in judge_range(record, topic.rows[record.input])
-    ]
 
 
 def _record(runs: "Sequence[Run]", config: Path | None, sim: bool) -> "CalibrationRecord | None":

@@ -3,6 +3,7 @@
 import shlex
 import sys
 from datetime import datetime
+from functools import partial
 from os import W_OK, access
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,6 @@ from calibration.linear import CalibrationSet
 from calibration.procedure import AbortedError, Answer, Operator, Procedure, Step, carry_out
 from calibration.sessions.current import CurrentSession, DriveCurrentSession
 from calibration.store import CalibrationStore, default_folder
-from drivers.device import Device
 from drivers.registry import open_device
 from estimation.files import OutputError, write_text_atomic
 from rig.bench.logger import open_logger
@@ -20,6 +20,7 @@ from rig.calibrate.raw import read_raw, require_absent, whole_folder, write_raw
 from rig.calibrate.run import Kept, Signature, keep
 from rig.calibrate.shown import announced, found_line, parameter_lines, reading
 from rig.cli.calibrate import Keeping
+from rig.cli.calibrate_store import store_of
 from rig.cli.options import chosen_rig
 from rig.configuration.config import Config
 from rig.errors import UsageError
@@ -50,11 +51,8 @@ def conduct(procedure: Procedure, how: Keeping) -> None:
         )
     if how.seed is not None:
         settings = settings.changed(simulation={"seed": how.seed})
-    own = settings.store or settings.default_store
-    store = CalibrationStore(how.store) if how.store else own
-    folder = (
-        how.out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-calibrate-{procedure.kind}"
-    )
+    store = store_of(how.store, settings)
+    folder = how.out or _new_folder("calibrate", procedure)
     if how.raw is not None:
         kind, measurements, lines = read_raw(how.raw)
         if kind != procedure.kind:
@@ -75,21 +73,23 @@ def conduct(procedure: Procedure, how: Keeping) -> None:
         notes=how.notes,
     )
     kept = keep(procedure, measurements, lines, signature, store, folder)
-    page = _write_page(kept, store)
+    place = kept.folder / "calibration.html"
+    text = page(kept.records, kept.conclusion, store.records(), Provenance.now(0))
+    write_text_atomic(place, text)
     if how.use:
         for digest in kept.records:
             store.use(digest, now_utc(), how.operator)
-    _show(kept, how, store, page)
+    _show(kept, how, store, place)
     if settings.store is None or settings.store.folder != store.folder:
+        name = "default" if store.folder == default_folder() else str(store.folder.resolve())
         results(how.json).print(
             f"Sessions of {settings.name} take no record from this store. To change that, write"
-            f' calibration_store = "{_name_of(store)}" in its configuration.'
+            f' calibration_store = "{name}" in its configuration.'
         )
 
 
-def _name_of(store: CalibrationStore) -> str:
-    """Return the name of a store in a configuration."""
-    return "default" if store.folder == default_folder() else str(store.folder.resolve())
+def _new_folder(what: str, procedure: Procedure) -> Path:
+    return Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{what}-{procedure.kind}"
 
 
 def _refuse_unkept(store: CalibrationStore, folder: Path) -> None:
@@ -175,14 +175,11 @@ def _kept_for_later(
     """Keep what a person set up before a session was stopped; return a message about it."""
     if how.yes or not measured:
         return "Nothing was kept."
-    folder = Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-unfinished-{procedure.kind}"
+    folder = _new_folder("unfinished", procedure)
     with whole_folder(folder) as part:
         write_raw(part, procedure.kind, measured, lines)
-    total = len(procedure.steps())
-    return (
-        f"{len(measured)} of {total} steps are kept. Go on with the same command and"
-        f" --resume {folder}"
-    )
+    kept = f"{len(measured)} of {len(procedure.steps())} steps are kept"
+    return f"{kept}. Go on with the same command and --resume {folder}"
 
 
 class Asking:
@@ -199,8 +196,7 @@ class Asking:
     def prepare(self, step: Step) -> Answer:
         """Show the instruction and wait for Enter; `b` goes back a step, `q` ends the session."""
         if step.instruction:
-            screen = remarks()
-            screen.print(step.instruction)
+            remarks().print(step.instruction)
             answer = self._asked()
             if answer == "q":
                 raise AbortedError("The calibration was stopped.")
@@ -245,21 +241,10 @@ def _force_sensor(words: str | None, devices: tuple[str, ...]) -> Any:
             "This calibration needs a force sensor.",
             fix="Name it: --force-sensor ati-net=udp:192.168.1.1:49152",
         )
-
-    def opened() -> Device:
-        return open_device(driver, url)
-
-    return opened
+    return partial(open_device, driver, url)
 
 
-def _write_page(kept: Kept, store: CalibrationStore) -> Path:
-    place = kept.folder / "calibration.html"
-    text = page(kept.records, kept.conclusion, store.records(), Provenance.now(0))
-    write_text_atomic(place, text)
-    return place
-
-
-def _show(kept: Kept, how: Keeping, store: CalibrationStore, page: Path) -> None:
+def _show(kept: Kept, how: Keeping, store: CalibrationStore, place: Path) -> None:
     said = []
     for digest, record in kept.records.items():
         said.append(f"{digest}  {record.channel} from {record.input}")
@@ -268,7 +253,7 @@ def _show(kept: Kept, how: Keeping, store: CalibrationStore, page: Path) -> None
     said.append("Good: the data passed every check of this kind of calibration.")
     drifted = alarms(kept.records.values(), store.records())
     said += [f"ALARM: {line}" for line in drifted]
-    said += [f"Raw logs: {kept.folder}", f"Page: {page}"]
+    said += [f"Raw logs: {kept.folder}", f"Page: {place}"]
     if not how.use:
         by = f"--by {shlex.quote(how.operator)} --store {store.folder}"
         said += [f"Use it: rig calibrate use {digest} {by}" for digest in kept.records]
@@ -277,4 +262,4 @@ def _show(kept: Kept, how: Keeping, store: CalibrationStore, page: Path) -> None
         for digest, r in kept.records.items()
     }
     whole = {"folder": kept.folder, "records": records, "found": kept.conclusion.found}
-    present(how.json, {**whole, "page": page, "drifted": drifted}, *said)
+    present(how.json, {**whole, "page": place, "drifted": drifted}, *said)

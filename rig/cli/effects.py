@@ -36,14 +36,10 @@ def effects(
         present(json, _described(one), *_shown(one))
         return
     width = max(map(len, listed))
-    rows = (f"{key:{width}}  {_summary(one)}" for key, one in listed.items())
+    sentences = {key: _text(one).split("\n\n")[0] for key, one in listed.items()}
+    rows = (f"{key:{width}}  {text}".replace("\n", " ") for key, text in sentences.items())
     data = {"effects": [_described(one) for one in listed.values()]}
     present(json, data, *rows, f"{len(listed)} effects. More on one: rig effects NAME")
-
-
-def _summary(one: "Effect") -> str:
-    """Return the first sentence of an effect's description."""
-    return _text(one).split("\n\n")[0].replace("\n", " ")
 
 
 def _text(one: "Effect") -> str:

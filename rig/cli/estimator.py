@@ -54,11 +54,8 @@ def compare(
         task = bar.add_task("runs", total=len(campaign))
         found = compared(files, estimators, campaign, lambda run: bar.advance(task))
     lines, tables = [*shown.lines(found), *sentence(steps)], shown.tables(found)
-
-    def page() -> str:
-        return to_page(["Two estimators on the same runs", *lines], tables, found.provenance)
-
-    show_result(lines, tables, out, page, json)
+    said = ["Two estimators on the same runs", *lines]
+    show_result(lines, tables, out, lambda: to_page(said, tables, found.provenance), json)
     if json:
         emit_json(found)
 
@@ -119,8 +116,8 @@ def adapt(
 
 def _errors(result: "Adaptation") -> "TextTable":
     """Return the errors on the runs not used."""
-    torque = result.target.endswith("_n_m")
-    unit, scale = ("mN m", 1e3) if torque else ("deg", degrees(1.0))
+    is_torque = result.target.endswith("_n_m")
+    unit, scale = ("mN m", 1e3) if is_torque else ("deg", degrees(1.0))
     named = {
         "as it is": result.as_it_is,
         f"adapted with {', '.join(result.used)}": result.adapted,

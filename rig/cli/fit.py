@@ -1,9 +1,9 @@
 """`rig fit`: fit a declared model on a campaign."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -30,78 +30,68 @@ if TYPE_CHECKING:
     from estimation.estimators.bank import BankRecipe
     from estimation.estimators.network import NetworkRecipe
     from estimation.model import Model
-    from estimation.scores import Score
 
 
 STATE_NODES, THINNED = 12, 24
 """Hidden nodes of a network with physical states, and every how many-th sample it learns from."""
 
 
-class Learner(NamedTuple):
-    """An estimator that is learnt, not declared.
-
-    Attributes:
-        recipe: What is fitted.
-        score: Returns its error on runs held out of a campaign, in folds, with a seed; calls the
-            last argument after each fold.
-        facts: What is fixed of it, for the JSON.
-    """
-
-    recipe: "BankRecipe | NetworkRecipe"
-    score: "Callable[[Any, Campaign, int, int, Callable[[], None]], Score]"
-    facts: dict[str, Any]
-
-
-def _learner(kind: str, target: str, surrogate: str, live: bool, seed: int) -> Learner:
+def _recipe(
+    kind: str, target: str, surrogate: str, live: bool, seed: int
+) -> "BankRecipe | NetworkRecipe":
     """Return products of physical states, or a network with some of them as inputs.
 
     Raises:
         UsageError: The states have no scale for that channel as the load.
     """
     from estimation.bank.states import LOAD_SCALES, Bank
-    from estimation.cross_validation import closing_score, held_out_score
     from estimation.estimators.bank import BankRecipe
     from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
     from estimation.networks.training import Settings
 
     if kind == "network":
-        inputs, settings = (*STATE_INPUTS, surrogate), Settings(nodes=STATE_NODES, seed=seed)
-        recipe = NetworkRecipe(inputs, target, settings, every=THINNED)
-        facts = {"target": target, "inputs": inputs, "nodes": STATE_NODES}
-        return Learner(recipe, closing_score, facts)
+        settings = Settings(nodes=STATE_NODES, seed=seed)
+        return NetworkRecipe((*STATE_INPUTS, surrogate), target, settings, every=THINNED)
     if surrogate not in LOAD_SCALES:
         raise UsageError(
             f"{surrogate} does not stand for the load.",
             fix=f"Choose one of: {', '.join(LOAD_SCALES)}.",
         )
-    return Learner(
-        BankRecipe(target, Bank(surrogate), causal=live),
-        lambda recipe, runs, folds, seed, _: held_out_score(recipe, runs, folds, seed),
-        {"target": target, "surrogate": surrogate},
-    )
+    return BankRecipe(target, Bank(surrogate), causal=live)
 
 
 def _learn(
-    learner: Learner, campaign: "Campaign", folds: int, seed: int, out: Path | None, json_: bool
+    recipe: "BankRecipe | NetworkRecipe",
+    campaign: "Campaign",
+    folds: int,
+    seed: int,
+    out: Path | None,
+    json_: bool,
 ) -> None:
-    """Fit an estimator, and report its error on runs left out."""
+    """Fit an estimator that is learnt, not declared, and report its error on runs left out."""
+    from estimation.cross_validation import closing_score, held_out_score
+    from estimation.estimators.network import NetworkRecipe
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.models.origins import with_origin
     from rig.reports.diagnosis_words import display
 
-    recipe, target = learner.recipe, learner.recipe.target
+    target = recipe.target
     campaign, steps = with_one_zero(campaign, target)
     kept, error = campaign.evidence, None
     folds = min(folds, len(kept))
+    said, figures = [*sentence(steps)], {}
     with progress() as bar:
         task = bar.add_task("fits", total=1 + folds)
         estimator = recipe.fit(campaign)
         bar.advance(task)
-        if len(kept) > 1:
-            error = learner.score(recipe, kept, folds, seed, lambda: bar.advance(task))
-    said, figures = [*sentence(steps)], {}
-    if "nodes" in learner.facts:
-        said.insert(0, f"{target} from {', '.join(learner.facts['inputs'])}: {STATE_NODES} nodes.")
+        if isinstance(recipe, NetworkRecipe):
+            facts: dict[str, Any] = {"inputs": recipe.inputs, "nodes": STATE_NODES}
+            said.insert(0, f"{target} from {', '.join(recipe.inputs)}: {STATE_NODES} nodes.")
+            if len(kept) > 1:
+                error = closing_score(recipe, kept, folds, seed, lambda: bar.advance(task))
+        else:
+            facts = {"surrogate": recipe.bank.surrogate}
+            error = held_out_score(recipe, kept, folds, seed) if len(kept) > 1 else None
     if error is not None:
         figures = {"held_out_rmse": error.rmse, "held_out_p95": error.p95}
         scale, unit = display(unit_of(target), error.rmse)
@@ -113,7 +103,7 @@ def _learn(
         with_origin(estimator, campaign, figures).save(out)
         said.append(f"Estimator: {out}")
     found = {"held_out": error, "jaw_steps": steps, "out": out}
-    present(json_, learner.facts | found, *said)
+    present(json_, {"target": target, **facts, **found}, *said)
 
 
 def fit(
@@ -162,7 +152,7 @@ def fit(
     campaign = open_recordings(path, machine, format_, skip_bad)
     say_left_out(path, campaign)
     if model in ("states", "network"):
-        _learn(_learner(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)
+        _learn(_recipe(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)
         return
     done = _fitted(declared_models(model, machine), campaign, folds, seed)
     said: list[str | TextTable] = []
@@ -193,7 +183,9 @@ def _fitted(
         task = bar.add_task("fits", total=2 * len(models))
         for declared in models:
             bar.update(task, description=declared.name)
-            fitted = _dated(fit_model(declared, campaign, seed=seed))
+            fitted = fit_model(declared, campaign, seed=seed)
+            assert fitted.evidence is not None  # noqa: S101  a fit sets its evidence
+            fitted = replace(fitted, evidence=replace(fitted.evidence, made_at=now_utc()))
             bar.advance(task)
             error = held_out_error(declared, campaign, folds=folds, seed=seed) if several else None
             done.append((fitted, error))
@@ -219,15 +211,7 @@ def declared_models(model: str | None, machine: Path | None) -> "list[Model]":
     return named or models_in_use(Path(str(model)))
 
 
-def _dated(model: "Model") -> "Model":
-    """Return a fitted model with the time of its fit."""
-    assert model.evidence is not None  # noqa: S101  a fit sets its evidence
-    now = now_utc()
-    return replace(model, evidence=replace(model.evidence, made_at=now))
-
-
 def _told(model: "Model", error: "HeldOutError | None", out: Path | None) -> dict[str, Any]:
-    """Return the JSON result of a fit."""
     parameters = [
         {"effect": term.effect.id, "parameter": p.name, "unit": term.unit(p, model.target)}
         | {"estimate": term.values[p.name]}

@@ -97,7 +97,12 @@ def import_(
     found = look(recordings, said)
     written = [] if preview or out is None else write_logs(recordings, out)
     if plots is not None:
-        _draw(recordings, plots)
+        from estimation.campaign import Campaign
+        from rig.output.provenance import Provenance
+        from rig.reports.recordings import page
+
+        drawn = page(Campaign.of(recordings), "Imported table", Provenance.now(0))
+        write_text_atomic(plots, drawn)
     lines = [f"Note: {line}." for line in found.remarks]
     lines += [] if found.questions else ["Nothing looks wrong."]
     lines += [] if plots is None else [f"Plots: {plots}"]
@@ -157,14 +162,6 @@ def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
         )
     out.mkdir(parents=True, exist_ok=True)
     return [write_recording(p, recording) for p, recording in zip(paths, recordings, strict=True)]
-
-
-def _draw(recordings: "list[Recording]", plots: Path) -> None:
-    from estimation.campaign import Campaign
-    from rig.output.provenance import Provenance
-    from rig.reports.recordings import page
-
-    write_text_atomic(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
 
 
 def _tables(found: "Preview", mapping: "Mapping") -> "list[TextTable]":

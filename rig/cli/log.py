@@ -107,7 +107,6 @@ def _missing_runs(path: Path, there: set[str | None]) -> list[str]:
 
 
 def _summed_up(reports: "list[LogReport]", superseded: int, missing: int) -> str:
-    """Return the line that sums up a check."""
     from rig.log.check import Verdict
 
     whole = sum(report.verdict is Verdict.COMPLETE for report in reports)
@@ -229,7 +228,19 @@ def _show_runs(path: Path, json: bool) -> None:
     channels: dict[str, None] = {}
     for recording in campaign:
         channels |= dict.fromkeys(recording.columns)
-        runs.append(_described_run(recording))
+        runs.append(
+            {
+                "name": recording.name,
+                "samples": len(recording),
+                "duration_s": float(recording.time_s[-1] - recording.time_s[0]),
+                "rate_hz": recording.sample_rate_hz,
+                "conditions": dict(recording.conditions),
+                "instrument": recording.instrument,
+                "flagged": int((recording.flags != 0).sum()),
+                "excluded": recording.excluded,
+                "notes": recording.notes,
+            }
+        )
     said = [f"{counted(len(runs), 'run')}. Channels: {', '.join(channels)}."]
     width = max((len(run["name"]) for run in runs), default=0)
     for run in runs:
@@ -240,20 +251,6 @@ def _show_runs(path: Path, json: bool) -> None:
             f"  {listed(run['conditions'])}{flagged}{excluded}"
         )
     present(json, {"runs": runs, "channels": list(channels)}, *said)
-
-
-def _described_run(recording: Any) -> dict[str, Any]:
-    return {
-        "name": recording.name,
-        "samples": len(recording),
-        "duration_s": float(recording.time_s[-1] - recording.time_s[0]),
-        "rate_hz": recording.sample_rate_hz,
-        "conditions": dict(recording.conditions),
-        "instrument": recording.instrument,
-        "flagged": int((recording.flags != 0).sum()),
-        "excluded": recording.excluded,
-        "notes": recording.notes,
-    }
 
 
 def _date(started_at_ns: int | None) -> str:

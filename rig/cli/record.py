@@ -21,7 +21,6 @@ from rig.output.table import counted
 
 if TYPE_CHECKING:
     from rig.configuration.config import Config
-    from rig.machines.machine import Machine
     from rig.protocols.protocol import Plan
     from rig.recording.campaign import RunResult
     from rig.recording.watch import RunWatch
@@ -78,7 +77,9 @@ def record(
         settings = chosen_rig(config, sim)
         if seed is not None:
             settings = settings.changed(simulation={"seed": seed})
-        plan = load_protocol(protocol or _default_protocol(machine_of(settings), settings))
+        first = machine_of(settings).first_look(settings)
+        # of a rig that can play it, the campaign that is to be diagnosed
+        plan = load_protocol(protocol or ("diagnosis" if first == "quick" else first))
         folder = out or Path("logs") / f"{datetime.now():%Y-%m-%d-%H%M%S}-{plan.name}"
     refuse_problems(settings)
     for verdict in refuse_errors(settings.calibration_verdicts()):
@@ -138,9 +139,3 @@ def _recorded(
         )
         raise
     return recorded
-
-
-def _default_protocol(machine: "Machine", settings: "Config") -> str:
-    """Return the protocol of a campaign that is to be diagnosed, where the rig can play it."""
-    first = machine.first_look(settings)
-    return "diagnosis" if first == "quick" else first

@@ -13,7 +13,6 @@ from rig.output.console import JsonFlag, progress
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
-    from rig.studies.oneill.data import Source
     from rig.studies.oneill.kinds import KindRow
     from rig.studies.oneill.networks import NetworkStudy, Training
     from rig.studies.oneill.states import Shown
@@ -70,11 +69,17 @@ def oneill(
     By default it fits Table I's linear models, in seconds. --networks trains the paper's networks,
     which takes long; after an interruption it resumes. --states and --kinds take minutes.
     """
-    from rig.studies.oneill.data import open_reference
+    from rig.studies.oneill.data import Source, open_reference
     from rig.studies.oneill.page import page
     from rig.studies.oneill.study import run_study
 
-    source = _simulated(seed) if data is None else open_reference(data)
+    if data is None:
+        from rig.simulation.campaign import simulate_reference_campaign
+
+        name = f"simulated reference campaign, seed {seed}"
+        source = Source(simulate_reference_campaign(seed), name, measured=False)
+    else:
+        source = open_reference(data)
     with progress() as bar:
         task = bar.add_task("runs", total=len(source.campaign))
         study = run_study(source, seed=seed, on_run=lambda name: bar.advance(task))
@@ -261,14 +266,3 @@ def machines(
             "Put emps, smart-grasper, sts3215 or ur10e there.",
         )
     show(study, page(study), out, json)
-
-
-def _simulated(seed: int) -> "Source":
-    from rig.simulation.campaign import simulate_reference_campaign
-    from rig.studies.oneill.data import Source
-
-    return Source(
-        simulate_reference_campaign(seed),
-        name=f"simulated reference campaign, seed {seed}",
-        measured=False,
-    )

@@ -12,9 +12,9 @@ from estimation.files import write_text_atomic
 from rig.cli.options import (
     FormatOption,
     MachineOption,
+    RecordingsArgument,
     ReplayModel,
     SkipBad,
-    complete_recordings,
     say_left_out,
 )
 from rig.errors import DataError, UsageError
@@ -26,13 +26,7 @@ if TYPE_CHECKING:
 
 
 def view(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            help="Recordings: a log, folder or archive of any known format.",
-            autocompletion=complete_recordings,
-        ),
-    ],
+    path: RecordingsArgument,
     run: Annotated[
         list[str] | None, typer.Option(help="Only this run, in more points; may be repeated.")
     ] = None,
