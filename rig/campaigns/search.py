@@ -4,7 +4,7 @@ import difflib
 import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from rig.campaigns.index import IndexedCampaign, IndexedRun
@@ -26,19 +26,8 @@ FIELDS = ("date", "rig", "instrument", "protocol", "notes", "state", "samples", 
 VERDICT = "verdict"
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """One condition of a search.
-
-    Attributes:
-        name: Field or condition.
-        sign: Key of `COMPARISONS`.
-        text: The value, as typed.
-    """
-
-    name: str
-    sign: str
-    text: str
+Comparison = tuple[str, str, str]
+"""Field or condition, key of `COMPARISONS`, and the value as typed."""
 
 
 def search(campaigns: Sequence[IndexedCampaign], terms: Sequence[str]) -> list[IndexedCampaign]:
@@ -52,12 +41,16 @@ def search(campaigns: Sequence[IndexedCampaign], terms: Sequence[str]) -> list[I
     Raises:
         UsageError: A name that no run has.
     """
-    comparisons = [c for term in terms if (c := comparison(term)) is not None]
-    words = [term.lower() for term in terms if comparison(term) is None]
-    _check_names(campaigns, comparisons)
+    words, comparisons = [], []
+    for term in terms:
+        if parsed := TERM.fullmatch(term):
+            comparisons.append((parsed[1], parsed[2], parsed[3]))
+        else:
+            words.append(term.lower())
+    _check_names(campaigns, [name for name, _, _ in comparisons])
     found = []
     for campaign in campaigns:
-        of_all = f"{campaign.folder} {_findings(campaign)}".lower()
+        of_all = " ".join([str(campaign.folder), verdict(campaign), *families(campaign)]).lower()
         runs = [
             run
             for run in campaign.runs
@@ -67,14 +60,6 @@ def search(campaigns: Sequence[IndexedCampaign], terms: Sequence[str]) -> list[I
         if runs:
             found.append(replace(campaign, runs=tuple(runs)))
     return found
-
-
-def comparison(term: str) -> Comparison | None:
-    """Return a term as a comparison; None for a word."""
-    parsed = TERM.fullmatch(term)
-    if parsed is None:
-        return None
-    return Comparison(*parsed.groups())
 
 
 def verdict(campaign: IndexedCampaign) -> str:
@@ -88,10 +73,6 @@ def families(campaign: IndexedCampaign) -> list[str]:
     return [str(finding["family"]) for finding in found]
 
 
-def _findings(campaign: IndexedCampaign) -> str:
-    return " ".join([verdict(campaign), *families(campaign)])
-
-
 def _text(run: IndexedRun) -> str:
     values = (run.name, run.rig, run.instrument, run.protocol, run.notes, run.state, run.date)
     words = [value for value in run.conditions.values() if isinstance(value, str)]
@@ -99,38 +80,36 @@ def _text(run: IndexedRun) -> str:
 
 
 def _meets(run: IndexedRun, campaign: IndexedCampaign, one: Comparison) -> bool:
+    name, sign, text = one
     value: Any
-    if one.name == VERDICT:
+    if name == VERDICT:
         value = verdict(campaign)
-    elif one.name in FIELDS:
-        value = getattr(run, one.name)
+    elif name in FIELDS:
+        value = getattr(run, name)
     else:
-        value = run.conditions.get(one.name)
+        value = run.conditions.get(name)
     if value is None:
         return False
     if isinstance(value, str):
-        if one.sign in ("=", "!="):
-            return (one.text.lower() in value.lower()) == (one.sign == "=")
-        return COMPARISONS[one.sign](value, one.text)
+        if sign in ("=", "!="):
+            return (text.lower() in value.lower()) == (sign == "=")
+        return COMPARISONS[sign](value, text)
     try:
-        return COMPARISONS[one.sign](value, float(one.text))
+        return COMPARISONS[sign](value, float(text))
     except ValueError:
         return False
 
 
-def _check_names(campaigns: Sequence[IndexedCampaign], asked: Sequence[Comparison]) -> None:
-    if not asked:
-        return
+def _check_names(campaigns: Sequence[IndexedCampaign], asked: Sequence[str]) -> None:
     known = {*FIELDS, VERDICT}
-    for campaign in campaigns:
-        for run in campaign.runs:
-            known.update(run.conditions)
-    for one in asked:
-        if one.name not in known:
-            near = difflib.get_close_matches(one.name, known, n=1, cutoff=0.4)
+    for run in (run for campaign in campaigns for run in campaign.runs):
+        known.update(run.conditions)
+    for name in asked:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
             hint = f"Did you mean {near[0]!r}? " if near else ""
             raise UsageError(
-                f"No run has a condition {one.name!r}.",
+                f"No run has a condition {name!r}.",
                 f"Known: {', '.join(sorted(known))}.",
                 f"{hint}Words without a comparison are looked for in all texts.",
             )

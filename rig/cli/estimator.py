@@ -18,7 +18,7 @@ from rig.cli.options import (
     say_left_out,
 )
 from rig.errors import UsageError
-from rig.output.console import JsonFlag, emit_json, present, progress, show_result, to_json
+from rig.output.console import JsonFlag, present, progress, show_result, to_json
 from rig.output.table import TextTable, to_page
 
 if TYPE_CHECKING:
@@ -55,9 +55,7 @@ def compare(
         found = compared(files, estimators, campaign, lambda run: bar.advance(task))
     lines, tables = [*shown.lines(found), *sentence(steps)], shown.tables(found)
     said = ["Two estimators on the same runs", *lines]
-    show_result(lines, tables, out, lambda: to_page(said, tables, found.provenance), json)
-    if json:
-        emit_json(found)
+    show_result(lines, tables, out, lambda: to_page(said, tables, found.provenance), json, found)
 
 
 def adapt(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.options import FiguresFolder, TablesFile, WorkersOption
-from rig.output.console import JsonFlag, emit_json, progress, show_result
+from rig.output.console import JsonFlag, progress, show_result
 
 if TYPE_CHECKING:
     from rig.output.page import Page
@@ -47,9 +47,7 @@ def show(
 
         drawn = write_svgs(figures, page.figures())
     places = [] if out is None else [os.path.relpath(path, out.parent) for path in drawn]
-    show_result(page.paragraphs, page.tables, out, lambda: page.markdown(places), json)
-    if json:
-        emit_json(study)
+    show_result(page.paragraphs, page.tables, out, lambda: page.markdown(places), json, study)
 
 
 @contextmanager

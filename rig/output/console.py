@@ -173,8 +173,9 @@ def show_result(
     out: Path | None,
     markdown: Callable[[], str],
     json: bool,
+    data: Any,
 ) -> None:
-    """Show lines and tables to people, and write them as Markdown where they asked for a file.
+    """Show a result, and write it as Markdown where a file is asked for.
 
     Args:
         lines: Lines printed first.
@@ -182,6 +183,7 @@ def show_result(
         out: File for the Markdown, or None for none.
         markdown: Returns the file's text.
         json: Whether stdout is to carry JSON.
+        data: What it carries.
 
     Raises:
         OSError: The file cannot be written.
@@ -196,6 +198,8 @@ def show_result(
     if out is not None:
         write_text_atomic(out, markdown())
         screen.print(f"Markdown: {out}")
+    if json:
+        emit_json(data)
 
 
 def plain(value: Any) -> Any:

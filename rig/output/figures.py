@@ -43,9 +43,8 @@ LETTERS = 100
 def _drawn(figure: Figure, caption: str) -> Markup:
     """Return a figure as an SVG element that refers to nothing outside itself."""
     buffer = io.StringIO()
-    salt = sha256(caption.encode()).hexdigest()[
-        :8
-    ]  # keeps the clip paths and markers of two figures apart
+    # keeps the clip paths and markers of two figures apart
+    salt = sha256(caption.encode()).hexdigest()[:8]
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with mpl.rc_context({**_STYLE, "svg.hashsalt": salt}):
         figure.savefig(buffer, format="svg", metadata=nothing)

@@ -32,11 +32,6 @@ class RunWatch:
         recordings = list(open_campaign(path).evidence)
         return " ".join(filter(None, (_after(*one, recordings) for one in self.watches)))
 
-    @property
-    def fits(self) -> bool:
-        """Whether every model fits so far."""
-        return all(_fits(sights) for _, sights in self.watches)
-
     def to_json(self) -> list[dict[str, Any]]:
         """Return the state of each model in plain JSON types."""
         return [

@@ -101,13 +101,10 @@ def _parameters(record: CalibrationRecord, earlier: Sequence[CalibrationRecord])
         " expanded uncertainty; above 1 the two disagree."
     )
     if record.fit.residual_rms is not None:
-        note = f"Residual {with_unit(record.fit.residual_rms, _unit(record))} rms. {note}"
+        unit = parameter_unit(record.channel, record)
+        note = f"Residual {with_unit(record.fit.residual_rms, unit)} rms. {note}"
     columns = ["parameter", "value", "uncertainty", "before", "E_n"]
     return TextTable(f"{record.channel} from {record.input}", columns, rows, note)
-
-
-def _unit(record: CalibrationRecord) -> str:
-    return parameter_unit(record.channel, record)
 
 
 def _residuals(residuals: Residuals) -> Chart:

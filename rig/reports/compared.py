@@ -22,8 +22,7 @@ def lines(found: Comparison) -> list[str]:
         ratio = min(found.rmse) / max(found.rmse)
         name = found.sides[found.better].file
         said.append(f"{name} is better: {ratio:.2f} times the error (p {found.p:.2g}).")
-    for side in (a, b):
-        said.append(_origin(side))
+    said += [_origin(side) for side in (a, b)]
     if found.left_out:
         said.append(f"Without a valid closing sample, left out: {', '.join(found.left_out)}.")
     return said
@@ -33,8 +32,8 @@ def _origin(side: Side) -> str:
     if side.origin is None:
         return f"{side.file} ({side.hash}) does not state what it was made from."
     origin = side.origin
-    made = f"{side.file} ({side.hash}): made {origin.made_at} by {origin.code} on "
-    made += f"{len(origin.data)} runs"
+    runs = f"{len(origin.data)} runs"
+    made = f"{side.file} ({side.hash}): made {origin.made_at} by {origin.code} on {runs}"
     if origin.adapted_from:
         made += f", adapted from {origin.adapted_from}"
     if side.seen:
@@ -53,17 +52,13 @@ def tables(found: Comparison) -> list[TextTable]:
     columns = [f"{found.target}, {unit}", "runs", *names, "ratio"]
     rows = [_row("all", found.runs, scale)]
     for name in WHERE:
-        values = [run.conditions.get(name) for run in found.runs]
-        levels = sorted({value for value in values if value is not None})
-        if len(levels) > 1:
-            rows += [
-                _row(
-                    f"{name} {level:g}",
-                    [r for r, v in zip(found.runs, values, strict=True) if v == level],
-                    scale,
-                )
-                for level in levels
-            ]
+        by_level: dict[float, list[RunErrors]] = {}
+        for run in found.runs:
+            if name in run.conditions:
+                by_level.setdefault(run.conditions[name], []).append(run)
+        if len(by_level) > 1:
+            levels = sorted(by_level.items())
+            rows += [_row(f"{name} {level:g}", runs, scale) for level, runs in levels]
     return [
         TextTable("RMS error on closing samples", columns, rows),
         _by_run(found, names, unit, scale),

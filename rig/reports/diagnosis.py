@@ -3,13 +3,12 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from estimation.causes.verdict import Answer
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.files import write_text_atomic
-from estimation.model import Model
 from rig.diagnosis.traces import Traces, traces
 from rig.output.charts import embedded, scripts
 from rig.output.provenance import Provenance
@@ -40,25 +39,6 @@ CONFIDENCE = (
     "Confidence is the posterior probability of the name among all candidates. It is not calibrated"
     " yet; answers that were sure and wrong are counted in docs/results/diagnosis-versions.md."
 )
-
-
-@dataclass(frozen=True)
-class Card:
-    """One finding for the person at the bench.
-
-    Attributes:
-        title: What it is, in plain words.
-        verdict: What is claimed of it.
-        facts: Name and text of each fact: size, error, confidence, alternatives.
-        check: What to check at the rig.
-        command: Command that describes the effect; empty without a name.
-    """
-
-    title: str
-    verdict: str
-    facts: Sequence[tuple[str, str]]
-    check: str
-    command: str
 
 
 def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
@@ -133,8 +113,14 @@ def write(
     return said
 
 
-def card(finding: Finding, diagnosis: Diagnosis) -> Card:
-    """Return a finding as the person at the bench needs it."""
+def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return a finding as the person at the bench needs it.
+
+    Returns:
+        What it is in plain words, the verdict, name and text of each fact (size, error, confidence,
+        alternatives), what to check at the rig, and the command that describes the effect, empty
+        without a name.
+    """
     scale, unit = display(diagnosis.unit[finding.balance], finding.rmse_before)
     named = finding.verdict in ("identified", "one_of")
     variables = " and ".join(v.replace("_", " ") for v in finding.depends_on)
@@ -163,13 +149,13 @@ def card(finding: Finding, diagnosis: Diagnosis) -> Card:
     if not named and not variables:
         title = VERDICTS[finding.verdict]
     title = title or finding.family
-    return Card(
-        title[0].upper() + title[1:],
-        VERDICTS[finding.verdict],
-        facts,
-        check_of(finding),
-        f"rig effects {finding.family}" if named else "",
-    )
+    return {
+        "title": title[0].upper() + title[1:],
+        "verdict": VERDICTS[finding.verdict],
+        "facts": facts,
+        "check": check_of(finding),
+        "command": f"rig effects {finding.family}" if named else "",
+    }
 
 
 def error_table(diagnosis: Diagnosis) -> TextTable:
@@ -183,14 +169,9 @@ def error_table(diagnosis: Diagnosis) -> TextTable:
             ratio += f" ({low:.2f} to {high:.2f})"
         floor = diagnosis.noise_floor.get(name)
         values = (error.before, error.after, error.with_means_before, error.with_means_after)
-        rows.append(
-            [
-                f"{name}, {unit}",
-                *(f"{scale * v:.3g}" for v in values),
-                ratio,
-                "" if floor is None else f"{scale * floor:.3g}",
-            ]
-        )
+        errors = (f"{scale * value:.3g}" for value in values)
+        noise = "" if floor is None else f"{scale * floor:.3g}"
+        rows.append([f"{name}, {unit}", *errors, ratio, noise])
     columns = ["equation", "before", "after", "before, with means", "after, with means"]
     return TextTable(
         "Error on the held-out test runs",
@@ -240,8 +221,13 @@ def _moved(diagnosis: Diagnosis, signals: Traces) -> list[TextTable]:
     """Return the declared parameters of each equation before and after the findings."""
     shown = []
     for name, parameters in diagnosis.moved.items():
-        known = signals.equations.get(name)
-        units = _units(known.model) if known else {}
+        known = [signals.equations[name].model] if name in signals.equations else []
+        units = {
+            f"{term.effect.id}.{parameter.name}": term.unit(parameter, model.target)
+            for model in known
+            for term in model.terms
+            for parameter in term.parameters
+        }
         rows = []
         for key, value in parameters.items():
             scale, unit = display(units.get(key, ""), value["before"])
@@ -251,11 +237,3 @@ def _moved(diagnosis: Diagnosis, signals: Traces) -> list[TextTable]:
             columns = ["parameter", "before", "after", "unit"]
             shown.append(TextTable(f"Declared parameters: {name}", columns, rows))
     return shown
-
-
-def _units(model: Model) -> dict[str, str]:
-    return {
-        f"{term.effect.id}.{parameter.name}": term.unit(parameter, model.target)
-        for term in model.terms
-        for parameter in term.parameters
-    }

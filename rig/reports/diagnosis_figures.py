@@ -13,6 +13,7 @@ from rig.reports.diagnosis_words import display
 
 BINS = 48
 SIDES = ("before", "after")
+NAMES = {"before": "declared model", "after": "with the findings"}
 
 
 def charts(diagnosis: Diagnosis, traces: Traces) -> list[Chart]:
@@ -94,15 +95,13 @@ def _with_band(
     band = {"role": side, "band": True}
     lower = line(x, low, f"{side}, 5 %", band, unit, legend=False)
     upper = line(x, high, f"{side}, 95 %", band, unit, legend=False)
-    name = {"before": "declared model", "after": "with the findings"}[side]
-    return [lower, {**upper, "fill": "tonexty"}, line(x, mean, name, {"role": side}, unit)]
+    return [lower, {**upper, "fill": "tonexty"}, line(x, mean, NAMES[side], {"role": side}, unit)]
 
 
 def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
     """Draw the error of each held-out test run before and after."""
     scale, unit = display(diagnosis.unit[name], error.before)
     lines: list[Line] = []
-    names = {"before": "declared model", "after": "with the findings"}
     by_side = {"before": error.by_run_before, "after": error.by_run_after}
     for side in _sides(error):
         by_run = by_side[side]
@@ -111,7 +110,7 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
                 "type": "bar",
                 "x": list(by_run),
                 "y": numbers(scale * np.array(list(by_run.values()))),
-                "name": names[side],
+                "name": NAMES[side],
                 "meta": {"role": side},
                 "hovertemplate": f"%{{y:.3g}} {unit}",
             }
@@ -119,16 +118,17 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
     floor = diagnosis.noise_floor.get(name)
     if floor is not None and error.by_run_before:
         runs = list(error.by_run_before)
-        level = {
-            "type": "scatter",
-            "mode": "lines",
-            "x": [runs[0], runs[-1]],
-            "y": [scale * floor] * 2,
-            "name": "noise floor",
-            "meta": {"role": "level"},
-            "hovertemplate": f"%{{y:.3g}} {unit}",
-        }
-        lines.append(level)
+        lines.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "x": [runs[0], runs[-1]],
+                "y": [scale * floor] * 2,
+                "name": "noise floor",
+                "meta": {"role": "level"},
+                "hovertemplate": f"%{{y:.3g}} {unit}",
+            }
+        )
     better = sum(error.by_run_after[run] < one for run, one in error.by_run_before.items())
     judgement = (
         f"The error is lower in {better} of {len(error.by_run_before)} held-out test runs:"
@@ -162,7 +162,7 @@ def _over_time(name: str, shown: EquationTraces, sides: tuple[str, ...]) -> Char
     """Draw measured and estimated signal and the residual of one run, which a reader chooses."""
     scale, unit = display(shown.model.unit, float(np.max(np.abs(shown.runs[0].measured))))
     label, _ = words(shown.model.target)
-    runs = sorted(shown.runs, key=_error_after)
+    runs = sorted(shown.runs, key=lambda run: float(np.std(run.after)))
     middle = runs.pop(len(runs) // 2)
     choices = {run.run: _signals(run, scale, unit, sides) for run in (middle, *runs)}
     layout = {
@@ -181,24 +181,17 @@ def _over_time(name: str, shown: EquationTraces, sides: tuple[str, ...]) -> Char
     return Chart(f"time-{name}", title, "", caption, layout, choices=choices)
 
 
-def _error_after(run: RunTrace) -> float:
-    return float(np.std(run.after))
-
-
 def _signals(run: RunTrace, scale: float, unit: str, sides: tuple[str, ...]) -> list[Line]:
     gaps = np.diff(run.time_s, prepend=run.time_s[0]) > 3 * np.median(np.diff(run.time_s))
     measured = scale * run.measured
-    names = {"measured": "measured", "before": "declared model", "after": "with the findings"}
     left = {side: np.where(gaps, np.nan, scale * getattr(run, side)) for side in sides}
     time_s = thinned(run.time_s)
-    lines: list[Line] = [
-        line(time_s, thinned(measured), names["measured"], {"role": "measured"}, unit)
-    ]
+    lines: list[Line] = [line(time_s, thinned(measured), "measured", {"role": "measured"}, unit)]
     for side in sides:
         values = thinned(measured - left[side])
-        lines.append(line(time_s, values, names[side], {"role": side}, unit))
+        lines.append(line(time_s, values, NAMES[side], {"role": side}, unit))
     for side in sides:
         residual = thinned(left[side])
-        one = line(time_s, residual, f"residual, {names[side]}", {"role": side}, unit)
+        one = line(time_s, residual, f"residual, {NAMES[side]}", {"role": side}, unit)
         lines.append({**one, "yaxis": "y2", "showlegend": False})
     return lines
