@@ -89,7 +89,15 @@ def find_payload(
         ArmError: A run has too few periods.
     """
     for run in runs:
-        _check_mounting(run.name)
+        stated = [word for word in OTHER_MOUNTINGS if word in run.name.lower()]
+        if stated:
+            raise DataError(
+                f"The run {run.name!r} states the mounting {stated[0]!r}, whose geometry is not"
+                " modelled.",
+                "The mass is taken to be fixed on the base of the insertion axis. Torque shows mass"
+                " times distance from the joint's axis, so another place gives another mass.",
+                "Leave the run out.",
+            )
     tried = [effect for effect in candidates(PSM) if effect.name in EFFECTS]
     kept = [effect.name for effect in tried]
     fitted = prepare(model, tried, DAMPING)
@@ -108,17 +116,6 @@ def find_payload(
         masses=tuple(masses),
         provenance=Provenance.now(0),
     )
-
-
-def _check_mounting(name: str) -> None:
-    stated = [word for word in OTHER_MOUNTINGS if word in name.lower()]
-    if stated:
-        raise DataError(
-            f"The run {name!r} states the mounting {stated[0]!r}, whose geometry is not modelled.",
-            "The mass is taken to be fixed on the base of the insertion axis. Torque shows mass "
-            "times distance from the joint's axis, so another place gives another mass.",
-            "Leave the run out.",
-        )
 
 
 def _mass(

@@ -18,12 +18,9 @@ def runs_in(paths: Sequence[Path]) -> list[IndexedRun]:
         try:
             heads += heads_of([path])
         except NotALogError as error:
-            runs.append(_unreadable(path, str(error)))
+            why, name = str(error), path.name
+            runs.append(IndexedRun(name, path.stem, "", "", "", "", {}, "", why, 0, 0, None, why))
     return [*runs, *map(_indexed, standing(heads))]
-
-
-def _unreadable(path: Path, why: str) -> IndexedRun:
-    return IndexedRun(path.name, path.stem, "", "", "", "", {}, "", why, 0, 0, None, why)
 
 
 def _indexed(log: LogFile) -> IndexedRun:

@@ -109,7 +109,6 @@ def _refuse_unkept(store: CalibrationStore, folder: Path) -> None:
 
 
 def _refuse_idle_force_sensor(procedure: Procedure, settings: Config, how: Keeping) -> None:
-    """Refuse a force sensor that the session would not read."""
     if how.force_sensor is None:
         return
     if how.raw is not None:

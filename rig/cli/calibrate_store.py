@@ -90,7 +90,19 @@ def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
             made = f"{r.kind}, {r.made:%Y-%m-%d %H:%M} by {r.operator}{whom}"
             mark = "*" if is_active else " "
             said.append(f"{mark} {r.content_hash}  {r.channel}  {made}: {main_parameter(r)}")
-            listed.append(_summary(r) | {"active": is_active, "store": kept.folder})
+            listed.append(
+                {
+                    "hash": r.content_hash,
+                    "kind": r.kind,
+                    "channel": r.channel,
+                    "instrument": r.instrument,
+                    "made_at": r.made_at,
+                    "operator": r.operator,
+                    "parameters": r.fit.parameters,
+                    "active": is_active,
+                    "store": kept.folder,
+                }
+            )
     none = "No records yet. `rig calibrate torque` makes one, `add` takes a certificate."
     kept = store_of(store)
     data = {"store": kept.folder, "records": listed, "choices": kept.choices()}
@@ -206,18 +218,6 @@ def _serials(words: list[str]) -> dict[str, str]:
     if len(pairs) != len(words) or not all(k and v for k, v in pairs.items()):
         raise UsageError("A serial number is given as DEVICE=SERIAL.", f"Given: {words}.")
     return pairs
-
-
-def _summary(record: "CalibrationRecord") -> dict[str, Any]:
-    return {
-        "hash": record.content_hash,
-        "kind": record.kind,
-        "channel": record.channel,
-        "instrument": record.instrument,
-        "made_at": record.made_at,
-        "operator": record.operator,
-        "parameters": record.fit.parameters,
-    }
 
 
 def _in_words(record: "CalibrationRecord") -> dict[str, Any]:

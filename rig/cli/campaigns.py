@@ -63,8 +63,11 @@ def campaigns(
     from rig.campaigns import search
 
     whole = _indexed(root, rebuild)
-    named = _named(whole, terms or [], root) if diagnose or open_ or compare else []
-    found = named or search.search(whole, terms or [])
+    by_name = {str(campaign.folder.relative_to(root)): campaign for campaign in whole}
+    if (diagnose or open_ or compare) and terms and all(term in by_name for term in terms):
+        found = [by_name[term] for term in terms]
+    else:
+        found = search.search(whole, terms or [])
     recorded = [campaign for campaign in found if campaign.runs]
     if refit is not None or (diagnose and len(recorded) > 1):
         from rig.cli.campaigns_each import show_diagnoses, show_refit
@@ -120,20 +123,8 @@ def _listed(
     return [*shown, f"{len(found)} of {of} campaigns, {count} runs."]
 
 
-def _named(
-    whole: Sequence["IndexedCampaign"], terms: list[str], root: Path
-) -> "list[IndexedCampaign]":
-    """Return the campaigns whose folders the terms name; none unless every term names one."""
-    by_name = {str(campaign.folder.relative_to(root)): campaign for campaign in whole}
-    return [by_name[term] for term in terms] if all(term in by_name for term in terms) else []
-
-
 def _only(found: Sequence["IndexedCampaign"]) -> "IndexedCampaign":
-    """Return the single campaign of a search.
-
-    Raises:
-        UsageError: There is none, or there are several.
-    """
+    """Return the single campaign of a search; none and several are refused."""
     if len(found) == 1:
         return found[0]
     names = ", ".join(str(campaign.folder) for campaign in found[:5])

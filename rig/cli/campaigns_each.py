@@ -93,7 +93,6 @@ def show_refit(
 def _changes(
     good: Mapping[Path, Refit], dates: Mapping[Path, str], root: Path
 ) -> dict[str, list[dict[str, Any]]]:
-    """Return the changes of each parameter that has any."""
     folders = list(good)
     found = {}
     for name in next(iter(good.values())).values if good else ():

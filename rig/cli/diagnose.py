@@ -130,7 +130,6 @@ def _kept_with(path: Path) -> Path | None:
 def _plan(
     path: Path, model: Path | None, balance: str | None, machine: Path | None, json_: bool
 ) -> None:
-    """Show what runs of a protocol can distinguish."""
     from rig.diagnosis.plan import plan_of, sentences
     from rig.output.console import progress
 

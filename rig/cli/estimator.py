@@ -113,7 +113,6 @@ def adapt(
 
 
 def _errors(result: "Adaptation") -> "TextTable":
-    """Return the errors on the runs not used."""
     is_torque = result.target.endswith("_n_m")
     unit, scale = ("mN m", 1e3) if is_torque else ("deg", degrees(1.0))
     named = {

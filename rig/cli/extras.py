@@ -23,7 +23,9 @@ def install_command(extra: str, checkout: Path = CHECKOUT) -> list[str]:
     pip = [_short(Path(sys.executable)), "-m", "pip", "install"]
     if (checkout / "pyproject.toml").is_file():
         return [*pip, "-e", f"{_short(checkout)}[{extra}]"]
-    return [*pip, *_requirements(extra)]
+    marker = re.compile(rf"""\s*;.*\bextra\s*==\s*['"]{re.escape(extra)}['"].*""")
+    needed = (line for line in metadata.requires("rig") or () if marker.search(line))
+    return [*pip, *(marker.sub("", line) for line in needed)]
 
 
 def as_typed(words: list[str]) -> str:
@@ -42,11 +44,6 @@ def offer(extra: str) -> bool:
     if not typer.confirm("Install it now?", default=False, err=True):
         return False
     return subprocess.run(install_command(extra), check=False).returncode == 0  # noqa: S603
-
-
-def _requirements(extra: str) -> list[str]:
-    marker = re.compile(rf"""\s*;.*\bextra\s*==\s*['"]{re.escape(extra)}['"].*""")
-    return [marker.sub("", line) for line in metadata.requires("rig") or () if marker.search(line)]
 
 
 def _short(path: Path) -> str:

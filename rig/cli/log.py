@@ -83,10 +83,14 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
 def _heads(path: Path) -> "tuple[list[LogFile], list[str]]":
     """Return the heads of the logs at a path, and the files of a folder that are no logs."""
     from rig.log.attempts import heads_of
+    from rig.log.check import logs_in
     from rig.log.scan import NotALogError
 
     heads, foreign = [], []
-    for item in _logs(path):
+    logs = logs_in(path)
+    if not logs:
+        raise UsageError(f"There is no log in {path}.", fix="Name a file or another folder.")
+    for item in logs:
         try:
             heads += heads_of([item])
         except NotALogError as error:
@@ -136,18 +140,7 @@ def repair(
 log_app.command()(export)
 
 
-def _logs(path: Path) -> list[Path]:
-    """Return the logs at a path, at least one."""
-    from rig.log.check import logs_in
-
-    found = logs_in(path)
-    if not found:
-        raise UsageError(f"There is no log in {path}.", fix="Name a file or another folder.")
-    return found
-
-
 def _described(log: "LogFile") -> dict[str, Any]:
-    """Return the result of `info` for a log."""
     from rig.log.check import report_on, stream_time_s
     from rig.log.convert import exclusion
 
@@ -185,7 +178,6 @@ def _described(log: "LogFile") -> dict[str, Any]:
 
 
 def _info_of(log: dict[str, Any]) -> Iterator[str]:
-    """Yield the result of `info` for a log, for people."""
     run, end = log["run"], log["end"]
     yield f"{log['path']}: {'; '.join(log['problems']) or 'complete, nothing lost'}"
     yield f"  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}"

@@ -56,12 +56,16 @@ def export(
     the estimate next to the sensor are written into a folder, for Foxglove and PlotJuggler.
     """
     from rig.cli.import_ import write_logs
+    from rig.cli.view import with_model
+    from rig.importers.registry import open_campaign
     from rig.log.export import ExportFormat, export_log
 
     if model or path.is_dir() or not path.name.endswith((".mcap", ".part")):
         if topic or calibration or record:
             raise UsageError("--topic, --calibration and --record are of a single log as it is.")
-        campaign = _campaign(path, model)
+        whole = open_campaign(path)
+        say_left_out(path, whole)
+        campaign = with_model(whole.evidence, model) if model else whole.evidence
         if model and format_name == "mcap":
             written = write_logs(list(campaign), out or Path(f"{path.resolve().name}.estimated"))
             _said(written, campaign, json)
@@ -76,16 +80,6 @@ def export(
     present(json, data, *(f"wrote {target}" for target in written))
 
 
-def _campaign(path: Path, model: Path | None) -> "Campaign":
-    """Return the runs at a path that count, with the estimate of a model."""
-    from rig.cli.view import with_model
-    from rig.importers.registry import open_campaign
-
-    campaign = open_campaign(path)
-    say_left_out(path, campaign)
-    return with_model(campaign.evidence, model) if model else campaign.evidence
-
-
 def _said(written: list[Path], campaign: "Campaign", json: bool) -> None:
     where = written[0] if len(written) == 1 else written[0].parent
     data = {"written": written, "runs": campaign.names}
@@ -95,7 +89,6 @@ def _said(written: list[Path], campaign: "Campaign", json: bool) -> None:
 def _export_campaign(
     path: Path, campaign: "Campaign", format_name: str, out: Path | None, force: bool, json: bool
 ) -> None:
-    """Write all runs as one table."""
     from rig.importers.tidy import write_tidy
     from rig.log.export import ExportFormat
 
@@ -108,11 +101,6 @@ def _export_campaign(
 
 
 def _known(name: str, what: str, formats: "Iterable[ExportFormat]") -> "ExportFormat":
-    """Return the format of a name.
-
-    Raises:
-        UsageError: There is none.
-    """
     known = {one.value: one for one in formats}
     if name not in known:
         fix = f"Choose one of {', '.join(known)}."

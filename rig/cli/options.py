@@ -66,18 +66,13 @@ def _campaigns() -> list[Path]:
     return sorted(folders, reverse=True)
 
 
-def _paths(start: str, pattern: str) -> list[str]:
-    """Return the paths in the folder that was typed so far."""
-    typed = Path(start or ".")
-    folder = typed if start.endswith("/") or not start else typed.parent
-    return sorted(map(str, folder.glob(pattern))) if folder.is_dir() else []
-
-
 def _completed(names: Callable[[], list[str]], pattern: str = "") -> Callable[[str], list[str]]:
     """Return a completion of names, and with a pattern of paths."""
 
     def complete(incomplete: str) -> list[str]:
-        files = _paths(incomplete, pattern) if pattern else []
+        typed = Path(incomplete or ".")
+        folder = typed if incomplete.endswith("/") or not incomplete else typed.parent
+        files = sorted(map(str, folder.glob(pattern))) if pattern and folder.is_dir() else []
         found = dict.fromkeys([*names(), *files])
         return [name for name in found if name.startswith(incomplete)]
 

@@ -100,7 +100,6 @@ def _usual(recording: "Recording") -> tuple[str, ...]:
 
 
 def _core(log: Path, config: Path | None, json: bool) -> int:
-    """Run the core again with a log's commands."""
     from rig.configuration.config import load_config
     from rig.recording.core_replay import replay_core
 

@@ -12,9 +12,7 @@ from rig.cli.study_arm import StateFolder, arm_studies, counted, described, resu
 from rig.output.console import JsonFlag, progress
 
 if TYPE_CHECKING:
-    from estimation.campaign import Campaign
     from rig.studies.oneill.kinds import KindRow
-    from rig.studies.oneill.networks import NetworkStudy, Training
     from rig.studies.oneill.states import Shown
 
 study_app = typer.Typer(
@@ -88,12 +86,16 @@ def oneill(
     every_kind: tuple[KindRow, ...] = ()
     shown: dict[str, list[Shown]] = {}
     if networks:
-        from rig.studies.oneill.networks import Training
+        from rig.studies.oneill.networks import Training, network_tables, run_networks
 
         kept = state or Path.home() / ".cache" / "rig" / "oneill"
         limit = float("inf") if minutes is None else minutes
         training = Training(kept, every=every, seed=seed, workers=workers, minutes=limit)
-        deep = _train(campaign, data, training)
+        with progress() as bar:
+            task = bar.add_task("closing samples", total=None)
+            tables, notes = network_tables(campaign, data, on_run=lambda name: bar.advance(task))
+        with counted("networks") as on_network:
+            deep = run_networks(tables, training, notes, on_network)
     if states:
         from rig.studies.oneill.states import run_states
 
@@ -108,16 +110,6 @@ def oneill(
     found = {"networks": deep, "states": physical, "kinds": every_kind or None}
     whole = asdict(study) | {name: each for name, each in found.items() if each is not None}
     show(whole, page(study, deep, physical, every_kind, shown), out, json, figures)
-
-
-def _train(campaign: "Campaign", data: Path | None, training: "Training") -> "NetworkStudy":
-    from rig.studies.oneill.networks import network_tables, run_networks
-
-    with progress() as bar:
-        task = bar.add_task("closing samples", total=None)
-        tables, notes = network_tables(campaign, data, on_run=lambda name: bar.advance(task))
-    with counted("networks") as on_network:
-        return run_networks(tables, training, notes, on_network)
 
 
 @study_app.command()

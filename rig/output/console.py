@@ -143,8 +143,6 @@ def stages(
     from rich.text import Text
 
     class Left(ProgressColumn):
-        """The time left, next to the stage at work."""
-
         def render(self, task: "Task") -> Text:
             if task.finished or task.elapsed is None:
                 return Text("")

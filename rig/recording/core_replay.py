@@ -86,11 +86,12 @@ def replay_core(path: Path, config: Config | None = None) -> CoreReplay:
     details = log.run.details if log.run else {}
     build = details.get("firmware_build", "")
     same, difference = _compared(logged, again)
+    codes = dict.fromkeys((logged["status"].astype(np.int64) >> TRIP_SHIFT).tolist())
     return CoreReplay(
         len(logged),
         same,
         difference,
-        _trips(logged["status"]),
+        tuple(Trip(code).name.lower().replace("_", " ") for code in codes if code),
         f"{details.get('firmware_version', 'unknown')}, build {build or 'unknown'}",
         build == f"{board.build_hash:08x}",
         sum(len(data) for _, data in commands),
@@ -185,9 +186,3 @@ def _compared(logged: NDArray[np.void], again: NDArray[np.void]) -> tuple[int, s
 
 def _keys(samples: NDArray[np.void]) -> list[tuple[int, int]]:
     return list(zip(samples["sequence"].tolist(), samples["tick_us"].tolist(), strict=True))
-
-
-def _trips(status: NDArray[np.integer]) -> tuple[str, ...]:
-    codes = status.astype(np.int64) >> TRIP_SHIFT
-    seen = dict.fromkeys(int(code) for code in codes if code)
-    return tuple(Trip(code).name.lower().replace("_", " ") for code in seen)

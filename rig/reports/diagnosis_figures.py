@@ -99,7 +99,6 @@ def _with_band(
 
 
 def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
-    """Draw the error of each held-out test run before and after."""
     scale, unit = display(diagnosis.unit[name], error.before)
     lines: list[Line] = []
     by_side = {"before": error.by_run_before, "after": error.by_run_after}

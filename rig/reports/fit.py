@@ -1,7 +1,7 @@
 """A fitted model's parameters as a table, and its error on held-out runs in a sentence."""
 
 from estimation.cross_validation import HeldOutError
-from estimation.model import Estimate, Model
+from estimation.model import Model
 from rig.output.table import TextTable, counted
 from rig.reports.diagnosis_words import display
 
@@ -15,7 +15,8 @@ def parameter_table(model: Model) -> TextTable:
             unit = term.unit(parameter, model.target)
             side = "+" if term.sign == 1 else "-"
             name = f"{term.effect.id}, {parameter.name}"
-            rows.append([name, side, f"{known.value:.4g}", _spread(known), unit])
+            spread = "" if known.spread is None else f"{known.spread:.2g}"
+            rows.append([name, side, f"{known.value:.4g}", spread, unit])
     evidence = model.evidence
     note = ""
     if evidence is not None:
@@ -36,7 +37,3 @@ def held_out_sentence(model: Model, error: HeldOutError) -> str:
         f"{model.target} on {error.runs} runs not fitted on: RMSE {scale * error.rmse:.3g} {unit}"
         f" with each run's mean removed, {scale * error.rmse_with_means:.3g} {unit} with means."
     )
-
-
-def _spread(known: Estimate) -> str:
-    return "" if known.spread is None else f"{known.spread:.2g}"

@@ -71,7 +71,6 @@ def is_false(finding: Named, family: str) -> bool:
 
 
 def _lead(study: DelSolStudy) -> str:
-    """Return how ours compares, on how many arms the hoses were found, and what was false."""
     found = [(f, family) for family, arms in _by_family(study).items() for arm in arms for f in arm]
     hoses = sum(map(_has_hoses, study.named))
     false = [f for f, family in found if is_false(f, family)]

@@ -51,7 +51,6 @@ def page(study: IntervalStudy) -> Page:
 
 
 def _lead(study: IntervalStudy) -> list[str]:
-    """Return the result in sentences."""
     usual = _usual(study)
     found = [
         "Products of physical states from the measured current; aimed at is 95 %. A row is an"

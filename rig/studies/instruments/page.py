@@ -18,22 +18,17 @@ NOTE = (
 
 def page(study: InstrumentStudy) -> Page:
     """Return the study's page."""
-    tables = [_table(study), _drawn_table(study)]
-    return Page(TITLE, [_lead(study)], tables, study.provenance)
-
-
-def _lead(study: InstrumentStudy) -> str:
     parts = [
         f"{1e3 * median(row.rmse_n_m):.2f} mN m on {row.instrument} with {row.runs}"
         f" run{'s' if row.runs > 1 else ''}"
         for row in study.drawn
     ]
     reach = f", states reach {', '.join(parts)}" if parts else ""
-    return f"Fitted on {study.source} and adapted{reach}: the median over choices of these runs."
+    lead = f"Fitted on {study.source} and adapted{reach}: the median over choices of these runs."
+    return Page(TITLE, [lead], [_table(study), _drawn_table(study)], study.provenance)
 
 
 def _drawn_table(study: InstrumentStudy) -> TextTable:
-    """Return the effect of the choice of the runs on the errors."""
     cells = [
         [
             row.instrument,
@@ -54,7 +49,6 @@ def _drawn_table(study: InstrumentStudy) -> TextTable:
 
 
 def _table(study: InstrumentStudy) -> TextTable:
-    """Return the errors."""
     cells = []
     for row in study.rows:
         found = row.result

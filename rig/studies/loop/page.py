@@ -9,22 +9,17 @@ TITLE = "The loop closed on measured data: from a linear model to named effects"
 
 def page(study: LoopStudy) -> Page:
     """Return the study's page."""
-    tables = [_errors(study), *(_effects(row) for row in study.rows)]
-    return Page(TITLE, [_lead(study), *_notes(study)], tables, study.provenance)
-
-
-def _lead(study: LoopStudy) -> str:
-    """Return the study's result in one sentence."""
     parts = [
         f"{row.task.name} over {row.task.samples} samples {_mn_m(row.linear)} to {_mn_m(row.rmse)}"
         for row in study.rows
     ]
     runs = len(study.sealed.confirm)
-    return f"On {runs} held-out test runs, errors in mN m before and after: {'; '.join(parts)}."
+    lead = f"On {runs} held-out test runs, errors in mN m before and after: {'; '.join(parts)}."
+    tables = [_errors(study), *(_effects(row) for row in study.rows)]
+    return Page(TITLE, [lead, *_notes(study)], tables, study.provenance)
 
 
 def _notes(study: LoopStudy) -> list[str]:
-    """Return remarks for a comparison."""
     sealed = study.sealed
     found = [
         f"Data: {study.source}. {len(sealed.discover)} training runs, {len(sealed.confirm)} test"

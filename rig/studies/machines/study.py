@@ -120,7 +120,6 @@ def _published(folder: Path) -> list[tuple[str, Published]]:
 
 
 def _rows(case: Case, campaign: Campaign, seed: int) -> list[Row]:
-    """Return a row for each equation of a machine."""
     whole = equations_of(Path(case.machine))
     models = [model for model in whole if case.equation in ("", model.balance)]
     campaign = with_motion(campaign, models)

@@ -119,7 +119,6 @@ def _notes(study: Study) -> list[str]:
 
 
 def _held_out_table(study: Study) -> TextTable:
-    """Return the errors on runs, frequencies and power levels that were not fitted."""
     found: dict[str, dict[str, float]] = {}
     for row in study.rows:
         found.setdefault(row.surrogate, {})[row.protocol] = row.score.rmse
@@ -136,7 +135,6 @@ def _held_out_table(study: Study) -> TextTable:
 
 
 def _kinds_table(kinds: Sequence[KindRow]) -> TextTable:
-    """Return the errors of every kind of estimator."""
     found: dict[str, list[str]] = {}
     for row in kinds:
         found.setdefault(row.kind, [row.kind]).append(_mn_m(row.score.rmse))

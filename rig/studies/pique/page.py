@@ -45,7 +45,6 @@ def page(study: Study) -> Page:
 
 
 def _lead(study: Study) -> str:
-    """Return the study's result in one sentence or two."""
     models = list(dict.fromkeys(row.model for row in study.rows))
     before, after = (_mean(study, model) for model in (models[0], EFFECTS))
     return (
@@ -72,7 +71,6 @@ def _reached(study: Study) -> str:
 
 
 def _notes(study: Study) -> list[str]:
-    """Return remarks for a comparison."""
     first, second = study.paths
     return [
         "The torque is motor current times nominal constants: the arm has no torque sensor. Both"

@@ -77,17 +77,12 @@ def page(study: WrenchStudy) -> Page:
         ADJUSTED,
         coverage("pique", "wrench"),
     ]
-    paragraphs = [_lead(study), *NOTES]
-    return Page(TITLE, paragraphs, tables, study.provenance, lambda: _figures(study))
-
-
-def _lead(study: WrenchStudy) -> str:
-    """Return the study's result in a few sentences."""
     near = [word for table in TABLES for word in _near(study, table)]
-    return (
+    lead = (
         f"{verdict(_ratios(study))} On the arms that were matched to it the thesis' own method"
         f" lands within {WITHIN:.0%} of the thesis in {sum(near)} of {len(near)} columns."
     )
+    return Page(TITLE, [lead, *NOTES], tables, study.provenance, lambda: _figures(study))
 
 
 def _figures(study: WrenchStudy) -> Mapping[str, Markup]:

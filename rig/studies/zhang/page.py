@@ -110,19 +110,14 @@ def page(study: ZhangStudy) -> Page:
         ADJUSTED,
         coverage("zhang"),
     ]
-    paragraphs = [_lead(study), *NOTES]
-    return Page(TITLE, paragraphs, tables, study.provenance, lambda: _figures(study))
-
-
-def _lead(study: ZhangStudy) -> str:
-    """Return the study's result in a few sentences."""
     near = [word for condition in PAPER for word in study.near(condition) if word is not None]
     near += study.near_in_contact()
-    return (
+    lead = (
         f"{verdict(_ratios(study))} On the arms that were matched to it the paper's networks land"
         f" within {WITHIN:.0%} of the paper in {sum(near)} of {len(near)} numbers (median over"
         f" arms){_missed(study)}."
     )
+    return Page(TITLE, [lead, *NOTES], tables, study.provenance, lambda: _figures(study))
 
 
 def _figures(study: ZhangStudy) -> Mapping[str, Markup]:

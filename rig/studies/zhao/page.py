@@ -81,7 +81,6 @@ def page(study: Study, haptics: Sequence[Sequence[Answer]] = ()) -> Page:
 
 
 def _lead(study: Study) -> str:
-    """Return the study's result in a sentence or two."""
     near = (
         f" On the graspers that were matched to it ({study.prototype}) the paper's method lands"
         f" within {NEAR:.0%} of the paper's errors in"
@@ -93,7 +92,6 @@ def _lead(study: Study) -> str:
 
 
 def _notes(study: Study) -> list[str]:
-    """Return remarks for a comparison."""
     return [
         "No grasper was measured. A grasper's friction is the simulation's own, in proportion to"
         " the load, or the same times a table over one variable whose form is drawn for each axis."
