@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from estimation.channels import plain_name, unit_of
 from estimation.recording import FloatArray
 from rig.output.table import TextTable
 
@@ -79,11 +78,6 @@ def binned(
     mean = np.array([part.mean() for part in parts])
     spread = np.array([np.percentile(part, [5, 95]) for part in parts]).reshape(-1, 2)
     return centres, mean, spread[:, 0], spread[:, 1]
-
-
-def words(channel: str) -> tuple[str, str]:
-    """Return a channel's name without its unit's suffix, and that unit."""
-    return plain_name(channel), unit_of(channel)
 
 
 def axis(title: str, unit: str) -> dict[str, Any]:

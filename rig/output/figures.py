@@ -3,7 +3,6 @@
 import io
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -101,43 +100,35 @@ def over_time(
     return _drawn(figure, caption)
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One panel of a figure: values against a variable.
-
-    Attributes:
-        label: Name and unit of the variable.
-        x: The variable, shape (n,).
-        y: The values, shape (n,).
-        before: Values to compare with, shape (n,).
-    """
-
-    label: str
-    x: FloatArray
-    y: FloatArray
-    before: FloatArray
-
-
-def against(panels: Sequence[Panel], y_label: str, caption: str) -> Markup:
+def against(
+    variables: Mapping[str, FloatArray],
+    before: FloatArray,
+    after: FloatArray,
+    y_label: str,
+    caption: str,
+) -> Markup:
     """Draw values against several variables: mean and the middle 90 % in each of 24 bins.
 
     The bins cover the middle 98 % of each variable; those with under ten samples are left out.
 
     Args:
-        panels: The panels, side by side, on one scale.
+        variables: Name and unit of each variable to its values, shape (n,); the panels stand side
+            by side, on one scale.
+        before: Values to compare with, shape (n,).
+        after: The values, shape (n,).
         y_label: Name and unit of the values.
         caption: Description of the figure.
     """
-    figure, axes = _axes(7.2, 2.5, len(panels))
+    figure, axes = _axes(7.2, 2.5, len(variables))
+    series = [("before", before, COLOURS[1]), ("after", after, COLOURS[0])]
     with mpl.rc_context(_STYLE):
-        for ax, panel in zip(axes, panels, strict=True):
-            series = [("before", panel.before, COLOURS[1]), ("after", panel.y, COLOURS[0])]
+        for ax, (label, variable) in zip(axes, variables.items(), strict=True):
             for name, values, colour in series:
-                x, mean, low, high = binned(panel.x, values, 24)
+                x, mean, low, high = binned(variable, values, 24)
                 ax.fill_between(x, low, high, color=colour, alpha=0.25, linewidth=0)
                 ax.plot(x, mean, color=colour, linewidth=1.4, label=name)
             ax.axhline(0, color=_INK, linewidth=0.6)
-            ax.set_xlabel(panel.label)
+            ax.set_xlabel(label)
         axes[0].set_ylabel(y_label)
         _legend_above(axes[0])
         limits = [ax.get_ylim() for ax in axes]

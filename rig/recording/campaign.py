@@ -10,12 +10,12 @@ import itertools
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from calibration.zero import Drift, SensorZero, drift_verdicts
+from calibration.zero import Drift, drift_verdicts
 from estimation.files import write_text_atomic
 from rig.bench.session import Session
 from rig.configuration.config import Config
@@ -201,8 +201,18 @@ def _record_run(
     readings = session.play(*motion.setpoints)
     first = next(r for r in readings if len(_of_run(r, motion)))
     run_start_us = int(_of_run(first, motion).tick_us[0])
+    info = RunInfo(
+        name=plan.name,
+        conditions=plan.conditions,
+        notes=notes,
+        started_at_ns=epoch_ns + run_start_us * 1000,
+        duration_s=plan.duration_s,
+        zeros_before=mean_counts(before),
+        details=_clock_residuals(session),
+    )
+    _set_aside(path)
     with (
-        _new_log(session, plan, path, epoch_ns + run_start_us * 1000, before, notes) as log,
+        SessionLog(session, path, info, companions=session.companions) as log,
         _crossing_in(log, session, run_start_us),
     ):
         for reading in itertools.chain([first], readings):
@@ -222,7 +232,14 @@ def _record_run(
         drift = drift_verdicts(before, after, session.calibrations, limits)
         lost = session.counters["lost"] - lost_before
         result = RunResult(plan.name, path, samples, expected, lost, tuple(drift))
-        log.close(_end_of_run(result, after, session.counters))
+        end = RunEnd(
+            expected_samples=dict.fromkeys((SAMPLE, COUNTS), expected),
+            counters=session.counters,
+            zeros_after=mean_counts(after),
+            drift={d.channel: d.after - d.before for d in drift},
+            drift_verdict=f"drifted: {', '.join(result.drifted)}" if result.drifted else "steady",
+        )
+        log.close(end)
     return result
 
 
@@ -244,45 +261,12 @@ def _of_run(reading: Reading, motion: Motion) -> Reading:
     return reading.where((reading.setpoint >= motion.first) & (reading.setpoint < motion.last))
 
 
-def _new_log(
-    session: Session,
-    plan: Plan,
-    path: Path,
-    started_at_ns: int,
-    before: Mapping[str, SensorZero],
-    notes: str,
-) -> SessionLog:
-    info = RunInfo(
-        name=plan.name,
-        conditions=plan.conditions,
-        notes=notes,
-        started_at_ns=started_at_ns,
-        duration_s=plan.duration_s,
-        zeros_before=mean_counts(before),
-        details=_clock_residuals(session),
-    )
-    _set_aside(path)
-    return SessionLog(session, path, info, companions=session.companions)
-
-
 def _clock_residuals(session: Session) -> dict[str, str]:
     """Return how well each device's clock is known, as a log keeps it, s."""
     lines = {companion.name: companion.line for companion in session.companions}
     known = {name: line for name, line in lines.items() if line is not None}
     known["logger"] = session.clock.line
     return {f"clock_residual_s_{name}": f"{one.residual_s:.3g}" for name, one in known.items()}
-
-
-def _end_of_run(
-    result: RunResult, after: Mapping[str, SensorZero], counters: Mapping[str, int]
-) -> RunEnd:
-    return RunEnd(
-        expected_samples=dict.fromkeys((SAMPLE, COUNTS), result.expected),
-        counters=counters,
-        zeros_after=mean_counts(after),
-        drift={d.channel: d.after - d.before for d in result.drift},
-        drift_verdict="drifted: " + ", ".join(result.drifted) if result.drifted else "steady",
-    )
 
 
 def _log_path(folder: Path, plan: Plan) -> Path:

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
+from estimation.channels import plain_name, unit_of
 from estimation.diagnosis.result import Diagnosis, Error, Finding
 from estimation.recording import FloatArray
 from rig.diagnosis.traces import EquationTraces, RunTrace, Traces
-from rig.output.charts import Chart, Line, axis, binned, line, numbers, thinned, words
+from rig.output.charts import Chart, Line, axis, binned, line, numbers, thinned
 from rig.output.table import TextTable
 from rig.reports.diagnosis_words import display
 
@@ -40,7 +41,7 @@ def _sides(error: Error) -> tuple[str, ...]:
 
 def _profile(name: str, channel: str, finding: Finding, shown: EquationTraces) -> Chart:
     """Draw the residual of the held-out test runs over one channel, before and after."""
-    label, x_unit = words(channel)
+    label, x_unit = plain_name(channel), unit_of(channel)
     runs = shown.runs
     periodic = "order" in finding.parameters
     scale, unit = display(shown.model.unit, max(float(np.max(np.abs(r.before))) for r in runs))
@@ -160,7 +161,7 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
 def _over_time(name: str, shown: EquationTraces, sides: tuple[str, ...]) -> Chart:
     """Draw measured and estimated signal and the residual of one run, which a reader chooses."""
     scale, unit = display(shown.model.unit, float(np.max(np.abs(shown.runs[0].measured))))
-    label, _ = words(shown.model.target)
+    label = plain_name(shown.model.target)
     runs = sorted(shown.runs, key=lambda run: float(np.std(run.after)))
     middle = runs.pop(len(runs) // 2)
     choices = {run.run: _signals(run, scale, unit, sides) for run in (middle, *runs)}

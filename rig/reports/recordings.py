@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.channels import ESTIMATED, unit_of
+from estimation.channels import ESTIMATED, plain_name, unit_of
 from estimation.recording import FloatArray, Recording
-from rig.output.charts import Chart, axis, embedded, line, scripts, thinned, words
+from rig.output.charts import Chart, axis, embedded, line, scripts, thinned
 from rig.output.provenance import Provenance
 from rig.output.render import render
 from rig.output.table import TextTable, listed
@@ -75,13 +75,13 @@ def _lines(run: Recording, points: int) -> list[dict[str, Any]]:
     for name, values in run.columns.items():
         scale, unit = _shown(run, name)
         role = "after" if name.startswith(ESTIMATED) else ""
-        add(words(name)[0], scale * values, unit, "ratio" if unit == "1" else unit, role)
+        add(plain_name(name), scale * values, unit, "ratio" if unit == "1" else unit, role)
     for name, values in run.columns.items():
         target = name.removeprefix(ESTIMATED)
         if target != name and target in run.columns:
             scale, unit = _shown(run, name)
             left = scale * (run.columns[target] - values)
-            label = f"{words(target)[0]}, measured - estimated"
+            label = f"{plain_name(target)}, measured - estimated"
             add(label, left, unit, f"residual, {unit}", "before")
     if run.flags.any():
         add("flags", run.flags.astype(np.float64), "", "1 saturated, 2 stale, 4 missing, 8 suspect")

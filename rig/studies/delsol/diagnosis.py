@@ -77,11 +77,13 @@ def diagnosed(arm: HydraulicArm, rng: np.random.Generator) -> tuple[tuple[Named,
     )
     declared = {model.balance: len(model.terms) for model in balances.models}
     joints = [f"joint.{name.number}" for name in NAMES]
+    # a model that needs channels that a motion alone does not give is not used
+    given = {c for name in NAMES for c in (name.position, name.velocity, name.acceleration)}
     effects = tuple(
         (joints.index(model.balance), term)
         for model in found.models
         for term in model.terms[declared[model.balance] :]
-        if {*term.channels.values()} <= {*motion_channels()}
+        if {*term.channels.values()} <= given
     )
     return told, effects
 
@@ -107,8 +109,3 @@ def found_columns(effects: Effects, motion: Motion) -> FloatArray:
         for k, term in effects
     ]
     return np.concatenate([np.zeros((len(motion), JOINTS, 0)), *parts], axis=2)
-
-
-def motion_channels() -> tuple[str, ...]:
-    """Return the channels that a motion alone gives; a model that needs others is not used."""
-    return tuple(c for name in NAMES for c in (name.position, name.velocity, name.acceleration))

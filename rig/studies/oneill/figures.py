@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from estimation.recording import FloatArray
-from rig.output.figures import Panel, against, over_time
+from rig.output.figures import against, over_time
 from rig.studies.oneill.paper import SHOWN
 from rig.studies.oneill.states import Shown
 
@@ -40,8 +40,9 @@ def draw(shown: Mapping[str, Sequence[Shown]]) -> dict[str, tuple[str, Markup]]:
             for which in ("before", "after")
         )
         rows = np.concatenate([run.rows for run in runs])
-        panels = [Panel(label, rows[:, k], after, before) for label, k in VARIABLES.items()]
-        drawn[f"{stem}-error"] = caption, against(panels, f"error, {unit}", caption)
+        variables = {label: rows[:, k] for label, k in VARIABLES.items()}
+        figure = against(variables, before, after, f"error, {unit}", caption)
+        drawn[f"{stem}-error"] = caption, figure
     return drawn
 
 

@@ -13,18 +13,9 @@ from rig.arm.simulated import draw_arm
 from rig.output.provenance import Provenance
 from rig.studies.families import arm_of
 from rig.studies.seeds import Keeper, begin_learning, kept_outcomes
+from rig.studies.zhang import free
 from rig.studies.zhang.forces import Learnt, grasps, in_contact, turning
-from rig.studies.zhang.free import (
-    NETWORKS,
-    Cells,
-    figure_3,
-    fitted_physics,
-    free_runs,
-    of_family,
-    short_networks,
-    table_1,
-    table_2,
-)
+from rig.studies.zhang.free import NETWORKS, Cells
 from rig.studies.zhang.psm import with_instrument
 
 SCHEMA = "rig.study.zhang/2"
@@ -138,13 +129,13 @@ def one_arm(number: int) -> Outcome:
     """Do all experiments on one arm."""
     seed, family = arm_of(number)
     rng = np.random.default_rng([seed, STREAM])
-    forceps = of_family(with_instrument(rng, draw_arm(rng), "CF"), family, seed)
-    splits = {name: free_runs(forceps, rng, name == "M") for name in ("C", "M")}
-    networks, cells = table_1(splits, seed)
-    physics, ours = fitted_physics(forceps, splits)
-    cells |= ours | short_networks(splits, seed)
-    cells |= figure_3(forceps, rng)
-    gripper, other = table_2(forceps, rng, seed, family)
+    forceps = free.of_family(with_instrument(rng, draw_arm(rng), "CF"), family, seed)
+    splits = {name: free.free_runs(forceps, rng, name == "M") for name in ("C", "M")}
+    networks, cells = free.table_1(splits, seed)
+    physics, ours = free.fitted_physics(forceps, splits)
+    cells |= ours | free.short_networks(splits, seed)
+    cells |= free.figure_3(forceps, rng)
+    gripper, other = free.table_2(forceps, rng, seed, family)
     cells |= other
     learnt = Learnt(forceps, networks, gripper, physics)
     cells |= turning(learnt, rng)
