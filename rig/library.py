@@ -211,11 +211,7 @@ def diagnose(campaign: Campaign, models: Sequence[Model], seed: int = 0) -> Diag
 
 
 def compare(
-    a: Campaign,
-    b: Campaign,
-    models: Sequence[Model],
-    on: Campaign | None = None,
-    seed: int = 0,
+    a: Campaign, b: Campaign, models: Sequence[Model], on: Campaign | None = None, seed: int = 0
 ) -> Difference:
     """Find what changed from one campaign of a machine to another.
 

@@ -10,13 +10,7 @@ from dataclasses import dataclass
 from estimation.arm.effects import ArmEffect
 from estimation.arm.identification import smoothed
 from estimation.arm.motion import FINE, LOW_PASS, joint_channels, motion_of
-from estimation.arm.payload import (
-    LEAST_PERIODS,
-    SIDE_STEP_M,
-    AddedMass,
-    added_mass,
-    carried_torque,
-)
+from estimation.arm.payload import LEAST_PERIODS, SIDE_STEP_M, AddedMass, added_mass, carried_torque
 from estimation.arm.tables import PSM, PointMass
 from estimation.arm.wrist import candidates
 from estimation.recording import FloatArray, Recording

@@ -205,9 +205,7 @@ def ft(
     x, y, z = _three(jaw_mm, "--jaw-mm")
     about_x, about_y, about_z = map(radians, _three(jaw_turn_deg, "--jaw-turn-deg"))
     return FtSession(
-        repeats=repeats,
-        jaw_m=(x / 1e3, y / 1e3, z / 1e3),
-        jaw_turn_rad=(about_x, about_y, about_z),
+        repeats=repeats, jaw_m=(x / 1e3, y / 1e3, z / 1e3), jaw_turn_rad=(about_x, about_y, about_z)
     )
 
 

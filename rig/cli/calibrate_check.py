@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.calibrate_store import StoreOption, store_of
-from rig.cli.options import (
-    ConfigOption,
-    FormatOption,
-    SimFlag,
-    complete_recordings,
-    say_left_out,
-)
+from rig.cli.options import ConfigOption, FormatOption, SimFlag, complete_recordings, say_left_out
 from rig.output.console import JsonFlag, present
 from rig.output.table import counted
 

@@ -17,11 +17,7 @@ from rig.reports.diagnosed import FolderDiagnosis, diagnose_all
 
 
 def show_diagnoses(
-    found: Sequence[IndexedCampaign],
-    root: Path,
-    workers: int,
-    scheduler: str | None,
-    json: bool,
+    found: Sequence[IndexedCampaign], root: Path, workers: int, scheduler: str | None, json: bool
 ) -> None:
     """Diagnose campaigns, without next experiments, and print what each lacks, oldest first.
 

@@ -74,8 +74,7 @@ def follow(
     config: ConfigOption = None,
     sim: SimFlag = False,
     master: Annotated[
-        str | None,
-        typer.Option(help="URL, such as usb:16c0:0483; by default the configured one."),
+        str | None, typer.Option(help="URL, such as usb:16c0:0483; by default the configured one.")
     ] = None,
     duration: Annotated[float, typer.Option(min=0.5, help="Duration, s.")] = 10.0,
     scale: Annotated[

@@ -115,8 +115,7 @@ def new(
         typer.Option(help="Axis, NAME:rad or NAME:m, in the order they drive one another."),
     ] = None,
     transmission: Annotated[
-        list[str] | None,
-        typer.Option(help="INPUT:OUTPUT:RATIO; without a ratio it is fitted."),
+        list[str] | None, typer.Option(help="INPUT:OUTPUT:RATIO; without a ratio it is fitted.")
     ] = None,
     actuator: Annotated[
         list[str] | None, typer.Option(help="AXIS:CHANNEL, such as motor:motor_current_a.")

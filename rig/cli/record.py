@@ -98,11 +98,7 @@ def record(
 
 
 def _recorded(
-    settings: "Config",
-    todo: "list[Plan]",
-    folder: Path,
-    notes: str,
-    watch: "RunWatch | None",
+    settings: "Config", todo: "list[Plan]", folder: Path, notes: str, watch: "RunWatch | None"
 ) -> "list[RunResult]":
     """Record the runs and show how they go; state how to go on if not all are."""
     from rig.bench.logger import open_logger

@@ -47,8 +47,7 @@ def oneill(
         bool, typer.Option("--states", help="Also estimate from physical states: some minutes.")
     ] = False,
     kinds: Annotated[
-        bool,
-        typer.Option("--kinds", help="Also fit every kind of estimator on the same folds."),
+        bool, typer.Option("--kinds", help="Also fit every kind of estimator on the same folds.")
     ] = False,
     figures: FiguresFolder = None,
     minutes: Annotated[

@@ -75,10 +75,7 @@ def _legend_above(ax: Axes) -> None:
 
 
 def over_time(
-    time_s: FloatArray,
-    series: Mapping[str, FloatArray],
-    unit: str,
-    caption: str,
+    time_s: FloatArray, series: Mapping[str, FloatArray], unit: str, caption: str
 ) -> Markup:
     """Draw signals over time.
 

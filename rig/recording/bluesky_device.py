@@ -24,12 +24,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from bluesky.protocols import Triggerable
-from ophyd_async.core import (
-    AsyncStatus,
-    StandardReadable,
-    soft_signal_r_and_setter,
-    soft_signal_rw,
-)
+from ophyd_async.core import AsyncStatus, StandardReadable, soft_signal_r_and_setter, soft_signal_rw
 
 from rig.bench.logger import open_logger
 from rig.bench.session import Session

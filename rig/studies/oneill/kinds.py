@@ -69,9 +69,7 @@ def recipes() -> dict[str, Recipe]:
 
 
 def run_kinds(
-    campaign: Campaign,
-    seed: int = 0,
-    on_fit: Callable[[int, int], None] = lambda done, total: None,
+    campaign: Campaign, seed: int = 0, on_fit: Callable[[int, int], None] = lambda done, total: None
 ) -> tuple[KindRow, ...]:
     """Fit and score every kind.
 

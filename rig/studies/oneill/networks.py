@@ -192,9 +192,7 @@ class Trainer:
 
 
 def network_tables(
-    neutral: Campaign,
-    folder: Path | None,
-    on_run: Callable[[str], None] = lambda name: None,
+    neutral: Campaign, folder: Path | None, on_run: Callable[[str], None] = lambda name: None
 ) -> tuple[dict[str, ClosingTable], tuple[str, ...]]:
     """Return the closing samples by pose, and remarks about them.
 

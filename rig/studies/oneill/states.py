@@ -15,13 +15,7 @@ from numpy.typing import NDArray
 from estimation.bank.states import EFFECTS, Bank
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
-from estimation.estimators.bank import (
-    EVERY,
-    BankEstimator,
-    Estimates,
-    fit_runs,
-    rows_of,
-)
+from estimation.estimators.bank import EVERY, BankEstimator, Estimates, fit_runs, rows_of
 from estimation.estimators.run_evidence import RunEvidence
 from estimation.live_channels import causal_channels
 from estimation.recording import FloatArray, Recording

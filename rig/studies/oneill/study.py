@@ -105,10 +105,7 @@ class Study:
 
 
 def run_study(
-    source: Source,
-    *,
-    seed: int = 0,
-    on_run: Callable[[str], None] = lambda name: None,
+    source: Source, *, seed: int = 0, on_run: Callable[[str], None] = lambda name: None
 ) -> Study:
     """Do the study.
 

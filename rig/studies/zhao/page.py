@@ -17,15 +17,7 @@ from rig.output.table import TextTable
 from rig.studies.coverage import coverage
 from rig.studies.families import ratios, verdict
 from rig.studies.zhao.haptics import LEVEL, Answer
-from rig.studies.zhao.methods import (
-    FILTER,
-    Outcome,
-    axes_of,
-    fitted,
-    of_model,
-    record,
-    target_of,
-)
+from rig.studies.zhao.methods import FILTER, Outcome, axes_of, fitted, of_model, record, target_of
 from rig.studies.zhao.paper import DOFS, INPUTS, PAPER_COEFFICIENTS, PAPER_DELAYS_MS, PAPER_ERRORS_N
 from rig.studies.zhao.study import LOOKED_AT, Cell, Study
 
