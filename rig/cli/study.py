@@ -125,6 +125,7 @@ def zhao(
     json: JsonFlag = False,
 ) -> None:
     """Reproduce Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016, simulated."""
+    from estimation.model_file import parse
     from rig.errors import UsageError
     from rig.grasper.hidden import FAMILIES, OWN
     from rig.grasper.plant import PROTOTYPES
@@ -139,7 +140,7 @@ def zhao(
     steps = (3 + seeds) * len(FAMILIES) + seeds  # three diagnoses a family, and haptics
     with resumable(state, "zhao", steps, workers, "graspers") as keeper:
         study = run_study(prototype, seeds, spread, keeper)
-        model = study.lacking[OWN, "grasp"].model
+        model = parse(study.lacking[OWN, "grasp"].model)
         haptics = haptics_of(prototype, seeds, spread, model, keeper)
     cells = {"prototype": study.prototype, "spread": study.spread, "cells": study.cells}
     found = {", ".join(key): each.findings for key, each in study.lacking.items()}

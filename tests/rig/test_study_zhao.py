@@ -98,7 +98,7 @@ def test_ours_reads_signals_that_the_diagnosis_derived():
     family = "at some loads only"
     axes = axes_of(PROTOTYPES["third"], "yaw", zhao.LOOKED_AT, 0.1, family)
     named = lacking("yaw", axes, zhao.LOOKED_AT).model
-    assert fitted("yaw", axes, zhao.LOOKED_AT, parse(to_toml(named))).evidence is not None
+    assert fitted("yaw", axes, zhao.LOOKED_AT, parse(named)).evidence is not None
 
 
 def test_the_angle_makes_up_for_the_lag_of_the_filter_and_adds_nothing_at_rest():
@@ -115,7 +115,7 @@ def test_the_angle_makes_up_for_the_lag_of_the_filter_and_adds_nothing_at_rest()
 def test_what_was_measured_is_kept_and_not_measured_again(tmp_path, monkeypatch, mean_grasper):
     cell = mean_grasper["yaw"]
     term = to_toml(bearing("yaw"))
-    looked = zhao.Looked((("friction.load", "identified"),), term)
+    looked = Lacking((("friction.load", "identified"),), term)
     seen = []
     monkeypatch.setattr(zhao, "look", lambda *_: looked)
     monkeypatch.setattr(
@@ -133,7 +133,9 @@ def test_what_was_measured_is_kept_and_not_measured_again(tmp_path, monkeypatch,
 def test_every_family_is_in_the_report(mean_grasper):
     cells = {dof: [mean_grasper["yaw"]] * len(FAMILIES) for dof in DOFS}
     found = (("friction.load", "identified"),)
-    lacked = {(family, dof): Lacking(found, bearing(dof)) for family in FAMILIES for dof in DOFS}
+    lacked = {
+        (family, dof): Lacking(found, to_toml(bearing(dof))) for family in FAMILIES for dof in DOFS
+    }
     text = page(zhao.Study("third prototype", 0.1, cells, lacked)).markdown()
     assert "| pitch, periodic | +0.71 |" in text
     assert all(f"| {family} |" in text for family in FAMILIES)

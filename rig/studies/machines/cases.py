@@ -17,8 +17,8 @@ class Case:
     Attributes:
         name: What it is called.
         machine: Shipped machine.
-        folder: Folder of its recordings in the data, or `machine-FOLDER.tar.xz`.
-        card: Page that says what is declared, published and suspected.
+        folder: Folder of its recordings in the data, or `machine-FOLDER.tar.xz`; also the name of
+            the page that says what is declared, published and suspected.
         published: Published error, in words.
         files: Pattern of the files in the folder; all when empty.
         equation: Only this equation; all when empty.
@@ -28,7 +28,6 @@ class Case:
     name: str
     machine: str
     folder: str
-    card: str
     published: str
     files: str = ""
     equation: str = ""
@@ -46,11 +45,10 @@ _SERVO = "position error in simulation .0309 to .0323 rad, six friction models, 
 _JOINT = "none for a joint alone"
 
 CASES = (
-    Case("EMPS", "emps", "emps", "emps", "4.083 % of the force; by direction 3.112 %"),
-    Case("smart grasper", "smart_grasper", "smart-grasper", "smart-grasper", "none stated"),
+    Case("EMPS", "emps", "emps", "4.083 % of the force; by direction 3.112 %"),
+    Case("smart grasper", "smart_grasper", "smart-grasper", "none stated"),
     Case(
         "STS3215, 1.168 kg at .1 m",
-        "sts3215",
         "sts3215",
         "sts3215",
         _SERVO,
@@ -60,12 +58,11 @@ CASES = (
         "STS3215, .969 kg at .15 m",
         "sts3215",
         "sts3215",
-        "sts3215",
         _SERVO,
         only={"pendulum_mass_kg": 0.969, "pendulum_length_m": 0.15},
     ),
-    Case("UR10e, joint 6", "ur10e", "ur10e", "ur10e", _JOINT, "*joint_6.csv", "joint_6"),
-    Case("UR10e, joint 1", "ur10e", "ur10e", "ur10e", _JOINT, "*joint_1.csv", "joint_1"),
+    Case("UR10e, joint 6", "ur10e", "ur10e", _JOINT, "*joint_6.csv", "joint_6"),
+    Case("UR10e, joint 1", "ur10e", "ur10e", _JOINT, "*joint_1.csv", "joint_1"),
 )
 
 

@@ -21,7 +21,7 @@ def page(study: MachineStudy) -> Page:
         f"{len(study.rows)} equations of {len({row.case for row in study.rows})} machines;"
         f" effects were found in {better}."
     )
-    cards = sorted({case.card for case in CASES})
+    cards = sorted({case.folder for case in CASES})
     linked = "Cards: " + ", ".join(f"[{card}](../machines/{card}.md)" for card in cards) + "."
     skipped = ["Not studied: " + " ".join(study.skipped)] if study.skipped else []
     errors, found = [], []

@@ -147,7 +147,7 @@ def _row(case: Case, model: Model, answer: Answer) -> Row:
         case=case.name,
         equation=name,
         published=case.published,
-        card=case.card,
+        card=case.folder,
         runs=(len(found.sealed.discover), len(found.sealed.confirm)),
         declared_percent=100.0 * before / size,
         found_percent=100.0 * after / size,

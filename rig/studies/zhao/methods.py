@@ -18,6 +18,7 @@ from estimation.effects import effect
 from estimation.filters import LowPass
 from estimation.fitting import fit
 from estimation.model import Model, Term, predict
+from estimation.model_file import to_toml
 from estimation.recording import FloatArray, Recording
 from rig.grasper.current_force import CurrentForce, angle_led
 from rig.grasper.hidden import OWN, with_family
@@ -40,11 +41,11 @@ class Lacking:
 
     Attributes:
         findings: Family and verdict of each finding.
-        model: The declared model with the effects it named, and the signals they read.
+        model: The declared model with the effects it named, and the signals they read, as TOML.
     """
 
     findings: tuple[tuple[str, str], ...]
-    model: Model
+    model: str
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ def lacking(dof: str, axes: Axes, seed: int) -> Lacking:
     terms = (*declared(dof).terms, *written.terms[len(model.terms) :])
     return Lacking(
         tuple((finding.family, finding.verdict) for finding in found.diagnosis.findings),
-        replace(written, terms=terms, evidence=None),
+        to_toml(replace(written, terms=terms, evidence=None)),
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from estimation.model_file import parse
 from estimation.recording import FloatArray
 from rig.grasper.current_force import CurrentForce
 from rig.grasper.hidden import FAMILIES, NOT_IN_CATALOGUE, OWN
@@ -107,7 +108,7 @@ def _figures(study: Study, haptics: Sequence[Sequence[Answer]]) -> Mapping[str, 
     seed = 0
     short = next(name for name, one in PROTOTYPES.items() if one.name == study.prototype)
     axes = axes_of(PROTOTYPES[short], "grasp", seed, 0.0)
-    model = fitted("grasp", axes, seed, study.lacking[OWN, "grasp"].model)
+    model = fitted("grasp", axes, seed, parse(study.lacking[OWN, "grasp"].model))
     arm_m = axes[0].arm_m
     mean = float(np.mean([cell.slope for cell in _own(study, "grasp")]))
     method = CurrentForce(arm_m, coefficient=1 / mean)

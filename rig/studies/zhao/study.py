@@ -10,7 +10,7 @@ from functools import partial
 from itertools import product
 
 from estimation.model import Model
-from estimation.model_file import parse, to_toml
+from estimation.model_file import parse
 from rig.grasper.current_force import CurrentForce
 from rig.grasper.hidden import FAMILIES
 from rig.grasper.plant import PROTOTYPES
@@ -77,27 +77,18 @@ class Study:
     lacking: Mapping[tuple[str, str], Lacking] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Looked:
-    """The stored result of the diagnosis of one degree of freedom, with its model as TOML."""
-
-    findings: tuple[tuple[str, str], ...]
-    model: str
-
-
-def look(prototype: str, spread: float, number: int) -> Looked:
+def look(prototype: str, spread: float, number: int) -> Lacking:
     """Diagnose a degree of freedom's model on a grasper of one family that is not reported."""
     family, dof = FAMILIES[number // len(DOFS)], DOFS[number % len(DOFS)]
     axes = axes_of(PROTOTYPES[prototype], dof, LOOKED_AT, spread, family)
-    found = lacking(dof, axes, LOOKED_AT)
-    return Looked(found.findings, to_toml(found.model))
+    return lacking(dof, axes, LOOKED_AT)
 
 
 def one_grasper(prototype: str, spread: float, added: Added, number: int) -> tuple[Cell, ...]:
     """Measure all degrees of freedom of one grasper, in the order of `DOFS`."""
     seed, family = arm_of(number, FAMILIES)
     axes = {dof: axes_of(PROTOTYPES[prototype], dof, seed, spread, family) for dof in DOFS}
-    return tuple(measure(dof, axes[dof], seed, added[family, dof].model) for dof in DOFS)
+    return tuple(measure(dof, axes[dof], seed, parse(added[family, dof].model)) for dof in DOFS)
 
 
 def measure(dof: str, axes: Axes, seed: int, model: Model) -> Cell:
@@ -126,11 +117,8 @@ def run_study(prototype: str, seeds: int, spread: float, keeper: Keeper) -> Stud
     name = f"{SCHEMA} {prototype} {spread:g}"
     every = len(FAMILIES) * len(DOFS)
     diagnosed = partial(look, prototype, spread)
-    looked = kept_outcomes(Looked, diagnosed, every, f"{name} diagnosis", keeper)
-    lacked = {
-        (family, dof): Lacking(found.findings, parse(found.model))
-        for (family, dof), found in zip(product(FAMILIES, DOFS), looked, strict=True)
-    }
+    looked = kept_outcomes(Lacking, diagnosed, every, f"{name} diagnosis", keeper)
+    lacked = dict(zip(product(FAMILIES, DOFS), looked, strict=True))
     one = partial(one_grasper, prototype, spread, lacked)
     graspers = kept_outcomes(tuple[Cell, ...], one, seeds * len(FAMILIES), name, keeper)
     cells = {dof: [grasper[k] for grasper in graspers] for k, dof in enumerate(DOFS)}
