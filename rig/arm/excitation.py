@@ -118,16 +118,10 @@ def _outcome(found: Excitation, seconds: float) -> Outcome:
 
 def page(study: ExcitationStudy) -> Page:
     """Return the comparison's page."""
-    rows = [
-        [
-            str(each.seed),
-            f"{each.condition:.0f}",
-            *_cells(each.thesis),
-            f"{each.shrunk:.1f}",
-            *_cells(each.ours),
-        ]
-        for each in study.starts
-    ]
+    rows = []
+    for each in study.starts:
+        begin, shrunk = f"{each.condition:.0f}", f"{each.shrunk:.1f}"
+        rows.append([str(each.seed), begin, *_cells(each.thesis), shrunk, *_cells(each.ours)])
     thesis, ours = (
         [f"{way}: {what}" for what in ("condition", "limits used, %", "core time, s")]
         for way in ("active set", "ours")

@@ -204,18 +204,12 @@ def _conditions(runs: Sequence["IndexedRun"]) -> str:
 
 def _by_run(found: Sequence["IndexedCampaign"], root: Path, most: int) -> "TextTable":
     pairs = ((campaign, run) for campaign in found for run in campaign.runs)
-    rows = [
-        [
-            f"{campaign.folder.relative_to(root) / run.file}",
-            run.date[:16].replace("T", " "),
-            run.instrument or run.rig,
-            _short(run.state),
-            str(run.lost) if run.lost else "",
-            _short(_conditions([run])),
-            _short(run.notes),
-        ]
-        for campaign, run in islice(pairs, most)
-    ]
+    rows = []
+    for campaign, run in islice(pairs, most):
+        name, rig = str(campaign.folder.relative_to(root) / run.file), run.instrument or run.rig
+        lost = str(run.lost) if run.lost else ""
+        state, conditions, notes = map(_short, (run.state, _conditions([run]), run.notes))
+        rows.append([name, run.date[:16].replace("T", " "), rig, state, lost, conditions, notes])
     columns = ["run", "date", "instrument", "state", "lost", "conditions", "notes"]
     return TextTable("", columns, rows)
 

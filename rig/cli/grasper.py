@@ -23,18 +23,12 @@ def designs(json: JsonFlag = False) -> None:
 
     found = every()
     best = most_compact(found)
-    rows = [
-        [
-            f"1:{design.planetary.gear_ratio:g}",
-            f"{design.planetary.sun_over_carrier:g}",
-            design.drive,
-            f"{design.pulley_ratio:.3g}",
-            f"{design.area:.3g}",
-            str(design.extra_stages),
-            "most compact" if design is best else design.obstacle,
-        ]
-        for design in found
-    ]
+    rows = []
+    for design in found:
+        gears = [f"1:{design.planetary.gear_ratio:g}", f"{design.planetary.sun_over_carrier:g}"]
+        sizes = [f"{design.pulley_ratio:.3g}", f"{design.area:.3g}", str(design.extra_stages)]
+        remark = "most compact" if design is best else design.obstacle
+        rows.append([*gears, design.drive, *sizes, remark])
     columns = ["gears", "sun/carrier", "driven", "d2/d1", "area", "extra stages", "remark"]
     table = TextTable("Designs of the planetary wrist", columns, rows)
     present(json, {"designs": found, "most_compact": best}, table)

@@ -165,17 +165,11 @@ def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
 
 
 def _tables(found: "Preview", mapping: "Mapping") -> "list[TextTable]":
-    runs = [
-        (
-            run.name,
-            str(run.samples),
-            f"{run.duration_s:.4g}",
-            f"{run.rate_hz:.6g}" if run.rate_hz else "-",
-            str(run.flagged),
-            listed(run.conditions),
-        )
-        for run in found.runs[:MOST_RUNS]
-    ]
+    runs = []
+    for run in found.runs[:MOST_RUNS]:
+        rate = f"{run.rate_hz:.6g}" if run.rate_hz else "-"
+        sizes = (str(run.samples), f"{run.duration_s:.4g}", rate, str(run.flagged))
+        runs.append((run.name, *sizes, listed(run.conditions)))
     note = f"{len(found.runs)} runs in all" if len(found.runs) > MOST_RUNS else ""
     channels = [
         (c.name, _source(mapping, c.name), *(f"{v:.5g}" for v in (c.least, c.greatest, c.mean)))

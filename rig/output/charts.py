@@ -106,18 +106,17 @@ def line(
     }
 
 
+def trace(
+    kind: str, x: Sequence[Any], y: Sequence[Any], name: str, role: str, **more: Any
+) -> dict[str, Any]:
+    """Return a trace of a kind of Plotly's, coloured by its role."""
+    return {"type": kind, "x": x, "y": y, "name": name, "meta": {"role": role}, **more}
+
+
 def embedded(charts: Sequence[Chart]) -> Markup:
     """Return the data of charts as JSON that may stand inside a script element."""
-    plain = [
-        {
-            "name": chart.name,
-            "title": chart.title,
-            "layout": chart.layout,
-            "lines": chart.lines,
-            "choices": chart.choices,
-        }
-        for chart in charts
-    ]
+    names = ("name", "title", "layout", "lines", "choices")
+    plain = [{name: getattr(chart, name) for name in names} for chart in charts]
     text = json.dumps(plain, allow_nan=False, separators=(",", ":"))
     return Markup(text.replace("<", "\\u003c"))  # noqa: S704 - no tag can begin in it
 

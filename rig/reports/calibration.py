@@ -9,7 +9,7 @@ from calibration.history import COVERAGE, changes, deviation, earlier_ones
 from calibration.procedure import Conclusion, Residuals
 from calibration.record import CalibrationRecord
 from rig.calibrate.shown import parameter_unit, with_unit
-from rig.output.charts import Chart, Line, embedded, numbers, scripts, thinned
+from rig.output.charts import Chart, Line, embedded, numbers, scripts, thinned, trace
 from rig.output.provenance import Provenance
 from rig.output.render import render
 from rig.output.table import TextTable
@@ -108,16 +108,9 @@ def _parameters(record: CalibrationRecord, earlier: Sequence[CalibrationRecord])
 
 
 def _residuals(residuals: Residuals) -> Chart:
+    marks = {"mode": "markers", "showlegend": False}
     lines: list[Line] = [
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "x": numbers(thinned(x)),
-            "y": numbers(thinned(y)),
-            "name": name,
-            "meta": {"role": "after"},
-            "showlegend": False,
-        }
+        trace("scatter", numbers(thinned(x)), numbers(thinned(y)), name, "after", **marks)
         for name, (x, y) in residuals.series.items()
     ]
     rows = [
@@ -143,16 +136,10 @@ def _history(record: CalibrationRecord, earlier: Sequence[CalibrationRecord]) ->
         unit = parameter_unit(name, record)
         values = [one.fit.parameters[name] for one in known]
         bars = [COVERAGE * (deviation(one, name) or 0.0) for one in known]
-        line: dict[str, Any] = {
-            "type": "scatter",
-            "mode": "markers",
-            "x": [one.made_at for one in known],
-            "y": values,
-            "error_y": {"type": "data", "array": bars, "visible": True},
-            "name": name,
-            "meta": {"role": "after"},
-            "hovertemplate": f"%{{y:.5g}} {unit}<extra></extra>",
-        }
+        hover = f"%{{y:.5g}} {unit}<extra></extra>"
+        errors = {"type": "data", "array": bars, "visible": True}
+        more = {"mode": "markers", "error_y": errors, "hovertemplate": hover}
+        line = trace("scatter", [one.made_at for one in known], values, name, "after", **more)
         rows = [
             [one.made_at, with_unit(value, unit), with_unit(bar, unit), one.operator]
             for one, value, bar in zip(known, values, bars, strict=True)

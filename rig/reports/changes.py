@@ -40,17 +40,9 @@ def change_table(found: Difference) -> TextTable:
     for change in found.changes:
         for name, value in change.parameters.items():
             low, high = change.ci95[name]
-            before = change.before[name]
-            rows.append(
-                (
-                    change.name,
-                    name,
-                    "-" if before is None else f"{before:.4g}",
-                    f"{value:+.4g}",
-                    f"{low:+.4g} to {high:+.4g}",
-                    change.unit[name],
-                )
-            )
+            known, interval = change.before[name], f"{low:+.4g} to {high:+.4g}"
+            before = "-" if known is None else f"{known:.4g}"
+            rows.append((change.name, name, before, f"{value:+.4g}", interval, change.unit[name]))
     heads = ("change", "parameter", "in A", "A to B", "95 %", "unit")
     return TextTable("What changed", heads, rows)
 

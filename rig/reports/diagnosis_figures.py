@@ -8,7 +8,7 @@ from estimation.channels import plain_name, unit_of
 from estimation.diagnosis.result import Diagnosis, Error, Finding
 from estimation.recording import FloatArray
 from rig.diagnosis.traces import EquationTraces, RunTrace, Traces
-from rig.output.charts import Chart, Line, axis, binned, line, numbers, thinned
+from rig.output.charts import Chart, Line, axis, binned, line, numbers, thinned, trace
 from rig.output.table import TextTable
 from rig.reports.diagnosis_words import display
 
@@ -103,32 +103,17 @@ def _by_run(diagnosis: Diagnosis, name: str, error: Error) -> Chart:
     scale, unit = display(diagnosis.unit[name], error.before)
     lines: list[Line] = []
     by_side = {"before": error.by_run_before, "after": error.by_run_after}
+    hover = f"%{{y:.3g}} {unit}"
     for side in _sides(error):
         by_run = by_side[side]
-        lines.append(
-            {
-                "type": "bar",
-                "x": list(by_run),
-                "y": numbers(scale * np.array(list(by_run.values()))),
-                "name": NAMES[side],
-                "meta": {"role": side},
-                "hovertemplate": f"%{{y:.3g}} {unit}",
-            }
-        )
+        values = numbers(scale * np.array(list(by_run.values())))
+        lines.append(trace("bar", list(by_run), values, NAMES[side], side, hovertemplate=hover))
     floor = diagnosis.noise_floor.get(name)
     if floor is not None and error.by_run_before:
         runs = list(error.by_run_before)
-        lines.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "x": [runs[0], runs[-1]],
-                "y": [scale * floor] * 2,
-                "name": "noise floor",
-                "meta": {"role": "level"},
-                "hovertemplate": f"%{{y:.3g}} {unit}",
-            }
-        )
+        ends, level = [runs[0], runs[-1]], [scale * floor] * 2
+        more = {"mode": "lines", "hovertemplate": hover}
+        lines.append(trace("scatter", ends, level, "noise floor", "level", **more))
     better = sum(error.by_run_after[run] < one for run, one in error.by_run_before.items())
     judgement = (
         f"The error is lower in {better} of {len(error.by_run_before)} held-out test runs:"

@@ -29,16 +29,12 @@ def page(study: InstrumentStudy) -> Page:
 
 
 def _drawn_table(study: InstrumentStudy) -> TextTable:
-    cells = [
-        [
-            row.instrument,
-            str(row.runs),
-            str(len(row.rmse_n_m)),
-            *(f"{1e3 * e:.2f}" for e in (median(row.rmse_n_m), row.rmse_n_m[0], row.rmse_n_m[-1])),
-            "" if row.covered is None else f"{row.covered:.1%}",
-        ]
-        for row in study.drawn
-    ]
+    cells = []
+    for row in study.drawn:
+        errors = (median(row.rmse_n_m), row.rmse_n_m[0], row.rmse_n_m[-1])
+        counts = (str(row.runs), str(len(row.rmse_n_m)))
+        covered = "" if row.covered is None else f"{row.covered:.1%}"
+        cells.append([row.instrument, *counts, *(f"{1e3 * e:.2f}" for e in errors), covered])
     columns = ["instrument", "runs used", "choices", "median", "best", "worst"]
     note = (
         "Products of physical states, RMSE in mN m on the runs not used: each single run in turn,"

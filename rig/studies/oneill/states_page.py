@@ -98,17 +98,12 @@ def _level_cells(row: StateRow, levels: Sequence[Level]) -> list[str]:
 
 
 def _intervals(study: StateStudy) -> TextTable:
-    cells = [
-        [
-            f"{_name(row)}, {row.job.protocol}",
-            f"{row.covered:.1%}",
-            " to ".join(f"{share:.0%}" for share in row.covered_between),
-            *(f"{v:.1%}" for v in (row.covered_median, row.covered_worst, row.inside)),
-            _scaled(row, "rmse_inside"),
-        ]
-        for row in study.rows
-        if not row.job.without
-    ]
+    cells = []
+    for row in (row for row in study.rows if not row.job.without):
+        between = " to ".join(f"{share:.0%}" for share in row.covered_between)
+        shares = (f"{v:.1%}" for v in (row.covered_median, row.covered_worst, row.inside))
+        told = [f"{row.covered:.1%}", between, *shares, _scaled(row, "rmse_inside")]
+        cells.append([f"{_name(row)}, {row.job.protocol}", *told])
     columns = ["interval of 95 %", "covers", "by chance", "median run", "worst run", "valid"]
     columns.append("RMSE where valid")
     note = (

@@ -162,9 +162,6 @@ def _parameters(study: Study) -> TextTable:
         " Physically consistent: every link's pseudo-inertia is positive semidefinite, and no"
         " friction, spring or drive inertia is negative."
     )
-    return TextTable(
-        f"Base parameters of the thesis' model, fitted on {study.paths[0]}, SI units",
-        ["parameter", "value", "standard error", "physically consistent"],
-        rows,
-        note,
-    )
+    title = f"Base parameters of the thesis' model, fitted on {study.paths[0]}, SI units"
+    columns = ["parameter", "value", "standard error", "physically consistent"]
+    return TextTable(title, columns, rows, note)

@@ -123,12 +123,11 @@ def short_networks(splits: dict[str, Split], seed: int) -> Cells:
     runs = [splits[name].train.part(0, cut) for name in "MC"]
     validation = [splits[name].train.part(cut, samples) for name in "MC"]
     networks = [trained(k, runs, validation, True, seed) for k in range(GRIPPER)]
-    return {
-        f"I | M+C on {test} | {SHORT}": _nrmse(
-            np.column_stack([network(split.test) for network in networks]), split.test
-        )
-        for test, split in splits.items()
-    }
+    cells: Cells = {}
+    for test, split in splits.items():
+        free = np.column_stack([network(split.test) for network in networks])
+        cells[f"I | M+C on {test} | {SHORT}"] = _nrmse(free, split.test)
+    return cells
 
 
 def _nrmse(free: FloatArray, run: PsmRun) -> tuple[float, ...]:

@@ -199,12 +199,10 @@ def _stated(numbers: Sequence[float | None]) -> list[str]:
 def _figure_3(study: ZhangStudy) -> TextTable:
     cases = [cell for cell in study.outcomes[0] if cell.startswith("Figure 3")]
     rows = [[cell.split(" | ")[1], *_range(study, cell, 4)] for cell in cases]
-    return TextTable(
-        "Figure 3: torque on one path, compared with the gripper held at 0",
-        ["gripper", *(f"{j}, {'N' if j == 'J3' else 'N m'}" for j in JOINTS)],
-        rows,
-        "RMS of the difference, median (least to greatest). The paper shows curves, no numbers.",
-    )
+    title = "Figure 3: torque on one path, compared with the gripper held at 0"
+    columns = ["gripper", *(f"{j}, {'N' if j == 'J3' else 'N m'}" for j in JOINTS)]
+    note = "RMS of the difference, median (least to greatest). The paper shows curves, no numbers."
+    return TextTable(title, columns, rows, note)
 
 
 def _table_1(study: ZhangStudy) -> TextTable:
@@ -216,12 +214,9 @@ def _table_1(study: ZhangStudy) -> TextTable:
             [f"{condition}: its method here", *_range(study, f"{cell} | {NETWORKS}")],
             [f"{condition}: within {WITHIN:.0%}", *_words(study.near(cell))],
         ]
-    return TextTable(
-        "Table I: NRMSE of torque in free space, %",
-        ["trained on, tested on", *JOINTS],
-        rows,
-        "M: gripper moving, C: closed. Median (least to greatest) over the arms.",
-    )
+    title = "Table I: NRMSE of torque in free space, %"
+    note = "M: gripper moving, C: closed. Median (least to greatest) over the arms."
+    return TextTable(title, ["trained on, tested on", *JOINTS], rows, note)
 
 
 def _table_1_ours(study: ZhangStudy) -> TextTable:
@@ -242,9 +237,8 @@ def _table_1_ours(study: ZhangStudy) -> TextTable:
 def _effects(study: ZhangStudy) -> TextTable:
     rows = [[name, str(count), SIMULATED.get(name, "no")] for name, count in study.effects.items()]
     note = "By the forward search of `rig study pique`, confirmed in the other direction."
-    return TextTable(
-        "Effects found", ["effect", "arms", "in the simulation's own form"], rows, note
-    )
+    columns = ["effect", "arms", "in the simulation's own form"]
+    return TextTable("Effects found", columns, rows, note)
 
 
 def _table_2(study: ZhangStudy) -> TextTable:
@@ -280,12 +274,11 @@ def _grasp(study: ZhangStudy) -> TextTable:
         [f"within {WITHIN:.0%}", *_words(study.near(cell))],
         [OURS, *_range(study, f"{cell} | {OURS}")],
     ]
-    return TextTable(
-        "Figure 8: grasping and letting go for 13 s",
-        ["", "RMSE, N", "NRMSE, %", "scale, 1/m"],
-        rows,
-        "Against the force-sensing resistor, Cadiere Forceps. The scale is found on another grasp.",
+    title, columns = "Figure 8: grasping and letting go for 13 s", ["RMSE, N", "NRMSE, %"]
+    note = (
+        "Against the force-sensing resistor, Cadiere Forceps. The scale is found on another grasp."
     )
+    return TextTable(title, ["", *columns, "scale, 1/m"], rows, note)
 
 
 def _configurations(study: ZhangStudy) -> TextTable:

@@ -239,15 +239,11 @@ def _answers(haptics: Sequence[Sequence[Answer]]) -> TextTable:
 
 
 def _materials(haptics: Sequence[Answer]) -> TextTable:
-    rows = [
-        [
-            answer.method,
-            *(f"{s.mean_n_rad:.1f} ({s.true_n_rad:.1f})" for s in answer.materials),
-            "right" if answer.order_is_right else "wrong",
-            f"{answer.order_confidence:.4f}",
-        ]
-        for answer in haptics
-    ]
+    rows = []
+    for answer in haptics:
+        means = (f"{s.mean_n_rad:.1f} ({s.true_n_rad:.1f})" for s in answer.materials)
+        order = "right" if answer.order_is_right else "wrong"
+        rows.append([answer.method, *means, order, f"{answer.order_confidence:.4f}"])
     names = [s.name for s in haptics[0].materials]
     columns = ["method", *(f"{name}, N/rad (true)" for name in names), "order", "confidence"]
     note = "Confidence: the least of Welch's tests between neighbours, three grasps each."
@@ -255,16 +251,11 @@ def _materials(haptics: Sequence[Answer]) -> TextTable:
 
 
 def _places(haptics: Sequence[Answer]) -> TextTable:
-    rows = [
-        [
-            answer.method,
-            *(f"{s.mean_n_rad:.1f}" for s in answer.places),
-            str(answer.found + 1),
-            str(answer.true + 1),
-            f"{answer.place_confidence:.4f}",
-        ]
-        for answer in haptics
-    ]
+    rows = []
+    for answer in haptics:
+        means, sure = (f"{s.mean_n_rad:.1f}" for s in answer.places), answer.place_confidence
+        found = (str(answer.found + 1), str(answer.true + 1), f"{sure:.4f}")
+        rows.append([answer.method, *means, *found])
     columns = ["method", *map(str, range(1, len(haptics[0].places) + 1))]
     columns += ["found", "true", "confidence"]
     note = "N/rad, mean of three grasps; confidence that it is stiffer than the stiffest other."
