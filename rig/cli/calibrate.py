@@ -7,7 +7,7 @@ from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Option
 
 from rig.cli.calibrate_check import check
 from rig.cli.calibrate_store import add, diagnose, diff, list_, show, use
@@ -39,36 +39,34 @@ class Keeping:
     """How a session is run and kept: the options that every command has."""
 
     operator: Annotated[
-        str, typer.Option(envvar="USER", help="Name of the operator, stored in the record.")
+        str, Option(envvar="USER", help="Name of the operator, stored in the record.")
     ] = ""
     config: ConfigOption = None
     sim: SimFlag = False
     store: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "--store",
             help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations; a simulated"
             " rig has a separate folder, NAME-simulated.",
         ),
     ] = None
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the raw logs.")] = None
+    out: Annotated[Path | None, Option("--out", "-o", help="Folder of the raw logs.")] = None
     raw: Annotated[
-        Path | None, typer.Option("--from", help="Measure nothing: fit again from these raw logs.")
+        Path | None, Option("--from", help="Measure nothing: fit again from these raw logs.")
     ] = None
     resume: Annotated[
-        Path | None, typer.Option(help="Go on with a session that was stopped: its folder.")
+        Path | None, Option(help="Go on with a session that was stopped: its folder.")
     ] = None
     force_sensor: Annotated[
-        str | None, typer.Option(help="DRIVER=URL, such as ati-net=udp:192.168.1.1:49152.")
+        str | None, Option(help="DRIVER=URL, such as ati-net=udp:192.168.1.1:49152.")
     ] = None
-    days: Annotated[float, typer.Option(min=1, help="Stale after this number of days.")] = 180
-    notes: Annotated[str, typer.Option(help="Notes, stored in the record.")] = ""
-    use: Annotated[bool, typer.Option("--use", help="Make the result the active record.")] = False
+    days: Annotated[float, Option(min=1, help="Stale after this number of days.")] = 180
+    notes: Annotated[str, Option(help="Notes, stored in the record.")] = ""
+    use: Annotated[bool, Option("--use", help="Make the result the active record.")] = False
     yes: Annotated[
         bool,
-        typer.Option(
-            "--yes", "-y", help="Ask no questions; on the simulated rig, simulated hands act."
-        ),
+        Option("--yes", "-y", help="Ask no questions; on the simulated rig, simulated hands act."),
     ] = False
     seed: SimulationSeed = None
     json: JsonFlag = False
@@ -100,18 +98,18 @@ def session(make: "Callable[..., Procedure]") -> None:
 
 @session
 def torque(
-    sensor: Annotated[str, typer.Option(help="proximal or distal.")] = "proximal",
-    arm_mm: Annotated[float, typer.Option(help="From the axis to the weights, mm.")] = 100.0,
-    masses_g: Annotated[str, typer.Option(help="Weights, g, rising.")] = "50,100,150,200,250",
-    repeats: Annotated[int, typer.Option(min=1, help="Number of passes up and down.")] = 1,
+    sensor: Annotated[str, Option(help="proximal or distal.")] = "proximal",
+    arm_mm: Annotated[float, Option(help="From the axis to the weights, mm.")] = 100.0,
+    masses_g: Annotated[str, Option(help="Weights, g, rising.")] = "50,100,150,200,250",
+    repeats: Annotated[int, Option(min=1, help="Number of passes up and down.")] = 1,
     shunt_v_v: Annotated[
-        float | None, typer.Option(help="Change by the shunt on the certificate, V/V.")
+        float | None, Option(help="Change by the shunt on the certificate, V/V.")
     ] = None,
     counts_per_v_v: Annotated[
-        float | None, typer.Option(help="Counts per V/V of amplifier and converter.")
+        float | None, Option(help="Counts per V/V of amplifier and converter.")
     ] = None,
     temperature_c: Annotated[
-        float | None, typer.Option(help="Temperature of the sensor, for the notes.")
+        float | None, Option(help="Temperature of the sensor, for the notes.")
     ] = None,
 ) -> "Procedure":
     """Torque sensor: zero, shunt, then known weights on an arm, up and down again."""
@@ -130,15 +128,14 @@ def torque(
 
 @session
 def current(
-    loads_a: Annotated[str, typer.Option(help="Loads to move against, A.")] = "0.1,0.3,0.5,0.7,0.9",
-    speeds_rad_s: Annotated[str, typer.Option(help="Speeds of the spindle.")] = "0.5,1.0",
-    repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 1,
+    loads_a: Annotated[str, Option(help="Loads to move against, A.")] = "0.1,0.3,0.5,0.7,0.9",
+    speeds_rad_s: Annotated[str, Option(help="Speeds of the spindle.")] = "0.5,1.0",
+    repeats: Annotated[int, Option(min=1, help="Number of moves of each.")] = 1,
     motor_constant: Annotated[
-        float | None,
-        typer.Option(help="Torque constant of the data sheet, N m/A, for the efficiency."),
+        float | None, Option(help="Torque constant of the data sheet, N m/A, for the efficiency.")
     ] = None,
     ratio: Annotated[
-        float | None, typer.Option(help="Ratio of the gear; if none, of the reference rig's file.")
+        float | None, Option(help="Ratio of the gear; if none, of the reference rig's file.")
     ] = None,
 ) -> "Procedure":
     """Motor current against the spindle's torque sensor: constant, friction, driver."""
@@ -156,14 +153,12 @@ def current(
 
 @session
 def gearbox(
-    loads_a: Annotated[str, typer.Option(help="Loads of both signs, A.")] = "-0.9,-0.5,0.5,0.9",
-    repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 1,
+    loads_a: Annotated[str, Option(help="Loads of both signs, A.")] = "-0.9,-0.5,0.5,0.9",
+    repeats: Annotated[int, Option(min=1, help="Number of moves of each.")] = 1,
     ratio: Annotated[
-        float | None, typer.Option(help="Ratio of the gear; if none, of the reference rig's file.")
+        float | None, Option(help="Ratio of the gear; if none, of the reference rig's file.")
     ] = None,
-    stiffness_only: Annotated[
-        bool, typer.Option("--stiffness-only", help="Model no backlash.")
-    ] = False,
+    stiffness_only: Annotated[bool, Option("--stiffness-only", help="Model no backlash.")] = False,
 ) -> "Procedure":
     """Gear: torsional stiffness and backlash."""
     from calibration.chain import GEAR
@@ -179,11 +174,9 @@ def gearbox(
 
 @session
 def encoder(
-    which: Annotated[str, typer.Option(help="spindle or jaw.")] = "spindle",
-    repeats: Annotated[int, typer.Option(min=1, help="Number of moves of each.")] = 2,
-    line_only: Annotated[
-        bool, typer.Option("--line-only", help="Model no periodic error.")
-    ] = False,
+    which: Annotated[str, Option(help="spindle or jaw.")] = "spindle",
+    repeats: Annotated[int, Option(min=1, help="Number of moves of each.")] = 2,
+    line_only: Annotated[bool, Option("--line-only", help="Model no periodic error.")] = False,
 ) -> "Procedure":
     """Encoder: zero at its mark, and against the next one ratio, offset and periodic error."""
     from calibration.sessions.encoder import EncoderSession
@@ -193,11 +186,11 @@ def encoder(
 
 @session
 def ft(
-    jaw_mm: Annotated[str, typer.Option(help="The jaw from the sensor's origin, mm.")] = "0,0,0",
+    jaw_mm: Annotated[str, Option(help="The jaw from the sensor's origin, mm.")] = "0,0,0",
     jaw_turn_deg: Annotated[
-        str, typer.Option(help="Rotations of the jaw's frame about x, y, z of the sensor.")
+        str, Option(help="Rotations of the jaw's frame about x, y, z of the sensor.")
     ] = "0,0,0",
-    repeats: Annotated[int, typer.Option(min=1, help="Number of rounds through the poses.")] = 1,
+    repeats: Annotated[int, Option(min=1, help="Number of rounds through the poses.")] = 1,
 ) -> "Procedure":
     """Force sensor: bias, weight and centre of mass of its tool, and the lever arm to the jaw."""
     from calibration.sessions.ft import FtSession
@@ -211,20 +204,19 @@ def ft(
 
 @session
 def fsr(
-    top_n: Annotated[float, typer.Option(help="Greatest force of a press, N.")] = 1.6,
-    presses: Annotated[int, typer.Option(min=3, help="Number of presses.")] = 8,
-    hold_s: Annotated[float, typer.Option(min=0, help="Hold time for creep; 0 for none.")] = 30.0,
+    top_n: Annotated[float, Option(help="Greatest force of a press, N.")] = 1.6,
+    presses: Annotated[int, Option(min=3, help="Number of presses.")] = 8,
+    hold_s: Annotated[float, Option(min=0, help="Hold time for creep; 0 for none.")] = 30.0,
     degree: Annotated[
-        int | None,
-        typer.Option(min=1, max=9, help="Degree of the polynomial; by default selected."),
+        int | None, Option(min=1, max=9, help="Degree of the polynomial; by default selected.")
     ] = None,
     force_at_zero: Annotated[
-        float | None, typer.Option(help="Fixed force at 0 V; by default fitted.")
+        float | None, Option(help="Fixed force at 0 V; by default fitted.")
     ] = None,
-    axis: Annotated[str, typer.Option(help="Channel of the force sensor.")] = "force_z_n",
-    rail_v: Annotated[float, typer.Option(help="Upper end of the amplifier.")] = 3.3,
+    axis: Annotated[str, Option(help="Channel of the force sensor.")] = "force_z_n",
+    rail_v: Annotated[float, Option(help="Upper end of the amplifier.")] = 3.3,
     curve_only: Annotated[
-        bool, typer.Option("--curve-only", help="Model neither hysteresis nor creep.")
+        bool, Option("--curve-only", help="Model neither hysteresis nor creep.")
     ] = False,
 ) -> "Procedure":
     """Force-sensing resistor against the force sensor: curve, hysteresis, creep."""

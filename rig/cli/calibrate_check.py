@@ -5,7 +5,7 @@ from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from rig.cli.calibrate_store import StoreOption, store_of
 from rig.cli.options import ConfigOption, FormatOption, SimFlag, complete_recordings, say_left_out
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def check(
     path: Annotated[
         Path | None,
-        typer.Argument(
+        Argument(
             help="Recordings to compare: a file, folder or archive. If none: the active records.",
             autocompletion=complete_recordings,
         ),
@@ -35,7 +35,7 @@ def check(
     sim: SimFlag = False,
     log: Annotated[
         Path | None,
-        typer.Option(help="Of the active records: also their ranges against this log's counts."),
+        Option(help="Of the active records: also their ranges against this log's counts."),
     ] = None,
     store: StoreOption = None,
     json: JsonFlag = False,

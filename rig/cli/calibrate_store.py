@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from estimation.files import write_text_atomic
 from rig.cli.options import LedgerOption, SeedOption
@@ -18,30 +18,30 @@ if TYPE_CHECKING:
 
 StoreOption = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         "--store",
         help="Folder; if none, RIG_CALIBRATIONS, else ~/.config/rig/calibrations; what is not"
         " there is searched in NAME-simulated, the folder of the simulated rig.",
     ),
 ]
-Hash = Annotated[str, typer.Argument(help="Hash of a record, or its beginning.")]
+Hash = Annotated[str, Argument(help="Hash of a record, or its beginning.")]
 
 
 def add(
-    file: Annotated[Path, typer.Argument(help="TOML with a table [channels.NAME] per channel.")],
-    operator: Annotated[str, typer.Option(help="Person responsible for the numbers.")],
-    kind: Annotated[str, typer.Option(help="Origin of the numbers.")] = "certificate",
+    file: Annotated[Path, Argument(help="TOML with a table [channels.NAME] per channel.")],
+    operator: Annotated[str, Option(help="Person responsible for the numbers.")],
+    kind: Annotated[str, Option(help="Origin of the numbers.")] = "certificate",
     made_at: Annotated[
-        str | None, typer.Option(help="Date, ISO 8601 with offset from UTC; by default now.")
+        str | None, Option(help="Date, ISO 8601 with offset from UTC; by default now.")
     ] = None,
-    days: Annotated[float | None, typer.Option(help="Stale after this many days.")] = None,
+    days: Annotated[float | None, Option(help="Stale after this many days.")] = None,
     serial: Annotated[
-        list[str] | None, typer.Option(help="DEVICE=SERIAL of the record; may be repeated.")
+        list[str] | None, Option(help="DEVICE=SERIAL of the record; may be repeated.")
     ] = None,
     instrument: Annotated[
-        str, typer.Option(help="Serial number of the instrument, if valid for one only.")
+        str, Option(help="Serial number of the instrument, if valid for one only.")
     ] = "",
-    channel: Annotated[list[str] | None, typer.Option(help="Only these channels.")] = None,
+    channel: Annotated[list[str] | None, Option(help="Only these channels.")] = None,
     store: StoreOption = None,
     json: JsonFlag = False,
 ) -> None:
@@ -111,7 +111,7 @@ def list_(store: StoreOption = None, json: JsonFlag = False) -> None:
 
 def show(
     record: Hash,
-    figure: Annotated[Path | None, typer.Option(help="Write the residual figure here.")] = None,
+    figure: Annotated[Path | None, Option(help="Write the residual figure here.")] = None,
     store: StoreOption = None,
     json: JsonFlag = False,
 ) -> None:
@@ -149,7 +149,7 @@ def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = 
 
 def use(
     record: Hash,
-    by: Annotated[str, typer.Option(help="Name of the person who chooses it.")],
+    by: Annotated[str, Option(help="Name of the person who chooses it.")],
     store: StoreOption = None,
     json: JsonFlag = False,
 ) -> None:

@@ -5,7 +5,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from rig.cli.options import SchedulerOption, WorkersOption, complete_campaign, complete_model
 from rig.errors import UsageError
@@ -22,25 +22,25 @@ LONGEST = 40
 def campaigns(
     terms: Annotated[
         list[str] | None,
-        typer.Argument(
+        Argument(
             help="Words, and comparisons: 'frequency_hz>=0.5', verdict=one_of.",
             autocompletion=complete_campaign,
         ),
     ] = None,
-    root: Annotated[Path, typer.Option(help="Folder of the campaigns.")] = Path("logs"),
-    runs: Annotated[bool, typer.Option("--runs", help="One row a run.")] = False,
+    root: Annotated[Path, Option(help="Folder of the campaigns.")] = Path("logs"),
+    runs: Annotated[bool, Option("--runs", help="One row a run.")] = False,
     open_: Annotated[
-        bool, typer.Option("--open", help="Open the page of the one campaign found.")
+        bool, Option("--open", help="Open the page of the one campaign found.")
     ] = False,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Show the campaigns found side by side.")
+        bool, Option("--compare", help="Show the campaigns found side by side.")
     ] = False,
     diagnose: Annotated[
-        bool, typer.Option("--diagnose", help="Diagnose the campaigns found, and keep the pages.")
+        bool, Option("--diagnose", help="Diagnose the campaigns found, and keep the pages.")
     ] = False,
     refit: Annotated[
         str | None,
-        typer.Option(
+        Option(
             "--refit",
             metavar="MODEL",
             help="Fit a model on each campaign found, and show how its parameters change.",
@@ -49,9 +49,9 @@ def campaigns(
     ] = None,
     workers: WorkersOption = 1,
     scheduler: SchedulerOption = None,
-    most: Annotated[int, typer.Option("--most", help="Rows of a table, the newest first.")] = 40,
+    most: Annotated[int, Option("--most", help="Rows of a table, the newest first.")] = 40,
     rebuild: Annotated[
-        bool, typer.Option("--rebuild", help="Read every log again into the index.")
+        bool, Option("--rebuild", help="Read every log again into the index.")
     ] = False,
     json: JsonFlag = False,
 ) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from estimation.files import write_text_atomic
 from rig.cli.help import group
@@ -18,17 +19,16 @@ TEENSY = "16c0:0483"
 """USB vendor and product of the Teensy's serial port."""
 
 ConfigArgument = Annotated[
-    Path | None,
-    typer.Argument(help="A TOML file, or a shipped one by name; the default one if none."),
+    Path | None, Argument(help="A TOML file, or a shipped one by name; the default one if none.")
 ]
 
 
 @config_app.command()
 def init(
-    out: Annotated[Path, typer.Argument(help="File to write.")] = Path("rig.toml"),
+    out: Annotated[Path, Argument(help="File to write.")] = Path("rig.toml"),
     like: Annotated[
         str,
-        typer.Option(
+        Option(
             help=f"Shipped configuration to begin with: {', '.join(config_names())}.",
             autocompletion=complete_config,
         ),

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Option
 
 from rig.cli.options import OutFolder
 from rig.output.console import JsonFlag, present, progress, remarks
@@ -56,7 +56,7 @@ Open the page:
 def demo(
     out: OutFolder = None,
     seed: Annotated[
-        int | None, typer.Option(help="Seed of noise and split; from the clock by default.")
+        int | None, Option(help="Seed of noise and split; from the clock by default.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:

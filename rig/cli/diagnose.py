@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from estimation.files import OutputError, check_output
 from rig.cli.options import (
@@ -32,23 +32,22 @@ def diagnose(
     json_: JsonFlag = False,
     json_out: JsonFile = None,
     report: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the HTML report; of a folder of logs, diagnosis in it."),
+        Path | None, Option(help="Folder of the HTML report; of a folder of logs, diagnosis in it.")
     ] = None,
     model_out: Annotated[
-        Path | None, typer.Option(help="File of the models with the identified effects.")
+        Path | None, Option(help="File of the models with the identified effects.")
     ] = None,
     seed: SeedOption = 0,
     workers: WorkersOption = 1,
     quick: QuickFlag = False,
     scheduler: SchedulerOption = None,
     protocol_out: Annotated[
-        Path | None, typer.Option(help="Protocol file of the next experiment.")
+        Path | None, Option(help="Protocol file of the next experiment.")
     ] = None,
     ledger: LedgerOption = None,
     plan: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--plan",
             help="PATH is a protocol or recordings: which effects such runs can distinguish.",
         ),

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from rig.cli.options import (
     EquationOption,
@@ -18,14 +18,12 @@ from rig.output.table import TextTable
 
 
 def diff(
-    a: Annotated[Path, typer.Argument(help="Recordings of the first campaign.")],
-    b: Annotated[Path, typer.Argument(help="Recordings of the second campaign.")],
+    a: Annotated[Path, Argument(help="Recordings of the first campaign.")],
+    b: Annotated[Path, Argument(help="Recordings of the second campaign.")],
     model: ModelOption = None,
     machine: MachineOption = None,
     balance: EquationOption = None,
-    on: Annotated[
-        Path | None, typer.Option(help="Recordings of a third campaign, to predict.")
-    ] = None,
+    on: Annotated[Path | None, Option(help="Recordings of a third campaign, to predict.")] = None,
     seed: SeedOption = 0,
     format_: FormatOption = None,
     json_: JsonFlag = False,

@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer import Option
 
 from rig.cli.options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, emit_json, present, results
 
 YesFlag = Annotated[
-    bool, typer.Option("--yes", help="The jaw is empty and the emergency stop at hand; do not ask.")
+    bool, Option("--yes", help="The jaw is empty and the emergency stop at hand; do not ask.")
 ]
 
 
@@ -18,7 +19,7 @@ def doctor(
     sim: SimFlag = False,
     bundle: Annotated[
         Path | None,
-        typer.Option(help="Write one archive (.zip) for a question to a colleague; no secrets."),
+        Option(help="Write one archive (.zip) for a question to a colleague; no secrets."),
     ] = None,
     json: JsonFlag = False,
 ) -> int:
@@ -91,7 +92,7 @@ def selftest(
     config: ConfigOption = None,
     sim: SimFlag = False,
     bench: Annotated[
-        bool, typer.Option("--bench", help="Also name the tests that only a person can make.")
+        bool, Option("--bench", help="Also name the tests that only a person can make.")
     ] = False,
     json: JsonFlag = False,
 ) -> int:

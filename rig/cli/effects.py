@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument
 
 from rig.cli.options import complete_effect
 from rig.output.console import JsonFlag, present
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def effects(
     name: Annotated[
         str | None,
-        typer.Argument(
+        Argument(
             help="Effect, such as ripple.motor, or a family's beginning.",
             autocompletion=complete_effect,
         ),

@@ -4,7 +4,7 @@ from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from estimation.errors import nearest
 from estimation.files import write_text_atomic
@@ -34,9 +34,9 @@ def _estimator() -> None:
 
 @estimator_app.command()
 def compare(
-    first: Annotated[Path, typer.Argument(help="Estimator of rig fit or rig adapt.")],
-    second: Annotated[Path, typer.Argument(help="Another one of the same channel.")],
-    on: Annotated[Path, typer.Option("--on", help="Recordings: a file, folder or archive.")],
+    first: Annotated[Path, Argument(help="Estimator of rig fit or rig adapt.")],
+    second: Annotated[Path, Argument(help="Another one of the same channel.")],
+    on: Annotated[Path, Option("--on", help="Recordings: a file, folder or archive.")],
     format_: FormatOption = None,
     out: TablesFile = None,
     json: JsonFlag = False,
@@ -59,17 +59,17 @@ def compare(
 
 
 def adapt(
-    source: Annotated[Path, typer.Argument(help="Estimator of the source, from rig fit.")],
-    path: Annotated[Path, typer.Argument(help="Recordings of the other instrument.")],
-    runs: Annotated[str, typer.Option(help="Runs to adapt with, such as 00,11.")] = "",
+    source: Annotated[Path, Argument(help="Estimator of the source, from rig fit.")],
+    path: Annotated[Path, Argument(help="Recordings of the other instrument.")],
+    runs: Annotated[str, Option(help="Runs to adapt with, such as 00,11.")] = "",
     choose: Annotated[
-        int, typer.Option(min=1, help="Without --runs: how many, those nearest to all others.")
+        int, Option(min=1, help="Without --runs: how many, those nearest to all others.")
     ] = 1,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File of the adapted estimator.")
+        Path | None, Option("--out", "-o", help="File of the adapted estimator.")
     ] = None,
     scratch: Annotated[
-        bool, typer.Option(help="Also fit on the other instrument's runs alone, in folds.")
+        bool, Option(help="Also fit on the other instrument's runs alone, in folds.")
     ] = True,
     seed: SeedOption = 0,
     format_: FormatOption = None,
@@ -136,13 +136,13 @@ def _errors(result: "Adaptation") -> "TextTable":
 
 def export(
     model: Annotated[
-        Path, typer.Argument(help="Model or estimator of rig fit or rig adapt, .toml or .npz.")
+        Path, Argument(help="Model or estimator of rig fit or rig adapt, .toml or .npz.")
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="File of the header, such as grip.h.")],
+    out: Annotated[Path, Option("--out", "-o", help="File of the header, such as grip.h.")],
     equation: Annotated[
-        str | None, typer.Option(help="Equation of a file of several models; the first if none.")
+        str | None, Option(help="Equation of a file of several models; the first if none.")
     ] = None,
-    rate: Annotated[float, typer.Option(help="Call rate, Hz.")] = 1000.0,
+    rate: Annotated[float, Option(help="Call rate, Hz.")] = 1000.0,
     json: JsonFlag = False,
 ) -> None:
     """Write an estimator as a self-contained C header, for firmware.

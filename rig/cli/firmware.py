@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from rig.cli.help import group
 from rig.cli.options import ConfigOption, SimFlag, chosen_rig
@@ -11,7 +11,7 @@ from rig.output.console import JsonFlag, present
 firmware_app = group("firmware", "Show firmware versions, build the firmware, flash it.")
 
 BoardOption = Annotated[
-    str, typer.Option("--board", "-b", help="teensy35, teensy41 or teensy41-grasper.")
+    str, Option("--board", "-b", help="teensy35, teensy41 or teensy41-grasper.")
 ]
 
 
@@ -49,7 +49,7 @@ def build(board: BoardOption = "", json: JsonFlag = False) -> None:
 @firmware_app.command()
 def flash(
     board: BoardOption = "teensy41",
-    serial: Annotated[str, typer.Option(help="Serial number the board must have.")] = "",
+    serial: Annotated[str, Option(help="Serial number the board must have.")] = "",
     json: JsonFlag = False,
 ) -> None:
     """Build for a Teensy and write it to the only one that is plugged in.

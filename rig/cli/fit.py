@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Option
 
 from estimation.channels import unit_of
 from rig.cli.options import (
@@ -110,7 +110,7 @@ def fit(
     path: RecordingsArgument,
     model: Annotated[
         str | None,
-        typer.Option(
+        Option(
             "--model",
             "-m",
             help=f"Declared model: a file, or one of {', '.join(model_names())}; `states` for"
@@ -120,20 +120,16 @@ def fit(
         ),
     ] = None,
     machine: MachineOption = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File of the fitted model.")
-    ] = None,
-    folds: Annotated[int, typer.Option(help="Folds of the error on runs not fitted on.")] = 5,
+    out: Annotated[Path | None, Option("--out", "-o", help="File of the fitted model.")] = None,
+    folds: Annotated[int, Option(help="Folds of the error on runs not fitted on.")] = 5,
     seed: SeedOption = 0,
     target: Annotated[
-        str, typer.Option(help="Channel to estimate; with --model states or network.")
+        str, Option(help="Channel to estimate; with --model states or network.")
     ] = "proximal_torque_n_m",
     surrogate: Annotated[
-        str, typer.Option(help="Channel that represents the load; with --model states or network.")
+        str, Option(help="Channel that represents the load; with --model states or network.")
     ] = "motor_current_a",
-    live: Annotated[
-        bool, typer.Option("--live", help="Fit for use live; with --model states.")
-    ] = False,
+    live: Annotated[bool, Option("--live", help="Fit for use live; with --model states.")] = False,
     skip_bad: SkipBad = False,
     format_: FormatOption = None,
     json_: JsonFlag = False,

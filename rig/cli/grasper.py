@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from rig.cli.help import group
 from rig.cli.options import ConfigOption, SeedOption, SimFlag, chosen_rig
@@ -36,11 +36,11 @@ def designs(json: JsonFlag = False) -> None:
 
 @grasper_app.command()
 def record(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the recordings.")],
+    out: Annotated[Path, Option("--out", "-o", help="Folder of the recordings.")],
     pulley_ratio: Annotated[
-        float, typer.Option(min=0.5, max=2.0, help="d2/d1 as built; 1 decouples the jaws.")
+        float, Option(min=0.5, max=2.0, help="d2/d1 as built; 1 decouples the jaws.")
     ] = 1.0,
-    runs: Annotated[int, typer.Option(min=3, help="Number of runs.")] = 12,
+    runs: Annotated[int, Option(min=3, help="Number of runs.")] = 12,
     seed: SeedOption = 0,
     json: JsonFlag = False,
 ) -> None:
@@ -68,13 +68,13 @@ def follow(
     config: ConfigOption = None,
     sim: SimFlag = False,
     master: Annotated[
-        str | None, typer.Option(help="URL, such as usb:16c0:0483; by default the configured one.")
+        str | None, Option(help="URL, such as usb:16c0:0483; by default the configured one.")
     ] = None,
-    duration: Annotated[float, typer.Option(min=0.5, help="Duration, s.")] = 10.0,
+    duration: Annotated[float, Option(min=0.5, help="Duration, s.")] = 10.0,
     scale: Annotated[
-        float, typer.Option(min=0.01, max=2, help="Joint angle per angle of the master.")
+        float, Option(min=0.01, max=2, help="Joint angle per angle of the master.")
     ] = 0.3,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the log.")] = Path("logs"),
+    out: Annotated[Path, Option("--out", "-o", help="Folder of the log.")] = Path("logs"),
     json: JsonFlag = False,
 ) -> None:
     """Make the three motors follow the master, within the limits of the configuration.

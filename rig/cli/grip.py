@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from rig.cli.options import ConfigOption, LiveModel, SimFlag, chosen_rig
 from rig.errors import UsageError
@@ -17,8 +17,8 @@ REACHED_RATIO = 0.1
 
 
 def grip(
-    torque: Annotated[float, typer.Option(help="Torque to hold at the jaw, N m.")],
-    duration: Annotated[float, typer.Option(min=8, help="Duration, s.")] = 40.0,
+    torque: Annotated[float, Option(help="Torque to hold at the jaw, N m.")],
+    duration: Annotated[float, Option(min=8, help="Duration, s.")] = 40.0,
     config: ConfigOption = None,
     sim: SimFlag = False,
     model: LiveModel = None,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from estimation.files import write_text_atomic
 from rig.cli.options import complete_machine, machine_names
@@ -22,32 +22,32 @@ MOST_RUNS = 12
 
 ColumnOption = Annotated[
     list[str] | None,
-    typer.Option(help="CHANNEL=COLUMN[:UNIT], such as motor_angle_rad=q1:deg; may be repeated."),
+    Option(help="CHANNEL=COLUMN[:UNIT], such as motor_angle_rad=q1:deg; may be repeated."),
 ]
 ConditionOption = Annotated[
     list[str] | None,
-    typer.Option(help="NAME=COLUMN[:UNIT], what is constant in a run; may be repeated."),
+    Option(help="NAME=COLUMN[:UNIT], what is constant in a run; may be repeated."),
 ]
 RunsOption = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         help="Where runs begin: gap_s=1, lap_s=6.24, changes=COLUMN, falls=COLUMN,"
         " mark=COLUMN, resets=true; may be repeated."
     ),
 ]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Another key of [data], such as even_rate_hz=100; may be repeated."),
+    Option("--set", help="Another key of [data], such as even_rate_hz=100; may be repeated."),
 ]
 
 
 def import_(
     path: Annotated[
-        Path, typer.Argument(help="CSV, TSV, Parquet, .mat, .npz, JSON, JSON lines, or a folder.")
+        Path, Argument(help="CSV, TSV, Parquet, .mat, .npz, JSON, JSON lines, or a folder.")
     ],
     machine: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "--machine",
             help="Machine file whose [data] maps the columns, or one of"
             f" {', '.join(machine_names())}.",
@@ -58,15 +58,15 @@ def import_(
     condition: ConditionOption = None,
     runs: RunsOption = None,
     rate: Annotated[
-        float | None, typer.Option(help="Sample rate, Hz, where no column holds the time.")
+        float | None, Option(help="Sample rate, Hz, where no column holds the time.")
     ] = None,
     set_: SetOption = None,
     preview: Annotated[
-        bool, typer.Option("--preview", help="Show what would be imported; write no recording.")
+        bool, Option("--preview", help="Show what would be imported; write no recording.")
     ] = False,
-    plots: Annotated[Path | None, typer.Option(help="Page of every channel (HTML).")] = None,
+    plots: Annotated[Path | None, Option(help="Page of every channel (HTML).")] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder of the recordings, one log a run.")
+        Path | None, Option("--out", "-o", help="Folder of the recordings, one log a run.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:

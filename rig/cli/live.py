@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from rig.cli.options import ConfigOption, LiveModel, PlainFlag, SimFlag, chosen_rig
 from rig.errors import UsageError
@@ -19,37 +19,33 @@ def live(
     model: LiveModel = None,
     protocol: Annotated[
         str | None,
-        typer.Option(
-            "--protocol", "-p", help="Play this protocol; without it the rig does not move."
-        ),
+        Option("--protocol", "-p", help="Play this protocol; without it the rig does not move."),
     ] = None,
-    duration: Annotated[float | None, typer.Option(help="Quit after this device time, s.")] = None,
+    duration: Annotated[float | None, Option(help="Quit after this device time, s.")] = None,
     pace: Annotated[
-        float, typer.Option(help="Simulated seconds per second; 0 is as fast as possible.")
+        float, Option(help="Simulated seconds per second; 0 is as fast as possible.")
     ] = 1.0,
     lever_mm: Annotated[
-        float | None, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
+        float | None, Option(help="Lever arm from the jaw's axis to its tip, mm.")
     ] = None,
     plain: PlainFlag = False,
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder of recordings started by a key.")
+        Path, Option("--out", "-o", help="Folder of recordings started by a key.")
     ] = Path("logs"),
     foxglove: Annotated[
-        bool,
-        typer.Option("--foxglove", help="Also serve the data to Foxglove, on this computer only."),
+        bool, Option("--foxglove", help="Also serve the data to Foxglove, on this computer only.")
     ] = False,
     foxglove_port: Annotated[
-        int, typer.Option(min=1, max=65535, help="Port of the Foxglove server.")
+        int, Option(min=1, max=65535, help="Port of the Foxglove server.")
     ] = 8765,
     web: Annotated[
-        bool, typer.Option("--web", help="Also serve a page for a browser on this computer.")
+        bool, Option("--web", help="Also serve a page for a browser on this computer.")
     ] = False,
     host: Annotated[
-        str | None,
-        typer.Option(help="With --web: this computer's address in a network, for a tablet."),
+        str | None, Option(help="With --web: this computer's address in a network, for a tablet.")
     ] = None,
     web_port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")
+        int, Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")
     ] = 8766,
     json_: JsonFlag = False,
 ) -> int:

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from rig.cli.help import group
 from rig.cli.log_export import export
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 log_app = group("log", "Inspect, check, repair and export logs.")
 
-LogOrFolder = Annotated[Path, typer.Argument(help="A log, or a folder of logs.")]
+LogOrFolder = Annotated[Path, Argument(help="A log, or a folder of logs.")]
 AnyRecording = Annotated[
-    Path, typer.Argument(help="A log, a folder of logs, or recordings of any format.")
+    Path, Argument(help="A log, a folder of logs, or recordings of any format.")
 ]
-OneLog = Annotated[Path, typer.Argument(help="A log.")]
+OneLog = Annotated[Path, Argument(help="A log.")]
 
 
 @log_app.command()
@@ -126,7 +126,7 @@ def _summed_up(reports: "list[LogReport]", superseded: int, missing: int) -> str
 def repair(
     path: OneLog,
     out: Annotated[
-        Path | None, typer.Option(help="File to write; NAME.repaired.mcap by default.")
+        Path | None, Option(help="File to write; NAME.repaired.mcap by default.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from rig.cli.options import say_left_out
 from rig.errors import UsageError
@@ -18,33 +18,25 @@ if TYPE_CHECKING:
 
 
 def export(
-    path: Annotated[
-        Path, typer.Argument(help="A log; or a folder, for one table of all its runs.")
-    ],
+    path: Annotated[Path, Argument(help="A log; or a folder, for one table of all its runs.")],
     format_name: Annotated[
-        str,
-        typer.Option(
-            "--format", help="csv or parquet; of a single log npz, too; mcap with --model."
-        ),
+        str, Option("--format", help="csv or parquet; of a single log npz, too; mcap with --model.")
     ] = "csv",
-    topic: Annotated[str | None, typer.Option(help="Only this topic.")] = None,
+    topic: Annotated[str | None, Option(help="Only this topic.")] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="File with --topic, else folder; by default by the log."),
+        Option("--out", "-o", help="File with --topic, else folder; by default by the log."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
+    force: Annotated[bool, Option("--force", help="Overwrite files.")] = False,
     calibration: Annotated[
-        str | None,
-        typer.Option(help="Apply this set instead: a TOML file, or a shipped set's name."),
+        str | None, Option(help="Apply this set instead: a TOML file, or a shipped set's name.")
     ] = None,
     record: Annotated[
-        list[str] | None,
-        typer.Option(help="Apply this record of the store, by hash; may be repeated."),
+        list[str] | None, Option(help="Apply this record of the store, by hash; may be repeated.")
     ] = None,
-    store: Annotated[Path | None, typer.Option(help="Folder of the store of --record.")] = None,
+    store: Annotated[Path | None, Option(help="Folder of the store of --record.")] = None,
     model: Annotated[
-        Path | None,
-        typer.Option(help="Add the estimate of this model file as estimated_* columns."),
+        Path | None, Option(help="Add the estimate of this model file as estimated_* columns.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:

@@ -4,7 +4,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from rig.cli.options import (
     EquationOption,
@@ -27,17 +27,17 @@ def loop(
     sim: SimFlag = False,
     hide: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="Hidden effect, or effect=strength; by default drawn by the seed; `none` for none."
         ),
     ] = None,
     balance: EquationOption = None,
     protocol: Annotated[
-        str | None, typer.Option("--protocol", "-p", help="First protocol; by default `diagnosis`.")
+        str | None, Option("--protocol", "-p", help="First protocol; by default `diagnosis`.")
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of all output.")] = None,
-    rounds: Annotated[int, typer.Option(help="Maximum number of campaigns.")] = 3,
-    minutes: Annotated[float, typer.Option(help="No round starts after this time, min.")] = 20.0,
+    out: Annotated[Path | None, Option("--out", "-o", help="Folder of all output.")] = None,
+    rounds: Annotated[int, Option(help="Maximum number of campaigns.")] = 3,
+    minutes: Annotated[float, Option(help="No round starts after this time, min.")] = 20.0,
     seed: SimulationSeed = None,
     quick: QuickFlag = False,
     workers: WorkersOption = 1,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from rig.cli.help import group
 from rig.cli.options import FormatOption, complete_machine, machine_names, require_new
@@ -20,7 +20,7 @@ machine_app = group(
 
 FileArgument = Annotated[
     Path,
-    typer.Argument(
+    Argument(
         metavar="FILE",
         help=f"Machine file, or one of {', '.join(machine_names())}.",
         autocompletion=complete_machine,
@@ -46,7 +46,7 @@ def show(file: FileArgument, json_: JsonFlag = False) -> None:
 @machine_app.command()
 def check(
     file: FileArgument,
-    data: Annotated[Path | None, typer.Argument(help="Recordings of the machine.")] = None,
+    data: Annotated[Path | None, Argument(help="Recordings of the machine.")] = None,
     format_: FormatOption = None,
     json_: JsonFlag = False,
 ) -> int:
@@ -108,24 +108,24 @@ def _parameter_lines(equation: "CheckedEquation") -> list[str]:
 
 @machine_app.command()
 def new(
-    out: Annotated[Path, typer.Argument(metavar="FILE", help="Machine file to write.")],
-    name: Annotated[str, typer.Option(help="Name of the machine; by default the file's.")] = "",
+    out: Annotated[Path, Argument(metavar="FILE", help="Machine file to write.")],
+    name: Annotated[str, Option(help="Name of the machine; by default the file's.")] = "",
     axis: Annotated[
         list[str] | None,
-        typer.Option(help="Axis, NAME:rad or NAME:m, in the order they drive one another."),
+        Option(help="Axis, NAME:rad or NAME:m, in the order they drive one another."),
     ] = None,
     transmission: Annotated[
-        list[str] | None, typer.Option(help="INPUT:OUTPUT:RATIO; without a ratio it is fitted.")
+        list[str] | None, Option(help="INPUT:OUTPUT:RATIO; without a ratio it is fitted.")
     ] = None,
     actuator: Annotated[
-        list[str] | None, typer.Option(help="AXIS:CHANNEL, such as motor:motor_current_a.")
+        list[str] | None, Option(help="AXIS:CHANNEL, such as motor:motor_current_a.")
     ] = None,
     sensor: Annotated[
         list[str] | None,
-        typer.Option(help="AXIS:CHANNEL; what it reads follows from the channel's unit."),
+        Option(help="AXIS:CHANNEL; what it reads follows from the channel's unit."),
     ] = None,
     from_: Annotated[
-        Path | None, typer.Option("--from", help="Table: its columns are listed under [data].")
+        Path | None, Option("--from", help="Table: its columns are listed under [data].")
     ] = None,
     json_: JsonFlag = False,
 ) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument
 
 from estimation.channels import unit_of
 from rig.cli.help import group
@@ -52,7 +53,7 @@ def show(
 def use(
     model: Annotated[
         str,
-        typer.Argument(
+        Argument(
             help="Fitted model: a file, or a name of `rig model`.", autocompletion=complete_fitted
         ),
     ],

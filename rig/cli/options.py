@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 import estimation
 import rig
@@ -90,7 +90,7 @@ complete_campaign = _completed(lambda: [str(f.relative_to("logs")) for f in _cam
 
 ConfigOption = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         "--config",
         "-c",
         help=f"Configuration: a file, or one of {', '.join(config_names())}. If none: RIG_CONFIG,"
@@ -98,10 +98,10 @@ ConfigOption = Annotated[
         autocompletion=complete_config,
     ),
 ]
-SimFlag = Annotated[bool, typer.Option("--sim", help="Use the simulated rig; nothing real moves.")]
+SimFlag = Annotated[bool, Option("--sim", help="Use the simulated rig; nothing real moves.")]
 MachineOption = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         "--machine",
         help=f"Machine of the recordings: a file, or one of {', '.join(machine_names())}. If none:"
         " the reference rig.",
@@ -110,7 +110,7 @@ MachineOption = Annotated[
 ]
 ModelOption = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         "--model",
         "-m",
         help=f"Declared model: a file, or one of {', '.join(model_names())}.",
@@ -119,41 +119,38 @@ ModelOption = Annotated[
 ]
 RecordingsArgument = Annotated[
     Path,
-    typer.Argument(
-        help="Recordings: a file, folder or archive.", autocompletion=complete_recordings
-    ),
+    Argument(help="Recordings: a file, folder or archive.", autocompletion=complete_recordings),
 ]
 FormatOption = Annotated[
-    str | None, typer.Option("--format", help="Format of the recordings; detected by default.")
+    str | None, Option("--format", help="Format of the recordings; detected by default.")
 ]
 SkipBad = Annotated[
-    bool, typer.Option("--skip-bad", help="Leave out runs that cannot be read, and name them.")
+    bool, Option("--skip-bad", help="Leave out runs that cannot be read, and name them.")
 ]
 EquationOption = Annotated[
-    str | None, typer.Option("--equation", help="Only this equation, such as motor.")
+    str | None, Option("--equation", help="Only this equation, such as motor.")
 ]
-LedgerOption = Annotated[Path | None, typer.Option(help="Path of the held-out-data usage log.")]
-JsonFile = Annotated[Path | None, typer.Option("--json-out", help="File for the result as JSON.")]
-QuickFlag = Annotated[bool, typer.Option("--quick", help="Propose no next experiment.")]
-PlainFlag = Annotated[bool, typer.Option("--plain", help="Lines instead of the display.")]
-OutFolder = Annotated[Path | None, typer.Option("--out", "-o", help="Folder of all output.")]
+LedgerOption = Annotated[Path | None, Option(help="Path of the held-out-data usage log.")]
+JsonFile = Annotated[Path | None, Option("--json-out", help="File for the result as JSON.")]
+QuickFlag = Annotated[bool, Option("--quick", help="Propose no next experiment.")]
+PlainFlag = Annotated[bool, Option("--plain", help="Lines instead of the display.")]
+OutFolder = Annotated[Path | None, Option("--out", "-o", help="Folder of all output.")]
 LiveModel = Annotated[
-    Path | None, typer.Option(help="Model file of the estimate; by default the configured one.")
+    Path | None, Option(help="Model file of the estimate; by default the configured one.")
 ]
 ReplayModel = Annotated[
-    Path | None,
-    typer.Option(help="Model file of the estimate; by default the one in use for the rig."),
+    Path | None, Option(help="Model file of the estimate; by default the one in use for the rig.")
 ]
 WorkersOption = Annotated[
-    int, typer.Option("--workers", min=1, help="Number of processes; 1 is this one.")
+    int, Option("--workers", min=1, help="Number of processes; 1 is this one.")
 ]
-SchedulerOption = Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")]
-SeedOption = Annotated[int, typer.Option(help="Seed of everything random, such as the folds.")]
+SchedulerOption = Annotated[str | None, Option(help="Address of a Dask scheduler.")]
+SeedOption = Annotated[int, Option(help="Seed of everything random, such as the folds.")]
 SimulationSeed = Annotated[
-    int | None, typer.Option("--seed", help="Seed of the simulated rig; by default by the clock.")
+    int | None, Option("--seed", help="Seed of the simulated rig; by default by the clock.")
 ]
-TablesFile = Annotated[Path | None, typer.Option("--out", help="File for the tables, in Markdown.")]
-FiguresFolder = Annotated[Path | None, typer.Option(help="Folder for the figures, as SVG.")]
+TablesFile = Annotated[Path | None, Option("--out", help="File for the tables, in Markdown.")]
+FiguresFolder = Annotated[Path | None, Option(help="Folder for the figures, as SVG.")]
 
 
 def chosen_rig(config: Path | None, sim: bool) -> "Config":

@@ -4,7 +4,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from rig.cli.options import (
     ConfigOption,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def record(
     protocol: Annotated[
         str | None,
-        typer.Option(
+        Option(
             "--protocol",
             "-p",
             help=f"Protocol: a file, or one of {', '.join(protocol_names())}. If none: diagnosis;"
@@ -39,16 +39,16 @@ def record(
     ] = None,
     config: ConfigOption = None,
     sim: SimFlag = False,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the campaign.")] = None,
+    out: Annotated[Path | None, Option("--out", "-o", help="Folder of the campaign.")] = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Resume the campaign in this folder.")
+        Path | None, Option("--resume", help="Resume the campaign in this folder.")
     ] = None,
     seed: SimulationSeed = None,
     model: Annotated[
         Path | None,
-        typer.Option("--model", "-m", help="Fitted model to monitor for a change of the rig."),
+        Option("--model", "-m", help="Fitted model to monitor for a change of the rig."),
     ] = None,
-    notes: Annotated[str, typer.Option(help="Operator's notes, stored in every log.")] = "",
+    notes: Annotated[str, Option(help="Operator's notes, stored in every log.")] = "",
     json: JsonFlag = False,
 ) -> int:
     """Run a protocol on the rig and write one log per run to logs/.

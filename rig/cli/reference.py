@@ -4,13 +4,14 @@ from enum import StrEnum
 from typing import Annotated
 
 import typer
+from typer import Option
 
 from rig.cli.options import ConfigOption, SimFlag, chosen_rig
 from rig.output.console import JsonFlag, present, results
 
 AtOption = Annotated[
     list[float] | None,
-    typer.Option("--at", help="Angle of the mark, rad; once for each setpoint. If none: 0."),
+    Option("--at", help="Angle of the mark, rad; once for each setpoint. If none: 0."),
 ]
 
 
@@ -23,12 +24,12 @@ class Stop(StrEnum):
 
 StopOption = Annotated[
     Stop | None,
-    typer.Option(help="Drive gently against this stop first; --at is where it stands then."),
+    Option(help="Drive gently against this stop first; --at is where it stands then."),
 ]
 IndexFlag = Annotated[
-    bool, typer.Option("--index", help="Take the place of the encoder's index; --at is its angle.")
+    bool, Option("--index", help="Take the place of the encoder's index; --at is its angle.")
 ]
-YesFlag = Annotated[bool, typer.Option("--yes", help="The rig stands at its mark; do not ask.")]
+YesFlag = Annotated[bool, Option("--yes", help="The rig stands at its mark; do not ask.")]
 
 
 def reference(

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from rig.cli.options import FormatOption, MachineOption, PlainFlag, ReplayModel
 from rig.errors import UsageError
@@ -21,31 +21,28 @@ GRIP, EFFORTS = "distal_torque_n_m", ("_n_m", "_n", "_a")
 
 
 def replay(
-    log: Annotated[Path, typer.Argument(help="Recording: a file, folder or archive.")],
+    log: Annotated[Path, Argument(help="Recording: a file, folder or archive.")],
     run: Annotated[
-        str | None, typer.Option(help="Name of the run; by default the first valid one.")
+        str | None, Option(help="Name of the run; by default the first valid one.")
     ] = None,
     model: ReplayModel = None,
     speed: Annotated[
-        float, typer.Option(help="Speed relative to real time; 0 is as fast as possible.")
+        float, Option(help="Speed relative to real time; 0 is as fast as possible.")
     ] = 1.0,
     plain: PlainFlag = False,
     json_: JsonFlag = False,
-    lever_mm: Annotated[
-        float, typer.Option(help="Lever arm from the jaw's axis to its tip, mm.")
-    ] = 12.0,
+    lever_mm: Annotated[float, Option(help="Lever arm from the jaw's axis to its tip, mm.")] = 12.0,
     any_instrument: Annotated[
-        bool, typer.Option("--any-instrument", help="Allow a model of another instrument.")
+        bool, Option("--any-instrument", help="Allow a model of another instrument.")
     ] = False,
     machine: MachineOption = None,
     format_: FormatOption = None,
     core: Annotated[
-        bool,
-        typer.Option("--core", help="Run the firmware's core again on a simulated log; compare."),
+        bool, Option("--core", help="Run the firmware's core again on a simulated log; compare.")
     ] = False,
     config: Annotated[
         Path | None,
-        typer.Option("--config", "-c", help="With --core: configuration in place of the log's."),
+        Option("--config", "-c", help="With --core: configuration in place of the log's."),
     ] = None,
 ) -> int:
     """Play back a recording in the live display, with the estimate of any model.

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument, Option
 
 from rig.cli.help import GroupedHelp
 from rig.cli.options import FiguresFolder, SeedOption, TablesFile, WorkersOption
@@ -36,28 +37,27 @@ def studies() -> None:
 def oneill(
     data: Annotated[
         Path | None,
-        typer.Option(help="Measured data: a folder or archive. Without it, a simulated campaign."),
+        Option(help="Measured data: a folder or archive. Without it, a simulated campaign."),
     ] = None,
     out: TablesFile = None,
     seed: SeedOption = 0,
     networks: Annotated[
-        bool, typer.Option("--networks", help="Also train the networks: long, can be resumed.")
+        bool, Option("--networks", help="Also train the networks: long, can be resumed.")
     ] = False,
     states: Annotated[
-        bool, typer.Option("--states", help="Also estimate from physical states: some minutes.")
+        bool, Option("--states", help="Also estimate from physical states: some minutes.")
     ] = False,
     kinds: Annotated[
-        bool, typer.Option("--kinds", help="Also fit every kind of estimator on the same folds.")
+        bool, Option("--kinds", help="Also fit every kind of estimator on the same folds.")
     ] = False,
     figures: FiguresFolder = None,
     minutes: Annotated[
-        float | None,
-        typer.Option(help="Start no network after this time, min; tables list the rest."),
+        float | None, Option(help="Start no network after this time, min; tables list the rest.")
     ] = None,
-    every: Annotated[int, typer.Option(min=1, help="Train on every n-th closing sample.")] = 8,
+    every: Annotated[int, Option(min=1, help="Train on every n-th closing sample.")] = 8,
     workers: WorkersOption = 1,
     state: Annotated[
-        Path | None, typer.Option(help="Folder of trained networks; a cache folder by default.")
+        Path | None, Option(help="Folder of trained networks; a cache folder by default.")
     ] = None,
     json: JsonFlag = False,
 ) -> None:
@@ -113,11 +113,9 @@ def oneill(
 
 @study_app.command()
 def zhao(
-    prototype: Annotated[str, typer.Option(help="third, journal or ball.")] = "third",
-    seeds: Annotated[int, typer.Option(min=2, help="Simulated graspers of each family.")] = 4,
-    spread: Annotated[
-        float, typer.Option(min=0, max=0.3, help="Spread of hidden parameters.")
-    ] = 0.1,
+    prototype: Annotated[str, Option(help="third, journal or ball.")] = "third",
+    seeds: Annotated[int, Option(min=2, help="Simulated graspers of each family.")] = 4,
+    spread: Annotated[float, Option(min=0, max=0.3, help="Spread of hidden parameters.")] = 0.1,
     workers: WorkersOption = 1,
     state: StateFolder = None,
     out: TablesFile = None,
@@ -150,10 +148,10 @@ def zhao(
 
 @study_app.command()
 def loop(
-    data: Annotated[Path, typer.Option(help="Folder or archive of the reference rig's runs.")],
+    data: Annotated[Path, Option(help="Folder or archive of the reference rig's runs.")],
     seed: SeedOption = 0,
     task: Annotated[
-        list[int] | None, typer.Option(help="Only this row of the table, from 1; may be repeated.")
+        list[int] | None, Option(help="Only this row of the table, from 1; may be repeated.")
     ] = None,
     out: TablesFile = None,
     json: JsonFlag = False,
@@ -173,12 +171,12 @@ def loop(
 
 @study_app.command()
 def instruments(
-    data: Annotated[Path, typer.Option(help="Folder of the measured data's folders or archives.")],
-    source: Annotated[str, typer.Option(help="Instrument to fit on.")] = "Tool_4_Maryland_L_4",
+    data: Annotated[Path, Option(help="Folder of the measured data's folders or archives.")],
+    source: Annotated[str, Option(help="Instrument to fit on.")] = "Tool_4_Maryland_L_4",
     other: Annotated[
-        list[str] | None, typer.Option(help="Instrument to adapt to; may be repeated.")
+        list[str] | None, Option(help="Instrument to adapt to; may be repeated.")
     ] = None,
-    networks: Annotated[bool, typer.Option(help="Train networks too: minutes.")] = True,
+    networks: Annotated[bool, Option(help="Train networks too: minutes.")] = True,
     seed: SeedOption = 0,
     out: TablesFile = None,
     json: JsonFlag = False,
@@ -203,13 +201,13 @@ def instruments(
 
 @study_app.command()
 def intervals(
-    data: Annotated[Path, typer.Option(help="Folder of the measured data's folders or archives.")],
+    data: Annotated[Path, Option(help="Folder of the measured data's folders or archives.")],
     instrument: Annotated[
-        list[str] | None, typer.Option(help="Instrument to use; may be repeated.")
+        list[str] | None, Option(help="Instrument to use; may be repeated.")
     ] = None,
     source: Annotated[
         list[str] | None,
-        typer.Option(help="One to adapt to all others; may be repeated; the first three."),
+        Option(help="One to adapt to all others; may be repeated; the first three."),
     ] = None,
     seed: SeedOption = 0,
     out: TablesFile = None,
@@ -232,7 +230,7 @@ def intervals(
 def machines(
     data: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             metavar="DATA_FOLDER",
             help="Folder with emps, smart-grasper, sts3215 and ur10e, as folders or as"
             " machine-NAME.tar.xz; what is not there is left out.",

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Option
 
 from rig.cli.options import FiguresFolder, TablesFile, WorkersOption
 from rig.output.console import JsonFlag, progress, show_result
@@ -20,13 +21,10 @@ if TYPE_CHECKING:
 arm_studies = typer.Typer(rich_markup_mode=None)
 
 StateFolder = Annotated[
-    Path | None,
-    typer.Option("--state", help="Folder of finished parts; a cache folder by default."),
+    Path | None, Option("--state", help="Folder of finished parts; a cache folder by default.")
 ]
 
-ArmData = Annotated[
-    Path, typer.Option(help="Folder of measured arm motion, such as the dVRK paths.")
-]
+ArmData = Annotated[Path, Option(help="Folder of measured arm motion, such as the dVRK paths.")]
 
 
 def show(
@@ -91,11 +89,11 @@ def resumable(
 def pique(
     data: ArmData,
     paths: Annotated[
-        tuple[str, str], typer.Option(help="Two runs: effects are chosen fitting the first.")
+        tuple[str, str], Option(help="Two runs: effects are chosen fitting the first.")
     ] = ("one18", "two18"),
     also: Annotated[
         list[str] | None,
-        typer.Option(help="A further run to test on, with models fitted on the second path."),
+        Option(help="A further run to test on, with models fitted on the second path."),
     ] = None,
     out: TablesFile = None,
     figures: FiguresFolder = None,
@@ -114,12 +112,12 @@ def pique(
 
 @arm_studies.command()
 def excitation(
-    starts: Annotated[int, typer.Option(min=1, help="Random starts, from seed 0.")] = 5,
+    starts: Annotated[int, Option(min=1, help="Random starts, from seed 0.")] = 5,
     evaluations: Annotated[
-        int, typer.Option(min=100, help="Condition numbers each search may take of each start.")
+        int, Option(min=100, help="Condition numbers each search may take of each start.")
     ] = 3000,
     trajectory: Annotated[
-        Path | None, typer.Option(help="File for one period of the best one, as text at 200 Hz.")
+        Path | None, Option(help="File for one period of the best one, as text at 200 Hz.")
     ] = None,
     out: TablesFile = None,
     json: JsonFlag = False,
@@ -139,7 +137,7 @@ def _of_simulated_arms(name: str) -> Callable[..., None]:
 
     def command(
         seeds: Annotated[
-            int, typer.Option(min=1, help="Simulated arms of each family, from seed 0.")
+            int, Option(min=1, help="Simulated arms of each family, from seed 0.")
         ] = 2,
         workers: WorkersOption = 1,
         state: StateFolder = None,
@@ -170,13 +168,13 @@ for _name, _what in {
 @arm_studies.command()
 def payload(
     data: ArmData,
-    on: Annotated[list[str], typer.Option(help="A run to look for an added mass on.")],
-    model: Annotated[str, typer.Option(help="Run without the mass, to fit a model on.")] = "two18",
+    on: Annotated[list[str], Option(help="A run to look for an added mass on.")],
+    model: Annotated[str, Option(help="Run without the mass, to fit a model on.")] = "two18",
     height_m: Annotated[
-        float, typer.Option(min=0.01, help="Height of the mass above the remote centre, m.")
+        float, Option(min=0.01, help="Height of the mass above the remote centre, m.")
     ] = 0.535,
     height_error_m: Annotated[
-        float, typer.Option(min=0.0, help="Standard error of that height, m.")
+        float, Option(min=0.0, help="Standard error of that height, m.")
     ] = 0.01,
     out: TablesFile = None,
     json: JsonFlag = False,

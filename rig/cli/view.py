@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
@@ -28,18 +28,16 @@ if TYPE_CHECKING:
 def view(
     path: RecordingsArgument,
     run: Annotated[
-        list[str] | None, typer.Option(help="Only this run, in more points; may be repeated.")
+        list[str] | None, Option(help="Only this run, in more points; may be repeated.")
     ] = None,
     model: ReplayModel = None,
     machine: MachineOption = None,
     format_: FormatOption = None,
     skip_bad: SkipBad = False,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Page to write; by default NAME.view.html.")
+        Path | None, Option("--out", "-o", help="Page to write; by default NAME.view.html.")
     ] = None,
-    open_: Annotated[
-        bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
-    ] = True,
+    open_: Annotated[bool, Option("--open/--no-open", help="Open the page in a browser.")] = True,
     json: JsonFlag = False,
 ) -> None:
     """Show recordings in a browser: every channel over time, run by run.
