@@ -101,7 +101,6 @@ def _friction(
 
 
 def _signed(reference: Joint, level: Torque) -> Torque:
-    """Return friction of a level."""
     width = SIGN_SHARE * float(np.percentile(np.abs(reference.speed), 99.5))
     return lambda joint: level(joint) * np.tanh(joint.speed / width)
 

@@ -14,8 +14,7 @@ from estimation.arm.payload import LEAST_PERIODS, SIDE_STEP_M, AddedMass, added_
 from estimation.arm.tables import PSM, PointMass
 from estimation.arm.wrist import candidates
 from estimation.recording import FloatArray, Recording
-from rig.arm.search import EDGE_S, RATE_SHARE, Prepared, prepare
-from rig.arm.within import period_of
+from rig.arm.search import EDGE_S, RATE_SHARE, Prepared, period_of, prepare
 from rig.errors import DataError
 from rig.output.page import Page
 from rig.output.provenance import Provenance

@@ -1,7 +1,12 @@
-"""Search for the effects that an arm's torque holds beyond a model: fit one path, test another."""
+"""Search for the effects that an arm's torque holds beyond a model: fit one path, test another.
+
+Or effects are chosen on one path alone, so that another is untouched by the choice. The path is cut
+into segments, at the same places of every period. Periods repeat, so a random split would leak.
+Every other segment is fitted and the rest is the test, and back.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -15,6 +20,7 @@ from estimation.arm.regressor import regressor
 from estimation.arm.signed import Block, Normal, Products, solve
 from estimation.arm.tables import PSM, PSM_CLOSED
 from estimation.arm.wrist import candidates, gripper
+from estimation.diagnosis.split import SplitError, period_samples
 from estimation.filters import zero_phase
 from estimation.recording import FloatArray, Recording
 from rig.errors import DataError, UsageError
@@ -31,6 +37,10 @@ DAMPING = 1e-3
 
 LEAST_GAIN = 0.005
 """Mean relative gain over the joints below which the search stops."""
+
+STRETCHES = 8
+"""Of a period: each is longer than the filter's memory, and half of them cover most of the
+range."""
 
 GRIPPER_SHARE = 0.3
 """Weight of the gripper's own torque: it helps to identify the wrist's drives and is not scored."""
@@ -298,3 +308,31 @@ def score(way: tuple[Prepared, Prepared], kept: Sequence[str]) -> FloatArray:
 
 def _trial(effect: ArmEffect, kept_in_round: int | None, one: float, other: float) -> Trial:
     return Trial(effect.name, effect.what, kept_in_round, 100 * one, 100 * other)
+
+
+def period_of(run: Recording) -> float | None:
+    """Return the period of a run's motion in samples of a prepared path; None if it has none."""
+    try:
+        seconds = period_samples(run) / run.sample_rate_hz
+    except SplitError:
+        return None
+    return seconds * RATE_SHARE * LOW_PASS.cutoff_hz
+
+
+def chosen_within(path: Prepared, run: Recording, tried: Sequence[ArmEffect]) -> list[str]:
+    """Return the effects that help from some stretches of a path to the others and back.
+
+    Args:
+        path: The path, prepared with these effects.
+        run: The original run.
+        tried: The candidates.
+    """
+    samples = np.arange(len(path.torque))
+    period = period_of(run) or len(samples)
+    first = np.floor(samples / period * STRETCHES) % 2 == 0
+    arrays = ("torque", "thesis", "closed", "table")
+    one, other = (
+        replace(path, **{name: getattr(path, name)[kept] for name in arrays})
+        for kept in (first, ~first)
+    )
+    return search((one, other), (other, one), tried)[1]

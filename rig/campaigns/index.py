@@ -158,7 +158,6 @@ def _folders(root: Path) -> Iterator[tuple[Path, list[Path], str]]:
 
 
 def _learnt(folder: Path, logs: Sequence[Path]) -> dict[str, Any]:
-    """Return the runs and the diagnosis of a folder, as the index holds them."""
     # loaded when a log is read: a search alone needs no arrays and starts faster without them
     from rig.campaigns.reading import runs_in
 
@@ -167,7 +166,6 @@ def _learnt(folder: Path, logs: Sequence[Path]) -> dict[str, Any]:
 
 
 def _diagnosis(path: Path) -> Any:
-    """Return a diagnosis, or None where there is none that can be read."""
     try:
         content = json.loads(path.read_text())
         return content if str(content["schema"]).startswith("rig.diagnosis/") else None

@@ -9,6 +9,7 @@ from rig.log.attempts import heads_of, is_unfinished, run_name, standing
 from rig.log.reader import LogFile
 from rig.log.scan import NotALogError
 from rig.log.streams import SAMPLE
+from rig.output.provenance import utc_of
 
 
 def runs_in(paths: Sequence[Path]) -> list[IndexedRun]:
@@ -35,7 +36,7 @@ def _indexed(log: LogFile) -> IndexedRun:
         name=run_name(log),
         rig=run.rig if run else "",
         instrument=instrument,
-        date=_date(run.started_at_ns) if run else "",
+        date=utc_of(run.started_at_ns) if run else "",
         protocol=_protocol(log),
         conditions=conditions,
         notes=run.notes if run else "",
@@ -64,11 +65,3 @@ def _state(log: LogFile) -> str:
     if log.end and not log.end.clean:
         return f"aborted: {log.end.reason}" if log.end.reason else "aborted"
     return "complete"
-
-
-def _date(started_at_ns: int | None) -> str:
-    from datetime import UTC, datetime
-
-    if started_at_ns is None:
-        return ""
-    return datetime.fromtimestamp(started_at_ns * 1e-9, UTC).isoformat(timespec="seconds")

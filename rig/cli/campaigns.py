@@ -112,7 +112,6 @@ def _indexed(root: Path, rebuild: bool) -> "Sequence[IndexedCampaign]":
 def _listed(
     found: Sequence["IndexedCampaign"], root: Path, runs: bool, most: int, of: int
 ) -> "list[str | TextTable]":
-    """Return the table of the campaigns found, of so many in all."""
     count = sum(len(campaign.runs) for campaign in found)
     shown: list[str | TextTable] = []
     if found:

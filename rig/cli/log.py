@@ -1,7 +1,6 @@
 """`rig log`: what is in a log, is it whole, repair it, export it."""
 
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +11,7 @@ from rig.cli.log_export import export
 from rig.cli.options import say_left_out
 from rig.errors import ExitCode, UsageError
 from rig.output.console import JsonFlag, present, remarks
+from rig.output.provenance import utc_of
 from rig.output.table import counted, listed
 
 if TYPE_CHECKING:
@@ -61,12 +61,17 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     """
     from rig.log.attempts import standing
     from rig.log.check import check_log
+    from rig.recording.campaign import MANIFEST, read_manifest
 
     heads, foreign = _heads(path)
     counted = [log.path for log in standing(heads)]
     superseded = [log.path for log in heads if log.path not in counted]
     reports = [check_log(item) for item in counted]
-    missing = _missing_runs(path, {report.run for report in reports})
+    missing = []
+    if (path / MANIFEST).is_file():
+        there = {report.run for report in reports}
+        plans = read_manifest(path)[0].any_plans()
+        missing = [plan.name for plan in plans if plan.name not in there]
     code = max((report.verdict.exit_code for report in reports), default=ExitCode.OK)
     code = max(code, ExitCode.FAILED if missing else ExitCode.OK)
     code = max(code, ExitCode.DATA if foreign else ExitCode.OK)
@@ -98,16 +103,6 @@ def _heads(path: Path) -> "tuple[list[LogFile], list[str]]":
                 raise
             foreign.append(error.what)
     return heads, foreign
-
-
-def _missing_runs(path: Path, there: set[str | None]) -> list[str]:
-    """Return the runs of a campaign's protocol that have no log; empty if it is not a campaign."""
-    from rig.recording.campaign import MANIFEST, read_manifest
-
-    if not (path / MANIFEST).is_file():
-        return []
-    protocol, _ = read_manifest(path)
-    return [plan.name for plan in protocol.any_plans() if plan.name not in there]
 
 
 def _summed_up(reports: "list[LogReport]", superseded: int, missing: int) -> str:
@@ -183,7 +178,8 @@ def _info_of(log: dict[str, Any]) -> Iterator[str]:
     yield f"  {log['bytes'] / 1e6:.2f} MB, written by {log['written_by']}"
     if run is not None:
         yield f"  run {run.name} of {run.rig or 'an unnamed rig'}: {listed(run.conditions) or '-'}"
-        yield f"  started {_date(run.started_at_ns)}; notes: {run.notes or '-'}"
+        started = utc_of(run.started_at_ns) or "at an unknown time"
+        yield f"  started {started}; notes: {run.notes or '-'}"
         excluded = log["excluded"]
         yield f"  excluded: {excluded}" if excluded else "  counts as evidence"
     state = "not closed" if end is None else "clean" if end.clean else f"not clean: {end.reason}"
@@ -211,7 +207,6 @@ def _is_of_another_format(path: Path) -> bool:
 
 
 def _show_runs(path: Path, json: bool) -> None:
-    """Show each run's conditions, length, rate, flags and exclusion, and the channels."""
     from rig.importers.registry import open_campaign
 
     campaign = open_campaign(path)
@@ -243,12 +238,6 @@ def _show_runs(path: Path, json: bool) -> None:
             f"  {listed(run['conditions'])}{flagged}{excluded}"
         )
     present(json, {"runs": runs, "channels": list(channels)}, *said)
-
-
-def _date(started_at_ns: int | None) -> str:
-    if started_at_ns is None:
-        return "at an unknown time"
-    return datetime.fromtimestamp(started_at_ns * 1e-9, UTC).isoformat(timespec="seconds")
 
 
 def _report_lines(report: "LogReport") -> Iterator[str]:

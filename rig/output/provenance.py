@@ -15,6 +15,13 @@ def now_utc() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
+def utc_of(since_epoch_ns: int | None) -> str:
+    """Return a time in ns since the Unix epoch as `now_utc` has it; empty where it is unknown."""
+    if since_epoch_ns is None:
+        return ""
+    return datetime.fromtimestamp(since_epoch_ns * 1e-9, UTC).isoformat(timespec="seconds")
+
+
 @dataclass(frozen=True)
 class Provenance:
     """Data needed to reproduce a result.

@@ -7,7 +7,6 @@ from typing import Any
 
 from estimation import model_file
 from estimation.model import NotFittedError
-from estimation.recording import Recording
 from estimation.watch import ResidualWatch, Sight
 from rig.importers.registry import open_campaign
 
@@ -29,8 +28,17 @@ class RunWatch:
             DataError: The log cannot be read.
             MissingChannelError: The run lacks a channel of the model.
         """
-        recordings = list(open_campaign(path).evidence)
-        return " ".join(filter(None, (_after(*one, recordings) for one in self.watches)))
+        recordings, news = list(open_campaign(path).evidence), []
+        for watch, sights in self.watches:
+            fitted = _fits(sights)
+            sights += [sight for run in recordings if (sight := watch.see(run)) is not None]
+            if fitted and not _fits(sights):
+                last = sights[-1]
+                said = f"The model {watch.model.name!r} stops fitting, since run {last.since}"
+                if last.usual is not None:
+                    said += f" ({last.rmse / last.usual:.2f} times its own error)"
+                news.append(f"{said}.")
+        return " ".join(news)
 
     def to_json(self) -> list[dict[str, Any]]:
         """Return the state of each model in plain JSON types."""
@@ -47,17 +55,6 @@ class RunWatch:
 
 def _fits(sights: Sequence[Sight]) -> bool:
     return not sights or sights[-1].fits
-
-
-def _after(watch: ResidualWatch, sights: list[Sight], recordings: Sequence[Recording]) -> str:
-    """Hold finished runs against one model; return what is new to a person."""
-    fitted = _fits(sights)
-    sights += [sight for r in recordings if (sight := watch.see(r)) is not None]
-    if not fitted or _fits(sights):
-        return ""
-    last = sights[-1]
-    usual = "" if last.usual is None else f" ({last.rmse / last.usual:.2f} times its own error)"
-    return f"The model {watch.model.name!r} stops fitting, since run {last.since}{usual}."
 
 
 def watch_runs(path: Path) -> RunWatch:

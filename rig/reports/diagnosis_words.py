@@ -154,7 +154,6 @@ def other_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def _where_it_acts(finding: Finding) -> str:
-    """Return the part of the machine that a finding points at."""
     kind, _, channel = finding.place.partition(" ")
     if kind == "sensor":
         return f"It is an error of the sensor of {channel}."

@@ -146,12 +146,7 @@ def measured_torque(
     jacobians = tip_jacobians(HYDRAULIC, motion.position)[:, :3]
     outer = np.einsum("nij,ni->nj", jacobians, force)
     hidden = friction(arm, motion)
-    hidden[:, 0] += hose_drag(motion, arm.hose)
+    turn = motion.position[:, 0]
+    hidden[:, 0] += arm.hose * turn * (1 + turn**2)  # hoses pull harder the further they bend
     noise = PRESSURE_NOISE_N_M * rng.normal(size=inner.shape)
     return np.asarray((inner + outer + hidden) / arm.constants + noise)
-
-
-def hose_drag(motion: Motion, stiffness: float) -> FloatArray:
-    """Return the hoses' torque on joint 1: they pull back, and harder the further they bend."""
-    turn = motion.position[:, 0]
-    return stiffness * turn * (1 + turn**2)

@@ -123,7 +123,6 @@ def page(study: DelSolStudy) -> Page:
 
 
 def _figures(study: DelSolStudy) -> Mapping[str, Markup]:
-    """Draw the median residual of each joint and the median errors of force, by method."""
     sides = ("paper's method", "ours")
     paper, ours = (np.median(_errors(study, method), axis=0) for method in (PAPER, OURS))
     joints = {f"joint {k + 1}": (paper[k], ours[k]) for k in range(JOINTS)}

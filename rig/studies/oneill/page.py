@@ -101,7 +101,6 @@ def _lead(study: Study) -> str:
 
 
 def _notes(study: Study) -> list[str]:
-    """Return remarks for the reader: the sample counts, runs left out, and the study's notes."""
     counts = (
         f"The paper's processing gives {study.closing_samples:,} closing samples; the paper states"
         f" {study.paper_samples:,}, the public data gives {study.public_samples:,}."

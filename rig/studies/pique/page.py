@@ -5,8 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from markupsafe import Markup
 
-from rig.arm.search import DAMPING, LEAST_GAIN
-from rig.arm.within import STRETCHES
+from rig.arm.search import DAMPING, LEAST_GAIN, STRETCHES
 from rig.output.figures import paired_bars
 from rig.output.page import Page
 from rig.output.table import TextTable
@@ -88,7 +87,6 @@ def _notes(study: Study) -> list[str]:
 
 
 def _figures(study: Study) -> Mapping[str, Markup]:
-    """Draw the errors of each joint by the thesis' model and with effects, mean of both ways."""
     before, after = _mean(study, THESIS), _mean(study, EFFECTS)
     pairs = {f"J{k + 1}": (before[k], after[k]) for k in range(len(before))}
     caption = "NRMSD on the path that was not fitted, mean of both directions"

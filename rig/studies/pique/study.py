@@ -19,8 +19,7 @@ from estimation.arm.identification import Fit, fit, nrmsd_percent
 from estimation.arm.tables import PSM
 from estimation.arm.wrist import candidates
 from estimation.recording import FloatArray, Recording
-from rig.arm.search import Prepared, Trial, prepare, search
-from rig.arm.within import chosen_within
+from rig.arm.search import Prepared, Trial, chosen_within, prepare, search
 from rig.output.provenance import Provenance
 
 THESIS_TABLE_3_2 = (2.38, 4.80, 12.83, 6.49, 15.29, 18.11)

@@ -31,7 +31,15 @@ from estimation.arm.wrench import (
 from estimation.filters import zero_phase
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES
-from rig.arm.search import DAMPING, RATE_SHARE, Prepared, base_block, blocks_of, of_columns
+from rig.arm.search import (
+    DAMPING,
+    RATE_SHARE,
+    Prepared,
+    base_block,
+    blocks_of,
+    chosen_within,
+    of_columns,
+)
 from rig.arm.simulated import (
     RATE_HZ,
     ArmRun,
@@ -45,7 +53,6 @@ from rig.arm.simulated import (
     simulate,
     smooth_motion,
 )
-from rig.arm.within import chosen_within
 from rig.output.provenance import Provenance
 from rig.studies.families import arm_of
 from rig.studies.seeds import Keeper, kept_outcomes
