@@ -24,9 +24,9 @@ def end_of_hold(hold_s: float) -> tuple[float, float]:
     return last - 0.1, last
 
 
-def periodic(axis: AxisParameters, force_n: float, cycles: int = 8) -> FloatArray:
-    """Return squeezes at 2 Hz from first contact up to a force, rad, shape (n,)."""
-    time_s = np.arange(round(cycles / 2 * RATE_HZ)) / RATE_HZ
+def periodic(axis: AxisParameters, force_n: float) -> FloatArray:
+    """Return eight squeezes at 2 Hz from first contact up to a force, rad, shape (n,)."""
+    time_s = np.arange(round(4 * RATE_HZ)) / RATE_HZ
     squeeze = 0.5 - 0.5 * np.cos(2 * np.pi * 2 * time_s)
     first = axis.contact_rad
     return np.concatenate([_rise(0.0, first), first + (_depth(axis, force_n) - first) * squeeze])

@@ -56,17 +56,16 @@ def alarms(records: Any, stored: Sequence[CalibrationRecord]) -> list[str]:
     said = []
     for record in records:
         earlier = earlier_ones(record, stored)
-        if not earlier:
-            continue
-        for change in changes(earlier[0], record):
-            if change.drifted:
-                unit = parameter_unit(change.parameter, record)
-                said.append(
-                    f"{record.channel}, {change.parameter} drifted: {with_unit(change.now, unit)}"
-                    f" now, {with_unit(change.earlier, unit)} on {earlier[0].made_at[:10]};"
-                    f" {change.normalised_error:.1f} times the expanded uncertainty of the"
-                    " difference. Check mounting and cable, then calibrate again."
-                )
+        for change in changes(earlier[0], record) if earlier else ():
+            if not change.drifted:
+                continue
+            unit = parameter_unit(change.parameter, record)
+            said.append(
+                f"{record.channel}, {change.parameter} drifted: {with_unit(change.now, unit)} now,"
+                f" {with_unit(change.earlier, unit)} on {earlier[0].made_at[:10]};"
+                f" {change.normalised_error:.1f} times the expanded uncertainty of the difference."
+                " Check mounting and cable, then calibrate again."
+            )
     return said
 
 

@@ -65,7 +65,10 @@ def selected(
         model = chosen[-1].model
         room = parameters - sum(len(term.parameters) for term in model.terms)
         fitting = [term for term in tried if len(term.parameters) <= room]
-        base = [_table(model.terms, run) for run in runs]
+        base = [
+            np.hstack([t.sign * run.columns(t, t.numbers(t.effect.shape)) for t in model.terms])
+            for run in runs
+        ]
         aims = [run.thin[model.target] for run in runs]
         before = _left_out(_grams(base, aims))
         first = before if first is None else first
@@ -117,10 +120,6 @@ def _scored(
                 continue  # its amplitudes, fitted with all others, are not physically meaningful
             values = {p.name: Estimate(x) for p, x in zip(term.effect.shape, shape, strict=True)}
             yield _left_out(grams), replace(term, values=amplitudes | values)
-
-
-def _table(terms: Sequence[Term], run: FitRun) -> FloatArray:
-    return np.hstack([t.sign * run.columns(t, t.numbers(t.effect.shape)) for t in terms])
 
 
 def _left_out(grams: FloatArray) -> float:

@@ -92,12 +92,8 @@ OTHERS_REACH_N_M = {"command": 14.17e-3, "current": 14.24e-3, "gearbox": 43.14e-
 _FOUR = ("command", "current", "gearbox", "all")
 _FIVE = (*_FOUR, "sensor")
 _PRINTED: dict[tuple[str, str, str], tuple[str, ...]] = {
-    ("neutral", "end-to-end", PROXIMAL): (
-        "4.37 11.54 5.69",
-        "4.47 11.72 5.80",
-        "11.54 36.89 16.90",
-        "3.82 10.04 4.94",
-    ),
+    ("neutral", "end-to-end", PROXIMAL): ("4.37 11.54 5.69", "4.47 11.72 5.80",
+                                          "11.54 36.89 16.90", "3.82 10.04 4.94"),
     ("neutral", "staged", JAW): ("0.28 0.73 0.36", "0.29 0.74 0.37", "0.65 2.26 1.00",
                                  "0.25 0.64 0.32"),
     ("neutral", "end-to-end", JAW): ("0.28 0.74 0.37", "0.30 0.77 0.38", "0.69 2.33 1.00",
