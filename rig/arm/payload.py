@@ -147,8 +147,7 @@ def _unit(run: Recording, point_m: tuple[float, float, float], length: int) -> F
     torque = carried_torque(loaded, motion_of(position, 1 / rate_hz, FINE))
     every = max(1, round(rate_hz / (RATE_SHARE * LOW_PASS.cutoff_hz)))
     start = round(EDGE_S * rate_hz)
-    filtered = smoothed(torque[:, LIFTING, None], rate_hz)[start::every, :, 0]
-    return filtered[:length]
+    return smoothed(torque[:, LIFTING, None], rate_hz)[start::every, :, 0][:length]
 
 
 def page(study: Payload) -> Page:

@@ -143,8 +143,7 @@ def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = 
     ]
     if not changes:
         said.append("The two are the same record.")
-    data = {"first": a.content_hash, "second": b.content_hash, "changes": changes}
-    present(json, data, *said)
+    present(json, {"first": a.content_hash, "second": b.content_hash, "changes": changes}, *said)
 
 
 def use(

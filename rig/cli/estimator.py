@@ -113,8 +113,7 @@ def adapt(
 
 
 def _errors(result: "Adaptation") -> "TextTable":
-    is_torque = result.target.endswith("_n_m")
-    unit, scale = ("mN m", 1e3) if is_torque else ("deg", degrees(1.0))
+    unit, scale = ("mN m", 1e3) if result.target.endswith("_n_m") else ("deg", degrees(1.0))
     named = {
         "as it is": result.as_it_is,
         f"adapted with {', '.join(result.used)}": result.adapted,

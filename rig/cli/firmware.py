@@ -23,8 +23,7 @@ def version(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = 
     """
     from rig.bench.firmware import compare
 
-    settings = chosen_rig(config, sim)
-    versions = compare(settings)
+    versions = compare(chosen_rig(config, sim))
     present(
         json,
         versions,

@@ -202,8 +202,7 @@ def declared_models(model: str | None, machine: Path | None) -> "list[Model]":
 
     if machine is None:
         return models_in_use(Path(model or "grip"))
-    own = equations_of(machine)
-    named = [one for one in own if model in (None, one.balance)]
+    named = [one for one in equations_of(machine) if model in (None, one.balance)]
     return named or models_in_use(Path(str(model)))
 
 

@@ -101,8 +101,7 @@ def import_(
         from rig.output.provenance import Provenance
         from rig.reports.recordings import page
 
-        drawn = page(Campaign.of(recordings), "Imported table", Provenance.now(0))
-        write_text_atomic(plots, drawn)
+        write_text_atomic(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
     lines = [f"Note: {line}." for line in found.remarks]
     lines += [] if found.questions else ["Nothing looks wrong."]
     lines += [] if plots is None else [f"Plots: {plots}"]

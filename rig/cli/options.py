@@ -73,8 +73,7 @@ def _completed(names: Callable[[], list[str]], pattern: str = "") -> Callable[[s
         typed = Path(incomplete or ".")
         folder = typed if incomplete.endswith("/") or not incomplete else typed.parent
         files = sorted(map(str, folder.glob(pattern))) if pattern and folder.is_dir() else []
-        found = dict.fromkeys([*names(), *files])
-        return [name for name in found if name.startswith(incomplete)]
+        return [name for name in dict.fromkeys([*names(), *files]) if name.startswith(incomplete)]
 
     return complete
 

@@ -123,8 +123,7 @@ def _recorded(
                 if watch is not None and (news := watch.after(result.path)):
                     bar.console.print(news, style="yellow")
                 if result.drifted or not result.complete:
-                    text = f"{result.name}: {result.remark}"
-                    bar.console.print(text, style="yellow")
+                    bar.console.print(f"{result.name}: {result.remark}", style="yellow")
     except KeyboardInterrupt:
         screen.print(f"Stopped; the rig is safe. Go on with: rig record --resume {folder}")
         raise

@@ -136,8 +136,7 @@ class GrasperMachine(Machine):
         assert isinstance(limits, GrasperLimits)  # noqa: S101
         here = int(sample["motor_3"])
         last = dataclasses.replace(limits.axes[2], min_motor=here + 100, max_motor=here + 200)
-        narrow = dataclasses.replace(limits, axes=(*limits.axes[:2], last))
-        return narrow, Trip.MOTOR_TRAVEL
+        return dataclasses.replace(limits, axes=(*limits.axes[:2], last)), Trip.MOTOR_TRAVEL
 
     def beyond(self, limits: ArmLimits) -> tuple[NDArray[np.integer], ...]:
         """Return targets of which that of the last motor is beyond its travel."""

@@ -228,8 +228,7 @@ def _record_run(
             log.write_flight()
             log.poll()
         after = session.take_zeros(REST_S)
-        limits = session.config.drift_limits
-        drift = drift_verdicts(before, after, session.calibrations, limits)
+        drift = drift_verdicts(before, after, session.calibrations, session.config.drift_limits)
         lost = session.counters["lost"] - lost_before
         result = RunResult(plan.name, path, samples, expected, lost, tuple(drift))
         end = RunEnd(

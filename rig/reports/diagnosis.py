@@ -133,8 +133,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
     facts.append(("Error", f"{fall}, {runs}"))
     if variables:
         facts.append(("Depends on", variables))
-    equations = " and ".join([finding.balance, *finding.also_in])
-    facts.append(("Equation", equations))
+    facts.append(("Equation", " and ".join([finding.balance, *finding.also_in])))
     if finding.place not in ("", finding.balance):
         facts.append(("Place", finding.place))
     whole = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)

@@ -118,8 +118,7 @@ def page(study: DelSolStudy) -> Page:
         ADJUSTED,
         coverage("delsol"),
     ]
-    paragraphs = [_lead(study), NOTE]
-    return Page(TITLE, paragraphs, tables, study.provenance, lambda: _figures(study))
+    return Page(TITLE, [_lead(study), NOTE], tables, study.provenance, lambda: _figures(study))
 
 
 def _figures(study: DelSolStudy) -> Mapping[str, Markup]:
@@ -135,8 +134,7 @@ def _figures(study: DelSolStudy) -> Mapping[str, Markup]:
 
 def _errors(study: DelSolStudy, method: str) -> FloatArray:
     """Return a method's residuals and force errors on every arm, shape (arms, joints + 2)."""
-    each = study.outcomes[method]
-    return np.array([(*o.residual_n_m, o.impact_n, o.sliding_n) for o in each])
+    return np.array([(*o.residual_n_m, o.impact_n, o.sliding_n) for o in study.outcomes[method]])
 
 
 def _ratios(study: DelSolStudy) -> Mapping[str, FloatArray]:

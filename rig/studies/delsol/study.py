@@ -111,8 +111,7 @@ def run(seeds: int, keeper: Keeper) -> DelSolStudy:
         OSError: The folder cannot be written.
     """
     done = kept_outcomes(Seed, one_arm, seeds * len(FAMILIES), SCHEMA, keeper)
-    methods = (PAPER, DISCARDED, OURS)
-    by_method = {m: tuple(seed.outcomes[m] for seed in done) for m in methods}
+    by_method = {m: tuple(seed.outcomes[m] for seed in done) for m in (PAPER, DISCARDED, OURS)}
     named = tuple(seed.named for seed in done)
     return DelSolStudy(SCHEMA, seeds, by_method, named, Provenance.now(0))
 
@@ -130,11 +129,8 @@ def one_arm(number: int) -> Seed:
         return np.concatenate([paper_columns(motion), found_columns(effects, motion)], axis=2)
 
     outcomes = {}
-    for method, columns_of in (
-        (PAPER, paper_columns),
-        (DISCARDED, paper_columns),
-        (OURS, our_columns),
-    ):
+    ways = {PAPER: paper_columns, DISCARDED: paper_columns, OURS: our_columns}
+    for method, columns_of in ways.items():
         table = np.concatenate([columns_of(motion) for motion, _ in runs])
         torque = np.concatenate([torque for _, torque in runs])
         if method == DISCARDED:

@@ -58,8 +58,7 @@ def selected(
         on_found: Called with each model.
     """
     chosen = [Chosen(fit(declared, campaign, bootstrap=0), 0.0)]
-    with_all = replace(declared, terms=(*declared.terms, *tried))
-    runs = prepared(with_all, campaign)
+    runs = prepared(replace(declared, terms=(*declared.terms, *tried)), campaign)
     first = None
     while True:
         model = chosen[-1].model

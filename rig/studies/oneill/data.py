@@ -271,5 +271,4 @@ def held_out_masks(table: ClosingTable, protocol: str, seed: int) -> list[NDArra
         order = np.random.default_rng(seed).permutation(len(mask))
         mask[order[: round(TEST_SHARE * len(mask))]] = True
         return [mask]
-    parts = held_out_runs(table.conditions, protocol, seed)
-    return [np.isin(table.run, part) for part in parts]
+    return [np.isin(table.run, part) for part in held_out_runs(table.conditions, protocol, seed)]

@@ -6,7 +6,7 @@ five folds are those of the network rows, so that both stand side by side.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, product
 from pathlib import Path
 
 import numpy as np
@@ -82,26 +82,14 @@ class _Run:
 
 def jobs(poses: Sequence[str]) -> list[StateJob]:
     """Return the rows of the study."""
-    planned = []
-    for surrogate in ("command", "current"):
-        for filters in FILTERS:
-            for protocol in ("run-wise", "lofo", "lopo"):
-                planned += [
-                    StateJob("neutral", surrogate, target, filters, protocol) for target in TARGETS
-                ]
-    planned += [StateJob("neutral", "sensor", target) for target in (DISTAL, JAW)]
-    planned += [
-        StateJob("neutral", "command", target, without=effect)
-        for effect in EFFECTS
-        for target in TARGETS
-    ]
-    planned += [
-        StateJob(pose, surrogate, target, filters, protocol)
-        for pose in ("pitch", "roll")
-        for surrogate in ("command", "current")
-        for filters in FILTERS
-        for protocol in ("run-wise", "lopo")
-        for target in (DISTAL, JAW)
+    surrogates, protocols = ("command", "current"), ("run-wise", "lofo", "lopo")
+    neutral = product(surrogates, FILTERS, protocols, TARGETS)
+    posed = product(("pitch", "roll"), surrogates, FILTERS, ("run-wise", "lopo"), (DISTAL, JAW))
+    planned = [
+        *(StateJob("neutral", s, target, filters, held) for s, filters, held, target in neutral),
+        *(StateJob("neutral", "sensor", target) for target in (DISTAL, JAW)),
+        *(StateJob("neutral", "command", t, without=e) for e, t in product(EFFECTS, TARGETS)),
+        *(StateJob(pose, s, target, filters, held) for pose, s, filters, held, target in posed),
     ]
     return [job for job in planned if job.pose in poses]
 
@@ -257,6 +245,5 @@ def _fitted(
     found: dict[int, BankEstimator] = {}
     for held_out in _splits(runs, job.protocol, seed):
         rest = [run for k, run in enumerate(evidence) if k not in held_out]
-        estimator = fit_runs(rest, job.bank, job.target)
-        found |= dict.fromkeys(map(int, held_out), estimator)
+        found |= dict.fromkeys(map(int, held_out), fit_runs(rest, job.bank, job.target))
     return found

@@ -73,8 +73,7 @@ def of_family(psm: Psm, family: str, seed: int) -> Psm:
 def _free(psm: Psm, rng: np.random.Generator, seconds: float, moving: bool) -> PsmRun:
     path, open_rad = random_path(rng, seconds), psm.kind.open_rad
     gripper = moving_gripper(rng, seconds, open_rad) if moving else 0.0
-    motion = with_gripper(path, gripper, open_rad)
-    return simulate(psm, motion, rng, lead=LEAD_SAMPLES)
+    return simulate(psm, with_gripper(path, gripper, open_rad), rng, lead=LEAD_SAMPLES)
 
 
 def table_1(splits: dict[str, Split], seed: int) -> tuple[tuple[JointNetwork, ...], Cells]:

@@ -107,5 +107,4 @@ def _table(
     joint: int, runs: Sequence[PsmRun], names: Sequence[str]
 ) -> tuple[FloatArray, FloatArray]:
     rows = np.concatenate([states(run, names, EVERY) for run in runs])
-    torque = np.concatenate([run.torque[::EVERY, joint] for run in runs])
-    return rows, torque[:, None]
+    return rows, np.concatenate([run.torque[::EVERY, joint] for run in runs])[:, None]

@@ -73,8 +73,7 @@ it fits noise: the residual does not depend on these states."""
 
 def motion_of_run(run: PsmRun) -> Motion:
     """Return a run's motion as it is known at each sample; before its first one it stood still."""
-    before = np.repeat(run.position[:1], WINDOW, axis=0)
-    known = np.vstack([before, run.position])
+    known = np.vstack([np.repeat(run.position[:1], WINDOW, axis=0), run.position])
 
     def derivative(order: int) -> FloatArray:
         last, step = WINDOW - 1, 1 / RATE_HZ
@@ -179,8 +178,7 @@ def prepared(name: str, arm: Arm, runs: Sequence[PsmRun], effects: Sequence[ArmE
         widths = [part.shape[2] for part in parts[1:]]
         tables.append(np.concatenate(parts, axis=2))
         torques.append(run.torque[kept])
-    base = base_block(DAMPING, GRIPPER_FRICTIONS)
-    blocks = blocks_of(base, effects, widths)
+    blocks = blocks_of(base_block(DAMPING, GRIPPER_FRICTIONS), effects, widths)
     return of_columns(name, np.concatenate(torques), np.concatenate(tables), blocks, JOINTS)
 
 

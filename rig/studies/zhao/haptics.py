@@ -175,8 +175,7 @@ def _slope(force_n: FloatArray, angle_rad: FloatArray) -> float:
 
 def _confidence(high: Sequence[float], low: Sequence[float]) -> float:
     """Return one less the one-sided p-value of Welch's test that the first mean is greater."""
-    found = stats.ttest_ind(high, low, equal_var=False, alternative="greater")
-    return float(1.0 - found.pvalue)
+    return float(1.0 - stats.ttest_ind(high, low, equal_var=False, alternative="greater").pvalue)
 
 
 def _low(run: Recording, low_pass: LowPass) -> FloatArray:

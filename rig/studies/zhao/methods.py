@@ -170,8 +170,7 @@ def report_runs(dof: str, axes: Axes, seed: int) -> dict[str, list[Recording]]:
     for k, kind in enumerate(INPUTS):
         for j, force_n in enumerate(LEVELS_N):
             target = target_of(kind, axes[0], force_n)
-            run = record(f"{kind}-{force_n:g}N", dof, axes, target, seed + 10 * k + j)
-            found[kind].append(run)
+            found[kind].append(record(f"{kind}-{force_n:g}N", dof, axes, target, seed + 10 * k + j))
     return found
 
 

@@ -115,8 +115,7 @@ def _figures(study: Study, haptics: Sequence[Sequence[Answer]]) -> Mapping[str, 
     stem = "zhao" if short == "third" else f"zhao-{short}"
     drawn = {}
     for name in INPUTS:
-        target = target_of(name, axes[0], 1.5)
-        run = record(name, "grasp", axes, target, seed + 1)
+        run = record(name, "grasp", axes, target_of(name, axes[0], 1.5), seed + 1)
         series = {
             "force": run["grasp_torque_n_m"] / arm_m,
             "paper's method": method.force_n(run["grasp_current_a"], RATE_HZ),

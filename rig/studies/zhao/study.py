@@ -80,8 +80,7 @@ class Study:
 def look(prototype: str, spread: float, number: int) -> Lacking:
     """Diagnose a degree of freedom's model on a grasper of one family that is not reported."""
     family, dof = FAMILIES[number // len(DOFS)], DOFS[number % len(DOFS)]
-    axes = axes_of(PROTOTYPES[prototype], dof, LOOKED_AT, spread, family)
-    return lacking(dof, axes, LOOKED_AT)
+    return lacking(dof, axes_of(PROTOTYPES[prototype], dof, LOOKED_AT, spread, family), LOOKED_AT)
 
 
 def one_grasper(prototype: str, spread: float, added: Added, number: int) -> tuple[Cell, ...]:
