@@ -93,12 +93,7 @@ def _new_folder(what: str, procedure: Procedure) -> Path:
 
 
 def _refuse_unkept(store: CalibrationStore, folder: Path) -> None:
-    """Refuse, before anything is measured, a result or raw logs that could not be written.
-
-    Raises:
-        UsageError: The folder of the raw logs is there already.
-        OutputError: A folder cannot be written.
-    """
+    """Refuse, before anything is measured, a result or raw logs that could not be written."""
     require_absent(folder)
     for place in (store.folder.absolute(), folder.absolute()):
         there = next(above for above in (place, *place.parents) if above.exists())

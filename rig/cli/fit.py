@@ -39,11 +39,7 @@ STATE_NODES, THINNED = 12, 24
 def _recipe(
     kind: str, target: str, surrogate: str, live: bool, seed: int
 ) -> "BankRecipe | NetworkRecipe":
-    """Return products of physical states, or a network with some of them as inputs.
-
-    Raises:
-        UsageError: The states have no scale for that channel as the load.
-    """
+    """Return products of physical states, or a network with some of them as inputs."""
     from estimation.bank.states import LOAD_SCALES, Bank
     from estimation.estimators.bank import BankRecipe
     from estimation.estimators.network import STATE_INPUTS, NetworkRecipe

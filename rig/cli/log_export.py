@@ -13,7 +13,6 @@ from rig.output.table import counted
 
 if TYPE_CHECKING:
     from calibration.linear import CalibrationSet
-    from estimation.campaign import Campaign
     from rig.log.export import ExportFormat
 
 
@@ -50,6 +49,7 @@ def export(
     from rig.cli.import_ import write_logs
     from rig.cli.view import with_model
     from rig.importers.registry import open_campaign
+    from rig.importers.tidy import write_tidy
     from rig.log.export import ExportFormat, export_log
 
     if model or path.is_dir() or not path.name.endswith((".mcap", ".part")):
@@ -60,36 +60,22 @@ def export(
         campaign = with_model(whole.evidence, model) if model else whole.evidence
         if model and format_name == "mcap":
             written = write_logs(list(campaign), out or Path(f"{path.resolve().name}.estimated"))
-            _said(written, campaign, json)
-            return
-        _export_campaign(path, campaign, format_name, out, force, json)
+        else:
+            known = _known(format_name, "A campaign", (ExportFormat.CSV, ExportFormat.PARQUET))
+            name = f"{path.resolve().name}.{format_name}"
+            target = out or path.resolve().with_name(name)
+            target = target / name if target.is_dir() else target
+            written = [write_tidy(campaign, target, known, force)]
+        where = written[0] if len(written) == 1 else written[0].parent
+        data = {"written": written, "runs": campaign.names}
+        present(json, data, f"wrote {where}: {counted(len(campaign), 'run')}")
         return
     known = _known(format_name, "A log", ExportFormat)
     applied = _other_calibrations(path, calibration, record or [], store)
     written = export_log(path, known, out, topic, force=force, calibrations=applied)
     names = None if applied is None else {applied.name: applied.content_hash}
-    data = {"written": written, "calibrations": names}
-    present(json, data, *(f"wrote {target}" for target in written))
-
-
-def _said(written: list[Path], campaign: "Campaign", json: bool) -> None:
-    where = written[0] if len(written) == 1 else written[0].parent
-    data = {"written": written, "runs": campaign.names}
-    present(json, data, f"wrote {where}: {counted(len(campaign), 'run')}")
-
-
-def _export_campaign(
-    path: Path, campaign: "Campaign", format_name: str, out: Path | None, force: bool, json: bool
-) -> None:
-    from rig.importers.tidy import write_tidy
-    from rig.log.export import ExportFormat
-
-    known = _known(format_name, "A campaign", (ExportFormat.CSV, ExportFormat.PARQUET))
-    name = f"{path.resolve().name}.{format_name}"
-    target = out or path.resolve().with_name(name)
-    if target.is_dir():
-        target /= name
-    _said([write_tidy(campaign, target, known, force)], campaign, json)
+    found = {"written": written, "calibrations": names}
+    present(json, found, *(f"wrote {file}" for file in written))
 
 
 def _known(name: str, what: str, formats: "Iterable[ExportFormat]") -> "ExportFormat":
@@ -103,10 +89,7 @@ def _known(name: str, what: str, formats: "Iterable[ExportFormat]") -> "ExportFo
 def _other_calibrations(
     path: Path, calibration: str | None, records: list[str], store: Path | None
 ) -> "CalibrationSet | None":
-    """Return the set an export is to be made with; None for the one it was recorded with.
-
-    If the log exceeds the range of a record, the rules apply: a remark, or an error.
-    """
+    """Return the set an export is to be made with; None for the one it was recorded with."""
     if calibration is None and not records:
         return None
     from calibration.linear import load_calibration_set, shipped_calibration_set

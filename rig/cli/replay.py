@@ -135,10 +135,7 @@ def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
 def _estimators(
     recording: "Recording", model: Path | None, any_instrument: bool, quiet: bool
 ) -> "list[ModelEstimator]":
-    """Begin the estimates of a model at the recording's rate: of the named one, else that in use.
-
-    None without a model.
-    """
+    """Begin the estimates of the named model, else of that in use, at the recording's rate."""
     from estimation.estimators.instrument import require_own
     from rig.configuration.model_in_use import model_in_use
     from rig.live.estimator import estimators_of

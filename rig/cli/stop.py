@@ -64,11 +64,7 @@ def _stopped(path: Path, json: bool) -> dict[str, Any]:
 
 
 def _released(url: str) -> Ending | None:
-    """Let the session that has the rig, if any, disarm and end.
-
-    Raises:
-        PortBusyError: It is another user's.
-    """
+    """Let the session that has the rig, if any, disarm and end."""
     from drivers.errors import PortBusyError
     from rig.bench.holding import holder, let_go
 

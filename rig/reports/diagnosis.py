@@ -14,16 +14,8 @@ from rig.output.charts import embedded, scripts
 from rig.output.provenance import Provenance
 from rig.output.render import render
 from rig.output.table import TextTable
+from rig.reports import diagnosis_words as words
 from rig.reports.diagnosis_figures import charts
-from rig.reports.diagnosis_words import (
-    check_of,
-    display,
-    meaning,
-    next_sentence,
-    other_sentences,
-    sentences,
-    sizes_of,
-)
 
 VERDICTS = {
     "identified": "effect identified",
@@ -61,7 +53,7 @@ def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
         "diagnosis.html",
         {
             "title": f"Diagnosis: {VERDICTS[diagnosis.verdict]}",
-            "sentences": sentences(diagnosis),
+            "sentences": words.sentences(diagnosis),
             "cards": [card(finding, diagnosis) for finding in diagnosis.findings],
             "errors": error_table(diagnosis),
             "charts": drawn,
@@ -71,9 +63,9 @@ def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
                 _parameters(diagnosis.findings),
                 *_moved(diagnosis, signals),
             ],
-            "others": other_sentences(diagnosis),
+            "others": words.other_sentences(diagnosis),
             "limits": [*diagnosis.notes, CONFIDENCE],
-            "next_experiment": next_sentence(diagnosis),
+            "next_experiment": words.next_sentence(diagnosis),
             "method": method,
             "data": embedded(drawn),
             "script": scripts(),
@@ -121,12 +113,14 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
         alternatives), what to check at the rig, and the command that describes the effect, empty
         without a name.
     """
-    scale, unit = display(diagnosis.unit[finding.balance], finding.rmse_before)
+    scale, unit = words.display(diagnosis.unit[finding.balance], finding.rmse_before)
     named = finding.verdict in ("identified", "one_of")
     variables = " and ".join(v.replace("_", " ") for v in finding.depends_on)
     facts = []
     if named and finding.parameters:
-        sizes = ", ".join(f"{name} {text}".strip() for name, text in sizes_of(finding).items())
+        sizes = ", ".join(
+            f"{name} {text}".strip() for name, text in words.sizes_of(finding).items()
+        )
         facts.append(("Size", sizes))
     fall = f"{scale * finding.rmse_before:.3g} to {scale * finding.rmse_after:.3g} {unit}"
     runs = f"lower in {finding.runs_improved} of {finding.runs_total} held-out test runs"
@@ -142,9 +136,9 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
     if finding.confidence is not None:
         facts.append(("Confidence", f"{finding.confidence:.0%}"))
     if finding.alternatives:
-        alternatives = "; ".join(f"{meaning(a) or a} [{a}]" for a in finding.alternatives)
+        alternatives = "; ".join(f"{words.meaning(a) or a} [{a}]" for a in finding.alternatives)
         facts.append(("Could also be", alternatives))
-    title = meaning(finding.family) if named else f"something that depends on {variables}"
+    title = words.meaning(finding.family) if named else f"something that depends on {variables}"
     if not named and not variables:
         title = VERDICTS[finding.verdict]
     title = title or finding.family
@@ -152,7 +146,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
         "title": title[0].upper() + title[1:],
         "verdict": VERDICTS[finding.verdict],
         "facts": facts,
-        "check": check_of(finding),
+        "check": words.check_of(finding),
         "command": f"rig effects {finding.family}" if named else "",
     }
 
@@ -161,7 +155,7 @@ def error_table(diagnosis: Diagnosis) -> TextTable:
     """Return the errors on the held-out test runs before and after."""
     rows = []
     for name, error in diagnosis.errors.items():
-        scale, unit = display(diagnosis.unit[name], error.with_means_before)
+        scale, unit = words.display(diagnosis.unit[name], error.with_means_before)
         low, high = error.ratio_ci95
         ratio = f"{error.after / error.before:.2f}" if error.before else ""
         if math.isfinite(low) and math.isfinite(high):
@@ -196,7 +190,7 @@ def _parameters(findings: Sequence[Finding]) -> TextTable | None:
 
 def _with_interval(known: Value) -> list[str]:
     """Return value, interval and unit, to the digits that the interval supports."""
-    scale, unit = display(known.unit, known.value)
+    scale, unit = words.display(known.unit, known.value)
     if known.ci95 is None or not known.ci95[1] > known.ci95[0]:
         return [f"{scale * known.value:.4g}", "", unit]
     low, high = (scale * end for end in known.ci95)
@@ -206,7 +200,7 @@ def _with_interval(known: Value) -> list[str]:
 
 def _probabilities(findings: Sequence[Finding]) -> TextTable | None:
     rows = [
-        [f"{finding.balance}: {meaning(family) or family} [{family}]", f"{100 * share:.1f} %"]
+        [f"{finding.balance}: {words.meaning(family) or family} [{family}]", f"{100 * share:.1f} %"]
         for finding in findings
         for family, share in finding.probabilities.items()
     ]
@@ -229,7 +223,7 @@ def _moved(diagnosis: Diagnosis, signals: Traces) -> list[TextTable]:
         }
         rows = []
         for key, value in parameters.items():
-            scale, unit = display(units.get(key, ""), value["before"])
+            scale, unit = words.display(units.get(key, ""), value["before"])
             cells = (f"{scale * value[side]:.4g}" for side in ("before", "after"))
             rows.append([key, *cells, unit])
         if rows:

@@ -3,17 +3,10 @@
 from collections import Counter
 
 from rig.output.table import TextTable
+from rig.studies.oneill import paper
 from rig.studies.oneill.network_jobs import STATE_NODES
 from rig.studies.oneill.networks import NetworkRow, NetworkStudy
-from rig.studies.oneill.paper import (
-    FOLDS,
-    GRIP_ARM_M,
-    HELD_OUT,
-    PAPER_GRIP_N,
-    PAPER_GRIP_SHARE,
-    SHOWN,
-    shown,
-)
+from rig.studies.oneill.paper import FOLDS, HELD_OUT, SHOWN, shown
 
 WAYS = {
     "end-to-end": "the paper's inputs and 30 nodes",
@@ -37,9 +30,9 @@ def notes(study: NetworkStudy) -> list[str]:
     if study.grip_force is not None:
         force, share = study.grip_force
         told.append(
-            f"Grip force at {1e3 * GRIP_ARM_M:.0f} mm, from the command, random split: RMSE"
-            f" {force:.2f} N, {share:.1%} of the peak (paper: {PAPER_GRIP_N} N,"
-            f" {PAPER_GRIP_SHARE:.1%})."
+            f"Grip force at {1e3 * paper.GRIP_ARM_M:.0f} mm, from the command, random split: RMSE"
+            f" {force:.2f} N, {share:.1%} of the peak (paper: {paper.PAPER_GRIP_N} N,"
+            f" {paper.PAPER_GRIP_SHARE:.1%})."
         )
     loose = sum(row.networks - row.converged for row in study.rows)
     if loose:

@@ -22,19 +22,9 @@ from estimation.scores import Score, rmse, score
 from estimation.units import evaluate
 from rig.errors import DataError
 from rig.output.provenance import Provenance
+from rig.studies.oneill import paper
 from rig.studies.oneill.data import ClosingTable, Source, closing_table, held_out_masks
-from rig.studies.oneill.paper import (
-    AUTHORS_SKIP,
-    CONDITIONS,
-    HELD_OUT,
-    OTHERS_REACH_N_M,
-    PAPER_SAMPLES,
-    PAPER_TABLE_I,
-    PROXIMAL,
-    PUBLIC_SAMPLES,
-    SURROGATES,
-    PaperRow,
-)
+from rig.studies.oneill.paper import CONDITIONS, HELD_OUT, PROXIMAL, SURROGATES, PaperRow
 
 Mask = NDArray[np.bool_]
 
@@ -145,13 +135,13 @@ def run_study(
         measured=source.measured,
         notes=tuple(remarks),
         closing_samples=len(whole.run),
-        paper_samples=PAPER_SAMPLES,
-        public_samples=PUBLIC_SAMPLES,
+        paper_samples=paper.PAPER_SAMPLES,
+        public_samples=paper.PUBLIC_SAMPLES,
         runs=kept.names,
         left_out=left_out,
         rows=tuple(rows),
-        paper=PAPER_TABLE_I,
-        others_reach_n_m=OTHERS_REACH_N_M,
+        paper=paper.PAPER_TABLE_I,
+        others_reach_n_m=paper.OTHERS_REACH_N_M,
         rmse_by_run_n_m=_rmse_by_run(kept, shown, splits["run-wise"]),
         provenance=Provenance.now(seed),
     )
@@ -206,7 +196,7 @@ def _rows(
 ) -> Iterator[Row]:
     """Yield a row a protocol; the authors' fit takes all runs, as the paper has no flags."""
     unit = evaluate("target / source", {"target": "N m", "source": unit_of(channel)})
-    late = np.arange(len(whole.run)) >= round(len(whole.run) * AUTHORS_SKIP)
+    late = np.arange(len(whole.run)) >= round(len(whole.run) * paper.AUTHORS_SKIP)
     tried = {"authors": (whole, [(late, late)])}
     tried |= {name: (kept, [(~mask, mask) for mask in own]) for name, own in splits.items() if own}
     for protocol, (table, parts) in tried.items():

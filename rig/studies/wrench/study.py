@@ -30,16 +30,9 @@ from estimation.arm.wrench import (
 )
 from estimation.filters import zero_phase
 from estimation.recording import FloatArray
+from rig.arm import search
 from rig.arm.hidden import FAMILIES
-from rig.arm.search import (
-    DAMPING,
-    RATE_SHARE,
-    Prepared,
-    base_block,
-    blocks_of,
-    chosen_within,
-    of_columns,
-)
+from rig.arm.search import Prepared
 from rig.arm.simulated import (
     RATE_HZ,
     ArmRun,
@@ -185,17 +178,17 @@ def found_effects(run: ArmRun) -> list[ArmEffect]:
     tried = of_joints(JOINTS_ALONE)
     path = _path(_our_columns(tried, run), _filtered(run.torque), tried)
     whole = recorded("excitation", run.position, run.torque, RATE_HZ)
-    kept = chosen_within(path, whole, tried)
+    kept = search.chosen_within(path, whole, tried)
     return [effect for effect in tried if effect.name in kept]
 
 
 def _path(table: FloatArray, torque: FloatArray, effects: Sequence[ArmEffect]) -> Prepared:
     """Return columns of the base and of effects, thinned, ready to be fitted or searched."""
-    every = round(RATE_HZ / (RATE_SHARE * LOW_PASS.cutoff_hz))
+    every = round(RATE_HZ / (search.RATE_SHARE * LOW_PASS.cutoff_hz))
     still = motion_of(np.zeros((50, len(PSM.joints))), 1 / RATE_HZ, FINE)
     widths = [effect.columns(still).shape[2] for effect in effects]
-    blocks = blocks_of(base_block(DAMPING), effects, widths)
-    return of_columns("excitation", torque[::every], table[::every], blocks, len(PSM.joints))
+    blocks = search.blocks_of(search.base_block(search.DAMPING), effects, widths)
+    return search.of_columns("excitation", torque[::every], table[::every], blocks, len(PSM.joints))
 
 
 def _touched(
