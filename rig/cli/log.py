@@ -60,13 +60,13 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     complete, 1 if samples or runs are missing, 5 if a file is damaged.
     """
     from rig.log.attempts import standing
-    from rig.log.check import check_log
+    from rig.log.check import Verdict, check_log
     from rig.recording.campaign import MANIFEST, read_manifest
 
     heads, foreign = _heads(path)
-    counted = [log.path for log in standing(heads)]
-    superseded = [log.path for log in heads if log.path not in counted]
-    reports = [check_log(item) for item in counted]
+    logs = [log.path for log in standing(heads)]
+    superseded = [log.path for log in heads if log.path not in logs]
+    reports = [check_log(item) for item in logs]
     missing = []
     if (path / MANIFEST).is_file():
         there = {report.run for report in reports}
@@ -79,7 +79,14 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     said += [f"no log      {words}" for words in foreign]
     said += [f"superseded  {item}: not counted" for item in superseded]
     said += [f"missing     {name}. Record it: rig record --resume {path}" for name in missing]
-    said.append(_summed_up(reports, len(superseded), len(missing)))
+    whole = sum(report.verdict is Verdict.COMPLETE for report in reports)
+    topics = [topic for report in reports for topic in report.topics]
+    received, expected = sum(t.received for t in topics), sum(t.expected for t in topics)
+    runs = f"{whole} of {len(reports) + len(missing)} runs complete"
+    line = f"{runs}, {received} of {expected} samples"
+    if superseded:
+        line += f"; {counted(len(superseded), 'superseded log')} not counted"
+    said.append(f"{line}.")
     found = {"logs": reports, "superseded": superseded, "missing_runs": missing}
     present(json, {**found, "no_logs": foreign, "exit_code": int(code)}, *said)
     return int(code)
@@ -103,18 +110,6 @@ def _heads(path: Path) -> "tuple[list[LogFile], list[str]]":
                 raise
             foreign.append(error.what)
     return heads, foreign
-
-
-def _summed_up(reports: "list[LogReport]", superseded: int, missing: int) -> str:
-    from rig.log.check import Verdict
-
-    whole = sum(report.verdict is Verdict.COMPLETE for report in reports)
-    received = sum(topic.received for report in reports for topic in report.topics)
-    expected = sum(topic.expected for report in reports for topic in report.topics)
-    line = f"{whole} of {len(reports) + missing} runs complete, {received} of {expected} samples"
-    if superseded:
-        line += f"; {superseded} superseded {'log' if superseded == 1 else 'logs'} not counted"
-    return f"{line}."
 
 
 @log_app.command()

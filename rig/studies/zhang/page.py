@@ -253,17 +253,15 @@ def _table_2(study: ZhangStudy) -> TextTable:
             if method == NETWORKS:
                 near = (_words(study.near(cell))[0] for cell in cells)
                 rows.append([f"{when}: within {WITHIN:.0%}", *near])
-    wins = (
-        study.values(f"II after | {name} | {OURS}")
-        < study.values(f"II after | {name} | {NETWORKS}")
-        for name in OTHERS
+    after = (
+        [study.values(f"II after | {name} | {who}") for who in (OURS, NETWORKS)] for name in OTHERS
     )
-    rows.append(["after: arms where ours is better", *(str(int(won.sum())) for won in wins)])
-    note = "Before and after transfer from the Large Needle Driver. " + ", ".join(
-        f"{name}: {KINDS[name].name}" for name in OTHERS
-    )
+    wins = (str(int((ours < networks).sum())) for ours, networks in after)
+    rows.append(["after: arms where ours is better", *wins])
+    kinds = ", ".join(f"{name}: {KINDS[name].name}" for name in OTHERS)
+    note = f"Before and after transfer from the Large Needle Driver. {kinds}."
     title = "Table II: NRMSE of gripper torque on other instruments, %"
-    return TextTable(title, ["", *OTHERS], rows, note + ".")
+    return TextTable(title, ["", *OTHERS], rows, note)
 
 
 def _grasp(study: ZhangStudy) -> TextTable:
