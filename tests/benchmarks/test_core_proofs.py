@@ -1,7 +1,6 @@
 """Theorems on the firmware's core: what they state, and that a broken core breaks them."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -48,7 +47,7 @@ def test_a_broken_claim_is_on_the_page():
     ],
 )
 def test_a_theorem_holds_for_the_core_and_not_for_a_damaged_one(
-    tmp_path: Path, file: str, sound: str, broken: str, theorem: str
+    tmp_path, file, sound, broken, theorem
 ):
     folder = tmp_path / "firmware"
     shutil.copytree(FIRMWARE, folder, ignore=shutil.ignore_patterns("build"))

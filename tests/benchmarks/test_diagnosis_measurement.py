@@ -13,7 +13,7 @@ from benchmarks.diagnosis.own import (
     record,
     truth_of,
 )
-from benchmarks.diagnosis.scoring import Truth, judge, judge_next, outcome
+from benchmarks.diagnosis.scoring import judge, judge_next, outcome
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 from estimation.derived import zero_phase_channels
 from estimation.effects import families
@@ -34,24 +34,22 @@ def said(*findings: dict[str, Any], following: object = None) -> dict[str, Any]:
     return {"findings": list(findings), "next_experiment": following}
 
 
-def hidden(
-    kind: str, *names: str, either: tuple[str, ...] = (), runs: tuple[int, ...] = (0,)
-) -> Truth:
+def hidden(kind, *names, either=(), runs=(0,)):
     effects = tuple(HiddenEffect(name) for name in names)
     return truth_of(Answer("case-x", kind, effects, runs, either=either))
 
 
-def test_every_hidden_effect_has_an_answer() -> None:
+def test_every_hidden_effect_has_an_answer():
     assert set(TRUTHS) == set(NAMES)
 
 
-def test_every_family_is_hidden_in_some_case_or_cannot_be() -> None:
+def test_every_family_is_hidden_in_some_case_or_cannot_be():
     hidden_ = {truth.family for truth in CATALOGUED.values()}
     assert not hidden_ & NOT_HIDDEN.keys()
     assert hidden_ | NOT_HIDDEN.keys() == set(families())
 
 
-def test_what_comes_or_fades_does_so_from_run_to_run() -> None:
+def test_what_comes_or_fades_does_so_from_run_to_run():
     wear = Answer("case-x", "strong", (HiddenEffect("gear_wear"),), (7, 8, 9))
     assert (wear.in_run(6), wear.in_run(8)) == ((), wear.effects)
     stiff = Answer("case-x", "strong", (HiddenEffect("cable_stiff"),), tuple(range(14)))
@@ -60,7 +58,7 @@ def test_what_comes_or_fades_does_so_from_run_to_run() -> None:
 
 
 @pytest.mark.parametrize("number", range(len(CLEAN)))
-def test_a_recording_gives_nothing_away(number: int) -> None:
+def test_a_recording_gives_nothing_away(number):
     answer = draw("clean", number, 1)
     assert (answer.chain, answer.excitation) == CLEAN[number]
     (recording,) = record(answer, plans_of(answer.excitation)[:1])
@@ -93,7 +91,7 @@ named; the score. A plus is a proposed experiment."""
 
 
 @pytest.mark.parametrize("row", SCORED.strip().splitlines())
-def test_an_answer_is_scored(row: str) -> None:
+def test_an_answer_is_scored(row):
     true, answer, result = (part.strip() for part in row.split("|"))
     kind, *names = true.split()
     either = ("friction.load", "friction.position") if kind == "confounded" else ()
@@ -109,7 +107,7 @@ def test_an_answer_is_scored(row: str) -> None:
     assert judge(truth, report).right == (result == best.get(truth.kind, "right name"))
 
 
-def test_a_wrong_name_is_sure_from_nine_tenths_on() -> None:
+def test_a_wrong_name_is_sure_from_nine_tenths_on():
     answer = hidden("strong", "motor_ripple")
     true = finding("identified", "ripple.motor", confidence=0.99)
     for confidence in (0.89, 0.9):
@@ -119,7 +117,7 @@ def test_a_wrong_name_is_sure_from_nine_tenths_on() -> None:
         assert judged.sure_and_wrong == (confidence >= 0.9)
 
 
-def test_an_effect_of_some_runs_needs_the_runs_but_for_one() -> None:
+def test_an_effect_of_some_runs_needs_the_runs_but_for_one():
     answer = hidden("some_runs", "motor_ripple", runs=(1, 2, 3, 4, 5))
     for affected, right in (
         ([1, 2, 3, 4, 5], True),
@@ -130,7 +128,7 @@ def test_an_effect_of_some_runs_needs_the_runs_but_for_one() -> None:
         assert judge(answer, said(found)).right == right
 
 
-def test_a_confounded_case_is_solved_by_the_single_true_name() -> None:
+def test_a_confounded_case_is_solved_by_the_single_true_name():
     answer = hidden(
         "confounded", "gear_load_friction", either=("friction.load", "motor.saturation")
     )

@@ -1,7 +1,5 @@
 """The simulated rig against a measured run of the reference rig."""
 
-from pathlib import Path
-
 import pytest
 
 from benchmarks.measured_run import compare
@@ -11,7 +9,7 @@ pytestmark = pytest.mark.integration
 
 
 @pytest.mark.measured
-def test_a_simulated_run_looks_like_the_measured_one(measured_data: Path) -> None:
+def test_a_simulated_run_looks_like_the_measured_one(measured_data):
     """0.3 Hz against load 0.5: the spread of each channel within 30 % of the measured run's.
 
     Three channels are held to less. Distal torque varies along the stroke on the reference rig and

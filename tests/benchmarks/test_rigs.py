@@ -1,5 +1,4 @@
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ def left(case: Case, recordings: tuple[Recording, ...]) -> dict[str, Fitted]:
 
 
 @pytest.mark.parametrize("kind", ["clean", pytest.param("strong", marks=pytest.mark.long)])
-def test_a_seed_and_kind_give_the_same_samples_every_time(kind: str) -> None:
+def test_a_seed_and_kind_give_the_same_samples_every_time(kind):
     one, other = draw(FIRST + 1, kind), case_of(kind, FIRST + 1)
     for first, second in zip(one.recordings, other.recordings, strict=True):
         assert first.conditions == second.conditions
@@ -38,9 +37,7 @@ def test_a_seed_and_kind_give_the_same_samples_every_time(kind: str) -> None:
 
 
 @pytest.mark.parametrize(("kind", "low", "high"), [("strong", 2.2, 5.0), ("weak", 1.25, 1.9)])
-def test_the_stated_strength_is_what_the_declared_model_shows(
-    kind: str, low: float, high: float
-) -> None:
+def test_the_stated_strength_is_what_the_declared_model_shows(kind, low, high):
     case = case_of(kind)
     (effect,) = case.truth.effects
     without, with_it = left(case, tuple(case.twin)), left(case, case.recordings)
@@ -51,7 +48,7 @@ def test_the_stated_strength_is_what_the_declared_model_shows(
         assert case.truth.clean_rms[equation] == pytest.approx(without[equation].rms())
 
 
-def test_the_true_structure_leaves_what_the_clean_twin_leaves() -> None:
+def test_the_true_structure_leaves_what_the_clean_twin_leaves():
     case = case_of("strong")
     (effect,) = case.truth.effects
     runs = prepared(case, case.recordings)
@@ -61,7 +58,7 @@ def test_the_true_structure_leaves_what_the_clean_twin_leaves() -> None:
     assert case.truth.with_rms[effect.equation] > 2.0 * clean
 
 
-def test_a_clean_residual_is_the_noise_of_its_sensors() -> None:
+def test_a_clean_residual_is_the_noise_of_its_sensors():
     case = case_of("clean", FIRST + 1)
     assert not case.truth.effects
     stage = case.stage
@@ -72,7 +69,7 @@ def test_a_clean_residual_is_the_noise_of_its_sensors() -> None:
 
 
 @pytest.mark.long
-def test_an_effect_of_some_runs_is_in_these_alone() -> None:
+def test_an_effect_of_some_runs_is_in_these_alone():
     case = case_of("some_runs")
     (effect,) = case.truth.effects
     twin, there = tuple(case.twin), set(effect.runs)
@@ -83,21 +80,21 @@ def test_an_effect_of_some_runs_is_in_these_alone() -> None:
 
 
 @pytest.mark.long
-def test_a_confounded_case_states_the_families_that_cannot_be_separated() -> None:
+def test_a_confounded_case_states_the_families_that_cannot_be_separated():
     truth = case_of("confounded").truth
     assert len(truth.together) >= 2
     assert truth.effects[0].family in truth.together
 
 
 @pytest.mark.long
-def test_an_effect_outside_the_catalogue_has_no_name_but_variables() -> None:
+def test_an_effect_outside_the_catalogue_has_no_name_but_variables():
     (effect,) = case_of("outside").truth.effects
     assert effect.family == "unknown"
     assert effect.variables
 
 
 @pytest.mark.long
-def test_a_faulty_sensor_does_not_move_the_plant() -> None:
+def test_a_faulty_sensor_does_not_move_the_plant():
     faulty = (case_of("strong", FIRST + k) for k in range(14))
     case = next(c for c in faulty if c.truth.effects[0].family.startswith("sensor."))
     others = list(next(iter(case.twin)).columns)
@@ -106,7 +103,7 @@ def test_a_faulty_sensor_does_not_move_the_plant() -> None:
         assert len(changed) == 1
 
 
-def test_written_logs_read_back_equal(tmp_path: Path) -> None:
+def test_written_logs_read_back_equal(tmp_path):
     case = case_of("clean", FIRST + 1)
     read = list(open_campaign(case.write(tmp_path / "runs")))
     assert [r.name for r in read] == [r.name for r in case.recordings]
@@ -118,7 +115,7 @@ def test_written_logs_read_back_equal(tmp_path: Path) -> None:
             np.testing.assert_array_equal(one[name], other[name])
 
 
-def test_ranges_of_seeds_are_apart() -> None:
+def test_ranges_of_seeds_are_apart():
     for one, other in ((CALIBRATE, DEVELOP), (DEVELOP, JUDGE), (CALIBRATE, JUDGE)):
         assert not any(seed in other for seed in (one[0], one[-1]))
         assert not any(seed in one for seed in (other[0], other[-1]))

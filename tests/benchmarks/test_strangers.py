@@ -1,7 +1,5 @@
 """Machines drawn at random: a seed draws one machine, and the library reads its files."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,13 +12,13 @@ pytestmark = pytest.mark.integration
 SEEDS = (1000100, 1000101)
 
 
-def test_every_family_of_a_hidden_effect_is_of_the_catalogue() -> None:
+def test_every_family_of_a_hidden_effect_is_of_the_catalogue():
     assert {name for effect in NAMED.values() for name in effect.families} <= {*families()}
     assert {effect.families for effect in UNNAMED.values()} == {("unknown",)}
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_seed_draws_the_same_files_and_the_library_reads_them(tmp_path: Path, kind: str) -> None:
+def test_a_seed_draws_the_same_files_and_the_library_reads_them(tmp_path, kind):
     for seed in SEEDS:
         folders = [tmp_path / f"{seed}-{copy}" for copy in range(2)]
         for folder in folders:
@@ -37,7 +35,7 @@ def test_a_seed_draws_the_same_files_and_the_library_reads_them(tmp_path: Path, 
         assert all({*places} <= equations for _, places, _ in first)
 
 
-def test_machines_of_both_kinds_are_drawn() -> None:
+def test_machines_of_both_kinds_are_drawn():
     random = [np.random.default_rng(seed) for seed in range(40)]
     drawn = [Stranger(seed, "strong", random[seed]).is_geared for seed in range(40)]
     assert {True, False} == {*drawn}

@@ -79,7 +79,6 @@ class EmulatedLine(SimulatedTransport):
 
     def close(self) -> None:
         super().close()
-        assert isinstance(self.board, EmulatedBoard)
         self.board.close()
 
 

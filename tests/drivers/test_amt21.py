@@ -18,13 +18,13 @@ VECTORS = {0: 0xC000, 1: 0x8001, 0x1234: 0x9234, 0x2000: 0x6000, 0x21AB: 0x61AB,
 
 
 @pytest.mark.parametrize(("value", "word"), VECTORS.items())
-def test_the_check_bits_are_those_of_known_answers(value: int, word: int) -> None:
+def test_the_check_bits_are_those_of_known_answers(value, word):
     reply = word.to_bytes(2, "little")
     assert protocol.encode_reply(value) == reply
     assert protocol.decode_reply(reply) == value
 
 
-def test_the_questions_are_those_of_the_makers_sample_code() -> None:
+def test_the_questions_are_those_of_the_makers_sample_code():
     """Source: same-sky/AMT21_RS485_Sample_Code_Mega: address, and address + 1 for the turns."""
     assert protocol.request(0x54) == b"\x54"
     assert protocol.request(0x54, turns=True) == b"\x55"
@@ -32,13 +32,13 @@ def test_the_questions_are_those_of_the_makers_sample_code() -> None:
 
 
 @given(value=st.integers(0, 2**14 - 1), bit=st.integers(0, 15))
-def test_one_changed_bit_is_refused(value: int, bit: int) -> None:
+def test_one_changed_bit_is_refused(value, bit):
     word = int.from_bytes(protocol.encode_reply(value), "little") ^ 1 << bit
     with pytest.raises(FrameError):
         protocol.decode_reply(word.to_bytes(2, "little"))
 
 
-def test_it_polls_at_its_rate_and_reads_the_angle() -> None:
+def test_it_polls_at_its_rate_and_reads_the_angle():
     fake = Amt21Fake(counts_a_tick=100)
     device = Amt21(SimulatedTransport(fake), rate_hz=100.0)
     assert device.identify().model == "AMT21"
@@ -52,7 +52,7 @@ def test_it_polls_at_its_rate_and_reads_the_angle() -> None:
     assert len(device.read(0.001)) == 0
 
 
-def test_turns_are_signed() -> None:
+def test_turns_are_signed():
     fake = Amt21Fake(counts_a_tick=-20, multi_turn=True)
     device = Amt21(SimulatedTransport(fake), multi_turn=True, rate_hz=1.0)
     device.start()
@@ -72,7 +72,7 @@ class Turning(Amt21Fake):
 
 
 @pytest.mark.parametrize("counts_a_tick", [400, -400, 1000])
-def test_turns_and_angle_belong_together_however_the_shaft_turns(counts_a_tick: int) -> None:
+def test_turns_and_angle_belong_together_however_the_shaft_turns(counts_a_tick):
     fake = Turning(counts_a_tick=counts_a_tick, multi_turn=True)
     device = Amt21(SimulatedTransport(fake), multi_turn=True, rate_hz=200.0)
     device.start()
@@ -90,15 +90,13 @@ def test_turns_and_angle_belong_together_however_the_shaft_turns(counts_a_tick: 
     moved=st.tuples(st.integers(0, 2**12), st.integers(0, 2**12)),
     sense=st.sampled_from([-1, 1]),
 )
-def test_the_turns_of_an_angle_are_those_when_it_was_read(
-    total: int, moved: tuple[int, int], sense: int
-) -> None:
+def test_the_turns_of_an_angle_are_those_when_it_was_read(total, moved, sense):
     before, after = total - sense * moved[0], total + sense * moved[1]
     numbers = [place // 2**14 % 2**14 for place in (before, after, total)]
     assert turns_at(total % 2**14, numbers[0], numbers[1]) == numbers[2]
 
 
-def test_turns_that_lie_further_apart_are_no_reading() -> None:
+def test_turns_that_lie_further_apart_are_no_reading():
     assert turns_at(0, 5, 7) is None
     assert turns_at(0, 0, 2**13) is None
 
@@ -114,11 +112,11 @@ def reader(multi_turn: bool, bad: list[int]) -> Amt21:
         fake.count = 9000 if next(answers) in bad else 1000
         original(data)
 
-    fake.receive = receive  # type: ignore[method-assign]
+    fake.receive = receive
     return Amt21(SimulatedTransport(fake), multi_turn=multi_turn, top_speed_rad_s=100.0)
 
 
-def test_a_damaged_answer_whose_check_bits_fit_is_asked_for_again() -> None:
+def test_a_damaged_answer_whose_check_bits_fit_is_asked_for_again():
     device = reader(multi_turn=False, bad=[3])
     device.start()
     batches = [device.read(0.1) for _ in range(6)]
@@ -127,7 +125,7 @@ def test_a_damaged_answer_whose_check_bits_fit_is_asked_for_again() -> None:
     assert (device.counters["crc_errors"], device.counters["retries"]) == (1, 1)
 
 
-def test_a_jump_that_two_answers_confirm_is_believed() -> None:
+def test_a_jump_that_two_answers_confirm_is_believed():
     device = reader(multi_turn=False, bad=[3, 4, 5, 6])
     device.start()
     batches = [device.read(0.1) for _ in range(5)]
@@ -135,7 +133,7 @@ def test_a_jump_that_two_answers_confirm_is_believed() -> None:
     assert batches[-1].lost == 0
 
 
-def test_an_echoing_adapter_is_dealt_with_and_seen() -> None:
+def test_an_echoing_adapter_is_dealt_with_and_seen():
     device = Amt21(SimulatedTransport(Amt21Fake(echo=True)))
     device.start()
     assert device.read(0.1).columns["angle_rad"].tolist() == [0.0]
@@ -143,7 +141,7 @@ def test_an_echoing_adapter_is_dealt_with_and_seen() -> None:
     assert device.counters["crc_errors"] == 0
 
 
-def test_another_address_stays_silent() -> None:
+def test_another_address_stays_silent():
     device = Amt21(SimulatedTransport(Amt21Fake(address=0x58)))
     with pytest.raises(LinkTimeoutError, match="0x54"):
         device.identify()
@@ -153,7 +151,7 @@ def test_another_address_stays_silent() -> None:
     assert device.counters["timeouts"] == 2
 
 
-def test_a_caller_that_comes_late_has_lost_samples() -> None:
+def test_a_caller_that_comes_late_has_lost_samples():
     transport = SimulatedTransport(Amt21Fake())
     device = Amt21(transport, rate_hz=100.0)
     device.start()
@@ -163,7 +161,7 @@ def test_a_caller_that_comes_late_has_lost_samples() -> None:
     assert (int(late.sequence[0]), late.lost) == (5, 4)
 
 
-def test_an_address_is_a_multiple_of_four() -> None:
+def test_an_address_is_a_multiple_of_four():
     with pytest.raises(ValueError, match="multiple of 4"):
         protocol.request(0x55)
     with pytest.raises(LinkError, match="multiple of 4"):

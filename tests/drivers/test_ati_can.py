@@ -42,7 +42,7 @@ def set_up(base: int = 0x200) -> list[Exchange]:
     ]
 
 
-def test_the_conversation_of_the_manual() -> None:
+def test_the_conversation_of_the_manual():
     reading = [frame(0x200, "0000 0001 0003 0005"), frame(0x201, "0002 ffff 8001")]
     with ScriptedCanBus([*set_up(), (frame(0x200), reading)]) as bus:
         device = AtiCan(bus)
@@ -57,7 +57,7 @@ def test_the_conversation_of_the_manual() -> None:
     assert batch.sequence[0] == 0
 
 
-def test_a_script_that_is_not_followed_fails() -> None:
+def test_a_script_that_is_not_followed_fails():
     with pytest.raises(AssertionError), ScriptedCanBus([(frame(0x205), [])]) as bus:
         bus.send(frame(0x206))
     unread = ScriptedCanBus([(frame(0x205), [frame(0x205)])])
@@ -67,7 +67,7 @@ def test_a_script_that_is_not_followed_fails() -> None:
         pass
 
 
-def test_old_firmware_is_not_asked_for_units() -> None:
+def test_old_firmware_is_not_asked_for_units():
     node = AtiCanFake(firmware=(3, 6, 0), load=lambda _: np.array([100, 0, 0, 0, 0, 0]))
     device = AtiCan(SimulatedCanBus([node]))
     assert device.identify().firmware == "3.6.0"
@@ -77,7 +77,7 @@ def test_old_firmware_is_not_asked_for_units() -> None:
     device.close()
 
 
-def test_replies_are_paired_among_other_frames_and_stragglers() -> None:
+def test_replies_are_paired_among_other_frames_and_stragglers():
     first, second = "0000 0001 0003 0005", "0002 0004 0006"
     answer = [
         frame(0x201, "0009 0009 0009"),  # a straggler's second half
@@ -97,7 +97,7 @@ def test_replies_are_paired_among_other_frames_and_stragglers() -> None:
     assert device.counters["late"] == 2
 
 
-def test_half_an_answer_is_asked_for_again_and_none_is_a_gap() -> None:
+def test_half_an_answer_is_asked_for_again_and_none_is_a_gap():
     half = [frame(0x200, "0000 0001 0003 0005")]
     whole = [frame(0x200, "0000 0007 0003 0005"), frame(0x201, "0002 0004 0006")]
     polls: list[Exchange] = [(frame(0x200), half), (frame(0x200), whole)]
@@ -114,7 +114,7 @@ def test_half_an_answer_is_asked_for_again_and_none_is_a_gap() -> None:
     assert device.counters["timeouts"] == 1
 
 
-def test_a_saturated_gauge_makes_the_whole_wrench_invalid() -> None:
+def test_a_saturated_gauge_makes_the_whole_wrench_invalid():
     for gauge in range(6):
         for end in (-40_000, 32_767):
             load = np.zeros(6, np.int64)
@@ -129,7 +129,7 @@ def test_a_saturated_gauge_makes_the_whole_wrench_invalid() -> None:
     assert not protocol.is_saturated(np.array([32_766, -32_767, 0, 0, 0, 0], np.int16))
 
 
-def test_the_status_is_reported_in_words_and_flags_what_cannot_be_used() -> None:
+def test_the_status_is_reported_in_words_and_flags_what_cannot_be_used():
     node = AtiCanFake()
     device = AtiCan(SimulatedCanBus([node]))
     device.start()
@@ -152,14 +152,14 @@ STATUS_BITS = (
 
 
 @pytest.mark.parametrize("row", STATUS_BITS.split("; "))
-def test_a_status_bit_is_that_of_the_manual(row: str) -> None:
+def test_a_status_bit_is_that_of_the_manual(row):
     bit, words = int(row.split()[0]), row.split(" ", 1)[1]
     (said,) = protocol.status_words(1 << bit)
     assert re.search(words, said)
     assert bool(protocol.UNUSABLE & 1 << bit) == (bit in {1, 2, 3, 4, 5, 6, 7, 11, 12})
 
 
-def test_the_bias_is_taken_off() -> None:
+def test_the_bias_is_taken_off():
     load = np.array([5, -4, 3, -2, 1, 700])
     device = AtiCan(SimulatedCanBus([AtiCanFake(load=lambda _: load)]))
     device.start()
@@ -172,7 +172,7 @@ def test_the_bias_is_taken_off() -> None:
     device.close()
 
 
-def test_another_calibration_is_used_or_its_absence_reported() -> None:
+def test_another_calibration_is_used_or_its_absence_reported():
     load = np.array([1000, 0, 0, 0, 0, 0])
     device = AtiCan(SimulatedCanBus([AtiCanFake(load=lambda _: load)]), calibration=1)
     device.start()
@@ -192,18 +192,16 @@ def restarted(silent_s: float) -> tuple[AtiCan, AtiCanFake]:
         assert len(device.read(0.1)) == 1
     node.restart()
     if silent_s:
-        answer, node.receive = node.receive, lambda _: None  # type: ignore[method-assign]
+        answer, node.receive = node.receive, lambda _: None
         give_up_s = bus.now_s + silent_s
         while bus.now_s < give_up_s:
             assert len(device.read(0.1)) == 0
-        node.receive = answer  # type: ignore[method-assign]
+        node.receive = answer
     return device, node
 
 
 @pytest.mark.parametrize(("silent_s", "samples"), [(0.5, 0), (0.0, 200)])
-def test_a_sensor_that_restarts_and_loses_its_calibration_is_noticed(
-    silent_s: float, samples: int
-) -> None:
+def test_a_sensor_that_restarts_and_loses_its_calibration_is_noticed(silent_s, samples):
     device, _ = restarted(silent_s)
     wrong = 0
     with pytest.raises(DriverError, match=r"calibration 1 any more.*restarted"):  # noqa: PT012
@@ -220,7 +218,7 @@ def test_a_sensor_that_restarts_and_loses_its_calibration_is_noticed(
     assert device.counters["restarts"] == 1
 
 
-def test_a_sensor_on_the_calibration_of_a_restart_is_not_asked_for_it() -> None:
+def test_a_sensor_on_the_calibration_of_a_restart_is_not_asked_for_it():
     node = AtiCanFake()
     device = AtiCan(SimulatedCanBus([node]))
     device.start()
@@ -229,7 +227,7 @@ def test_a_sensor_on_the_calibration_of_a_restart_is_not_asked_for_it() -> None:
         assert len(device.read(0.1)) == 1
 
 
-def test_nobody_there_is_a_timeout_that_names_the_base() -> None:
+def test_nobody_there_is_a_timeout_that_names_the_base():
     device = AtiCan(SimulatedCanBus([AtiCanFake(base=0x68)]))
     with pytest.raises(LinkTimeoutError, match=r"base 0x20.*250 kbit/s"):
         device.identify()
@@ -238,7 +236,7 @@ def test_nobody_there_is_a_timeout_that_names_the_base() -> None:
 
 
 @given(st.binary(max_size=8), st.binary(max_size=8), st.binary(max_size=8))
-def test_any_bytes_are_decoded_or_refused(one: bytes, two: bytes, three: bytes) -> None:
+def test_any_bytes_are_decoded_or_refused(one, two, three):
     for decode in (
         lambda: protocol.decode_reading(one, two),
         lambda: protocol.decode_matrix_row([one, two, three]),
@@ -250,7 +248,7 @@ def test_any_bytes_are_decoded_or_refused(one: bytes, two: bytes, three: bytes) 
             decode()
 
 
-def test_firmware_3_7_is_the_first_that_is_asked_for_units() -> None:
+def test_firmware_3_7_is_the_first_that_is_asked_for_units():
     """Source: ATI 9610-05-1030, commands 7 and 8."""
     first, *others = set_up()
     assert first == (frame(0x20F), [frame(0x20F, "03080011")])
@@ -259,7 +257,7 @@ def test_firmware_3_7_is_the_first_that_is_asked_for_units() -> None:
     assert protocol.encode_counts_per_unit(1000, 2000).hex() == "000003e8000007d0"
 
 
-def test_options_that_are_no_sensors() -> None:
+def test_options_that_are_no_sensors():
     for options in ({"base": 128}, {"calibration": 16}, {"rate_hz": 0.0}):
         with pytest.raises(LinkError, match="not"):
-            open_ati_can("can:virtual:options", **options)  # type: ignore[arg-type]
+            open_ati_can("can:virtual:options", **options)

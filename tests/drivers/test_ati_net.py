@@ -23,7 +23,7 @@ def device_of(fake: RdtFake) -> AtiNet:
     return AtiNet(SimulatedTransport(fake), fake_calibration)
 
 
-def test_requests_are_the_bytes_of_the_manual() -> None:
+def test_requests_are_the_bytes_of_the_manual():
     assert protocol.encode_command(protocol.STREAM) == bytes.fromhex("12 34 00 02 00 00 00 00")
     assert protocol.encode_command(protocol.SET_BIAS) == bytes.fromhex("12 34 00 42 00 00 00 00")
     assert protocol.encode_command(protocol.STREAM, 258) == bytes.fromhex("1234 0002 0000 0102")
@@ -33,7 +33,7 @@ def test_requests_are_the_bytes_of_the_manual() -> None:
     assert protocol.READ_CALIBRATION.hex() == "01" + 19 * "00"
 
 
-def test_a_record_is_big_endian_and_36_bytes() -> None:
+def test_a_record_is_big_endian_and_36_bytes():
     datagram = struct.pack(">IIIiiiiii", 7, 49, 0x80010000, -1, 2, -3, 4, -5, 6)
     (record,) = protocol.decode_records(datagram)
     assert record["rdt_sequence"] == 7
@@ -46,7 +46,7 @@ def test_a_record_is_big_endian_and_36_bytes() -> None:
             protocol.decode_records((datagram * 2)[:size])
 
 
-def test_a_calibration_is_the_bytes_of_the_manual() -> None:
+def test_a_calibration_is_the_bytes_of_the_manual():
     """Source: ATI 9620-05-Net FT, TCP interface: u16 header, two unit codes, two u32, six u16."""
     answer = bytes.fromhex("1234 02 03 000f4240 0007a120 0001 0002 0003 0004 0005 0106")
     calibration = Calibration(2, 3, 1_000_000, 500_000, (1, 2, 3, 4, 5, 262))
@@ -55,7 +55,7 @@ def test_a_calibration_is_the_bytes_of_the_manual() -> None:
 
 
 @given(answer=st.binary(max_size=30))
-def test_a_calibration_is_refused_unless_whole_and_of_known_units(answer: bytes) -> None:
+def test_a_calibration_is_refused_unless_whole_and_of_known_units(answer):
     with pytest.raises(FrameError):
         protocol.decode_calibration(answer[:23])
     if len(answer) >= 24 and answer[:2] != b"\x12\x34":
@@ -63,7 +63,7 @@ def test_a_calibration_is_refused_unless_whole_and_of_known_units(answer: bytes)
             protocol.decode_calibration(answer[:24])
 
 
-def test_counts_become_si_by_the_scale_of_the_device() -> None:
+def test_counts_become_si_by_the_scale_of_the_device():
     pounds = Calibration(1, 1, 1000, 500)
     device = AtiNet(
         SimulatedTransport(RdtFake()), lambda: SimulatedTransport(CalibrationFake(pounds))
@@ -88,7 +88,7 @@ STATUS_BITS = (
 
 
 @pytest.mark.parametrize("row", STATUS_BITS.split("; "))
-def test_a_status_bit_is_that_of_the_manual(row: str) -> None:
+def test_a_status_bit_is_that_of_the_manual(row):
     bit, words = int(row.split()[0]), row.split(" ", 1)[1]
     (said,) = protocol.status_words(1 << 31 | 1 << bit)
     assert words in said
@@ -96,7 +96,7 @@ def test_a_status_bit_is_that_of_the_manual(row: str) -> None:
     assert protocol.is_data_fault(np.array([1 << 31 | 1 << bit], np.uint32))[0] == (bit != 16)
 
 
-def test_a_status_is_reported_in_words_and_flags_its_samples() -> None:
+def test_a_status_is_reported_in_words_and_flags_its_samples():
     assert protocol.status_words(0) == []
     assert protocol.status_words(0x80010000) == ["a threshold has been crossed"]
     assert protocol.status_words(1 << 31 | 1 << 17 | 1 << 5) == [
@@ -120,7 +120,7 @@ def test_a_status_is_reported_in_words_and_flags_its_samples() -> None:
     assert device.counters["device_errors"] == 50
 
 
-def test_the_numbers_wrap_without_a_gap() -> None:
+def test_the_numbers_wrap_without_a_gap():
     device = device_of(RdtFake(first_sequence=2**32 - 30))
     device.start()
     batch = device.read(0.1)
@@ -134,7 +134,7 @@ def followed(numbers: list[int]) -> tuple[list[bool], list[int], DeviceCounters]
     return kept.tolist(), given_numbers.tolist(), counters
 
 
-def test_lost_late_repeated_and_restarted_records_are_distinguished() -> None:
+def test_lost_late_repeated_and_restarted_records_are_distinguished():
     kept, numbers, counters = followed([5, 6, 9, 8, 9, 10])
     assert kept == [True, True, True, False, False, True]
     assert numbers == [0, 1, 4, 5]
@@ -148,7 +148,7 @@ def test_lost_late_repeated_and_restarted_records_are_distinguished() -> None:
     kept=st.lists(st.booleans(), min_size=2, max_size=200),
     first=st.integers(0, 2**32 - 1),
 )
-def test_what_is_missing_is_counted_exactly(kept: list[bool], first: int) -> None:
+def test_what_is_missing_is_counted_exactly(kept, first):
     kept[0] = kept[-1] = True
     places = [place for place, keep in enumerate(kept) if keep]
     mask, numbers, counters = followed([(first + place) % 2**32 for place in places])
@@ -159,9 +159,7 @@ def test_what_is_missing_is_counted_exactly(kept: list[bool], first: int) -> Non
 
 @pytest.mark.parametrize("command", ["set_bias", "reset_latch"])
 @pytest.mark.parametrize("numbers_begin_at", [1, 2**32 - 10])
-def test_a_command_that_ends_the_stream_is_followed_by_a_request_for_it(
-    command: str, numbers_begin_at: int
-) -> None:
+def test_a_command_that_ends_the_stream_is_followed_by_a_request_for_it(command, numbers_begin_at):
     device = device_of(RdtFake(numbers_begin_at))
     device.start()
     before = device.read(0.1)
@@ -174,7 +172,7 @@ def test_a_command_that_ends_the_stream_is_followed_by_a_request_for_it(
     assert {k for k, count in device.counters.items() if count} == {"frames"}
 
 
-def test_a_stream_that_goes_on_counting_after_a_command_loses_nothing() -> None:
+def test_a_stream_that_goes_on_counting_after_a_command_loses_nothing():
     sequence = RecordSequence(counters := DeviceCounters())
     sequence.follow(np.arange(5, 10, dtype=np.uint32))
     sequence.expect_restart()
@@ -185,7 +183,7 @@ def test_a_stream_that_goes_on_counting_after_a_command_loses_nothing() -> None:
     assert (counters.late, counters.restarts, counters.lost) == (1, 0, 0)
 
 
-def test_a_device_that_is_gone_is_reported_at_every_reading_until_it_is_back() -> None:
+def test_a_device_that_is_gone_is_reported_at_every_reading_until_it_is_back():
     fake = RdtFake()
     device = device_of(fake)
     device.start()
@@ -204,7 +202,7 @@ def test_a_device_that_is_gone_is_reported_at_every_reading_until_it_is_back() -
     assert device.counters["retries"] == 7
 
 
-def test_a_sensor_that_repeats_one_sample_for_ever_is_an_error() -> None:
+def test_a_sensor_that_repeats_one_sample_for_ever_is_an_error():
     fake = RdtFake()
     device = device_of(fake)
     device.start()
@@ -223,7 +221,7 @@ def test_a_sensor_that_repeats_one_sample_for_ever_is_an_error() -> None:
     device.close()
 
 
-def test_the_bias_is_set_in_the_device() -> None:
+def test_the_bias_is_set_in_the_device():
     fake = RdtFake()
     device = device_of(fake)
     device.start()
@@ -233,7 +231,7 @@ def test_the_bias_is_set_in_the_device() -> None:
     assert abs(first.columns["force_z_n"][0]) < 0.3
 
 
-def test_nobody_there_is_a_timeout() -> None:
+def test_nobody_there_is_a_timeout():
     silent = CalibrationFake()
     silent.receive(b"x")
     device = AtiNet(SimulatedTransport(RdtFake()), lambda: SimulatedTransport(silent))
@@ -243,7 +241,7 @@ def test_nobody_there_is_a_timeout() -> None:
         device.start()
 
 
-def test_over_a_real_socket_on_the_loopback_interface() -> None:
+def test_over_a_real_socket_on_the_loopback_interface():
     board = RdtFake()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listening:
         listening.bind(("127.0.0.1", 0))
@@ -273,6 +271,6 @@ def test_over_a_real_socket_on_the_loopback_interface() -> None:
 
 
 @pytest.mark.parametrize("url", ["udp:", "udp:host", "udp:host:", "udp:host:0", "udp:host:99999"])
-def test_an_address_has_a_host_and_a_port(url: str) -> None:
+def test_an_address_has_a_host_and_a_port(url):
     with pytest.raises(LinkError, match="udp:HOST:PORT"):
         open_transport(url)

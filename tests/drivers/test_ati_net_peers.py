@@ -64,11 +64,9 @@ class Sensor:
         self.process = subprocess.Popen(
             [str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
-        assert self.process.stdout is not None
         self.port = int(self.process.stdout.readline().split()[0])
 
     def say(self, line: str) -> None:
-        assert self.process.stdin is not None
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
 
@@ -107,7 +105,7 @@ def some(device: AtiNet, samples: int) -> list[Batch]:
     return batches
 
 
-def test_its_records_are_read_with_their_values_and_gaps(sensor: Sensor, device: AtiNet) -> None:
+def test_its_records_are_read_with_their_values_and_gaps(sensor, device):
     before = some(device, 200)
     last = {name: values[-1] for name, values in before[-1].columns.items()}
     assert list(last.values()) == pytest.approx([100e-6, -200e-6, 300e-6, 10e-6, -20e-6, 30e-6])
@@ -122,7 +120,7 @@ def test_its_records_are_read_with_their_values_and_gaps(sensor: Sensor, device:
     assert (np.diff(sequence) > 0).all()
 
 
-def test_a_bias_does_not_end_its_stream(device: AtiNet) -> None:
+def test_a_bias_does_not_end_its_stream(device):
     some(device, 100)
     device.set_bias()
     some(device, 500)
@@ -132,7 +130,7 @@ def test_a_bias_does_not_end_its_stream(device: AtiNet) -> None:
     assert device.counters["stalls"] == 0
 
 
-def test_its_silence_and_its_end_are_reported(sensor: Sensor, device: AtiNet) -> None:
+def test_its_silence_and_its_end_are_reported(sensor, device):
     some(device, 100)
     sensor.say("pause")
     with pytest.raises(LinkTimeoutError, match="fallen silent"):  # noqa: PT012
@@ -151,7 +149,7 @@ def test_its_silence_and_its_end_are_reported(sensor: Sensor, device: AtiNet) ->
             device.read(0.2)
 
 
-def test_its_client_reads_the_fake_of_this_project(sources: Path, tmp_path: Path) -> None:
+def test_its_client_reads_the_fake_of_this_project(sources, tmp_path):
     files = [path for path in (sources / "src").rglob("*.cpp") if path.name not in NOT_OURS]
     program = built("netft_client", files, sources, tmp_path)
     fake, over = RdtFake(), threading.Event()

@@ -25,13 +25,13 @@ from tests.drivers.taps import once
         (protocol.read_registers(protocol.STATUS, 1), "0A 03 00 1D 00 01 15 77"),
     ],
 )
-def test_messages_are_the_published_bytes(message: bytes, published: str) -> None:
+def test_messages_are_the_published_bytes(message, published):
     assert message == bytes.fromhex(published)
     assert protocol.encode(*protocol.decode(message)) == message
 
 
 @given(data=st.binary(min_size=1, max_size=40), bit=st.integers(0, 7), place=st.integers(0, 60))
-def test_one_changed_bit_is_refused(data: bytes, bit: int, place: int) -> None:
+def test_one_changed_bit_is_refused(data, bit, place):
     message = bytearray(protocol.encode(modbus.READ, data))
     message[place % len(message)] ^= 1 << bit
     with pytest.raises(FrameError):
@@ -42,7 +42,7 @@ def test_one_changed_bit_is_refused(data: bytes, bit: int, place: int) -> None:
     gauges=st.lists(st.lists(st.integers(-32768, 32767), min_size=6, max_size=6), min_size=1),
     bad=st.booleans(),
 )
-def test_frames_come_back(gauges: list[list[int]], bad: bool) -> None:
+def test_frames_come_back(gauges, bad):
     wire = protocol.encode_frames(np.array(gauges), bad)
     frames = np.frombuffer(wire, np.uint8).reshape(-1, protocol.FRAME_SIZE)
     assert protocol.frame_checks(frames).all()
@@ -51,14 +51,14 @@ def test_frames_come_back(gauges: list[list[int]], bad: bool) -> None:
     assert status.tolist() == [bad] * len(gauges)
 
 
-def test_a_frame_carries_the_gauges_in_the_published_order() -> None:
+def test_a_frame_carries_the_gauges_in_the_published_order():
     wire = protocol.encode_frames(np.array([[0x0100, 0x0201, 0x0302, 0x0403, 0x0504, 0x0605]]))
     assert wire[:12].hex(" ", 2) == "0100 0302 0504 0201 0403 0605"
     assert wire[12] == sum(wire[:12]) & 0x7F
     assert len(wire) == 13
 
 
-def test_it_reads_its_calibration_and_puts_it_in_force() -> None:
+def test_it_reads_its_calibration_and_puts_it_in_force():
     fake = AtiSerialFake()
     device = AtiSerial(SimulatedTransport(fake))
     identity = device.identify()
@@ -77,7 +77,7 @@ def test_it_reads_its_calibration_and_puts_it_in_force() -> None:
     assert not fake.server.streaming
 
 
-def test_each_calibration_is_read_192_registers_behind_the_one_before() -> None:
+def test_each_calibration_is_read_192_registers_behind_the_one_before():
     """Source: the register addresses of the public KIT driver."""
     cable = FaultyTransport(SimulatedTransport(AtiSerialFake()))
     asked: list[bytes] = []
@@ -88,14 +88,14 @@ def test_each_calibration_is_read_192_registers_behind_the_one_before() -> None:
     assert registers[0] == "02630068"
 
 
-def test_a_stream_left_on_by_another_program_is_ended_first() -> None:
+def test_a_stream_left_on_by_another_program_is_ended_first():
     fake = AtiSerialFake()
     fake.receive(protocol.encode(protocol.STREAM, protocol.START_STREAM))
     fake.advance(20)
     assert AtiSerial(SimulatedTransport(fake)).identify().serial == "FT99999"
 
 
-def test_a_bad_status_and_a_full_gauge_flag_their_samples() -> None:
+def test_a_bad_status_and_a_full_gauge_flag_their_samples():
     fake = AtiSerialFake()
     device = AtiSerial(SimulatedTransport(fake))
     device.start()
@@ -105,12 +105,12 @@ def test_a_bad_status_and_a_full_gauge_flag_their_samples() -> None:
     assert (device.read(0.1).flags == 8).all()
     assert device.counters["device_errors"] > 350
     fake.status_bad = False
-    fake.gauges = lambda numbers: np.full((len(numbers), 6), 32767)  # type: ignore[method-assign]
+    fake.gauges = lambda numbers: np.full((len(numbers), 6), 32767)
     device.read(0.1)
     assert (device.read(0.1).flags == 1).all()
 
 
-def test_a_damaged_answer_is_asked_for_again_and_silence_is_a_timeout() -> None:
+def test_a_damaged_answer_is_asked_for_again_and_silence_is_a_timeout():
     cable = FaultyTransport(SimulatedTransport(AtiSerialFake()))
     cable.incoming = once(lambda data: data[:9] + b"\x55" + data[10:])
     device = AtiSerial(cable)
@@ -121,7 +121,7 @@ def test_a_damaged_answer_is_asked_for_again_and_silence_is_a_timeout() -> None:
         device.identify()
 
 
-def test_an_empty_or_impossible_calibration_is_refused() -> None:
+def test_an_empty_or_impossible_calibration_is_refused():
     with pytest.raises(FrameError, match="empty"):
         AtiSerial(SimulatedTransport(AtiSerialFake()), calibration=2).identify()
     with pytest.raises(DriverError, match="1 to 16"):
@@ -132,7 +132,7 @@ def test_an_empty_or_impossible_calibration_is_refused() -> None:
     assert (function, reason) == (modbus.WRITE | protocol.FAILED, b"\x02")
 
 
-def test_what_may_differ_can_be_set() -> None:
+def test_what_may_differ_can_be_set():
     fake = AtiSerialFake()
     told = AtiSerial(SimulatedTransport(fake))
     told.start()
@@ -147,7 +147,7 @@ def test_what_may_differ_can_be_set() -> None:
     assert np.allclose(got, expected)
 
 
-def test_a_sensor_that_does_not_answer_the_lock_still_starts() -> None:
+def test_a_sensor_that_does_not_answer_the_lock_still_starts():
     class Mute(AtiSerialFake):
         def transmit(self) -> bytes:
             data = super().transmit()
@@ -159,7 +159,7 @@ def test_a_sensor_that_does_not_answer_the_lock_still_starts() -> None:
 
 
 @pytest.mark.parametrize("function", [protocol.STREAM, protocol.STORAGE])
-def test_an_answer_that_is_no_success_is_a_refusal(function: int) -> None:
+def test_an_answer_that_is_no_success_is_a_refusal(function):
     class Refusing(AtiSerialFake):
         def transmit(self) -> bytes:
             data = super().transmit()
@@ -170,7 +170,7 @@ def test_an_answer_that_is_no_success_is_a_refusal(function: int) -> None:
         device.start()
 
 
-def test_a_lost_answer_to_the_start_of_the_stream_is_asked_for_again() -> None:
+def test_a_lost_answer_to_the_start_of_the_stream_is_asked_for_again():
     cable = FaultyTransport(SimulatedTransport(AtiSerialFake()))
     device = AtiSerial(cable)
     device.identify()

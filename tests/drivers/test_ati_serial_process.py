@@ -77,8 +77,6 @@ def line() -> Iterator[str]:
         text=True,
     )
     try:
-        assert server.stdin is not None
-        assert server.stdout is not None
         with server.stdin as there:
             json.dump(registers(), there)
         assert server.stdout.readline() == "ready\n"
@@ -94,7 +92,7 @@ def line() -> Iterator[str]:
             os.close(end)
 
 
-def test_a_calibration_is_read_from_pymodbus_server(line: str) -> None:
+def test_a_calibration_is_read_from_pymodbus_server(line):
     device = AtiSerial(open_line(line, BAUD_RATE), rate_hz=100.0)
     identity = None
     while identity is None:

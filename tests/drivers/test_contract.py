@@ -94,14 +94,14 @@ def check(device: Device, batches: list[Batch]) -> None:
             assert (values[good] <= channels[name].upper).all()
 
 
-def test_the_built_in_drivers_are_installed() -> None:
+def test_the_built_in_drivers_are_installed():
     declared = tomllib.loads(PROJECT.read_text())["project"]["entry-points"][DRIVERS]
     assert set(declared) <= set(NAMES), "install the project again: make setup"
     assert set(NAMES) == set(fakes())
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_is_documented(name: str) -> None:
+def test_it_is_documented(name):
     driver = drivers()[name]
     assert isinstance(driver, Driver)
     assert driver.description
@@ -118,7 +118,7 @@ def test_it_is_documented(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PLACES)
-def test_it_identifies_itself_streams_and_opens_again(name: str) -> None:
+def test_it_identifies_itself_streams_and_opens_again(name):
     for _ in range(2):
         device = opened(name)
         assert isinstance(device, Device)
@@ -152,7 +152,7 @@ def test_it_identifies_itself_streams_and_opens_again(name: str) -> None:
 
 @pytest.mark.parametrize("fault", [fault for fault in Fault if fault is not Fault.DISCONNECT])
 @pytest.mark.parametrize("name", PLACES)
-def test_it_survives_a_fault_and_names_it(name: str, fault: Fault) -> None:
+def test_it_survives_a_fault_and_names_it(name, fault):
     faults = Faults(seed=2)
     device = opened(name, faults)
     device.start()
@@ -172,7 +172,7 @@ def test_it_survives_a_fault_and_names_it(name: str, fault: Fault) -> None:
     device.close()
 
 
-def test_the_words_of_a_fault_are_declared_for_every_driver() -> None:
+def test_the_words_of_a_fault_are_declared_for_every_driver():
     assert set(SAID) == set(NAMES)
     for name, said in SAID.items():
         assert set(said) == set(Fault) - {Fault.DISCONNECT}
@@ -183,7 +183,7 @@ def test_the_words_of_a_fault_are_declared_for_every_driver() -> None:
 
 
 @pytest.mark.parametrize("name", PLACES)
-def test_a_cut_link_is_reported_and_it_can_be_opened_again(name: str) -> None:
+def test_a_cut_link_is_reported_and_it_can_be_opened_again(name):
     faults = Faults()
     device = opened(name, faults)
     device.start()
@@ -199,7 +199,7 @@ def test_a_cut_link_is_reported_and_it_can_be_opened_again(name: str) -> None:
     again.close()
 
 
-def test_an_unknown_driver_or_option_is_named() -> None:
+def test_an_unknown_driver_or_option_is_named():
     with pytest.raises(DriverError, match=r"no driver 'nonesuch'.*teensy"):
         open_device("nonesuch", "/dev/null")
     with pytest.raises(DriverError, match="no option colour"):

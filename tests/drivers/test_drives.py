@@ -40,7 +40,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_drive_that_is_not_started_or_not_there_is_refused(kind: str) -> None:
+def test_a_drive_that_is_not_started_or_not_there_is_refused(kind):
     device = KINDS[kind].driver(SimulatedTransport(KINDS[kind].fake()))
     with pytest.raises(DriverError, match="Call start"):
         device.arm()
@@ -62,14 +62,14 @@ def armed(request: pytest.FixtureRequest) -> tuple[Kind, Any, Any, FaultyTranspo
 
 
 @pytest.mark.parametrize("factor", [math.nan, math.inf, 1.1, -1.1])
-def test_a_command_beyond_the_limit_or_no_number_is_refused(armed, factor: float) -> None:
+def test_a_command_beyond_the_limit_or_no_number_is_refused(armed, factor):
     kind, _, device, _ = armed
     with pytest.raises(DriverError, match=rf"limit is {kind.limit}"):
         getattr(device, kind.command)(factor * kind.limit)
     device.close()
 
 
-def test_a_host_that_falls_silent_stops_the_motor_and_reads_why(armed) -> None:
+def test_a_host_that_falls_silent_stops_the_motor_and_reads_why(armed):
     kind, fake, device, _ = armed
     command = getattr(device, kind.command)
     for _ in range(2):  # armed again, it is as before
@@ -88,7 +88,7 @@ def test_a_host_that_falls_silent_stops_the_motor_and_reads_why(armed) -> None:
     device.close()
 
 
-def test_a_disarm_that_nobody_confirms_is_no_disarm(armed) -> None:
+def test_a_disarm_that_nobody_confirms_is_no_disarm(armed):
     _, _, device, cable = armed
     cable.incoming = lambda data: b""
     with pytest.raises(DisarmUnconfirmedError, match=r"cut its supply.*(100 ms|0\.1 s)"):

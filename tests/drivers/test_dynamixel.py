@@ -49,16 +49,14 @@ EXAMPLES = [
 
 
 @pytest.mark.parametrize(("device_id", "instruction", "parameters", "packet"), EXAMPLES)
-def test_packets_are_those_of_the_manual(
-    device_id: int, instruction: int, parameters: bytes, packet: str
-) -> None:
+def test_packets_are_those_of_the_manual(device_id, instruction, parameters, packet):
     data = bytes.fromhex(packet)
     assert protocol.encode(device_id, instruction, parameters) == data
     assert protocol.decode(data) == (device_id, instruction, parameters)
     assert protocol.find(b"\xff\xff" + data + b"x") == (data, b"x")
 
 
-def test_the_registers_are_those_of_the_manual() -> None:
+def test_the_registers_are_those_of_the_manual():
     """Source: control tables of XM430-W210 and XL330-M288."""
     registers = {
         protocol.OPERATING_MODE: (11, 1),
@@ -84,7 +82,7 @@ def test_the_registers_are_those_of_the_manual() -> None:
     assert protocol.write_question(protocol.GOAL_CURRENT, -2).hex() == "6600feff"
 
 
-def test_errors_and_models_are_those_of_the_manual() -> None:
+def test_errors_and_models_are_those_of_the_manual():
     words = ("failed", "does not know", "checksum", "out of range", "length", "limit", "accessed")
     assert all(word in protocol.ERRORS[number] for number, word in enumerate(words, 1))
     models = {1020: "XM430-W350", 1030: "XM430-W210", 1120: "XM540-W270"}
@@ -94,9 +92,7 @@ def test_errors_and_models_are_those_of_the_manual() -> None:
 
 
 @given(parameters=st.binary(max_size=40), bit=st.integers(0, 7), place=st.integers(4, 60))
-def test_packets_come_back_and_one_changed_bit_is_refused(
-    parameters: bytes, bit: int, place: int
-) -> None:
+def test_packets_come_back_and_one_changed_bit_is_refused(parameters, bit, place):
     packet = protocol.encode(7, protocol.WRITE, parameters)
     assert protocol.decode(packet) == (7, protocol.WRITE, parameters)
     damaged = bytearray(packet)
@@ -105,7 +101,7 @@ def test_packets_come_back_and_one_changed_bit_is_refused(
         protocol.decode(bytes(damaged))
 
 
-def test_a_header_within_a_packet_is_stuffed() -> None:
+def test_a_header_within_a_packet_is_stuffed():
     packet = protocol.encode(1, protocol.WRITE, b"\x74\0\xff\xff\xfd\0")
     assert packet[7:-2] == b"\x03\x74\0\xff\xff\xfd\xfd\0"
     assert packet[5] == 10  # the length counts what was stuffed
@@ -119,7 +115,7 @@ def armed(fake: DynamixelFake, **options: int) -> Dynamixel:
     return device
 
 
-def test_a_current_turns_the_horn_and_the_end_is_without_force() -> None:
+def test_a_current_turns_the_horn_and_the_end_is_without_force():
     fake = DynamixelFake()
     device = armed(fake)
     assert device.current_limit_a == pytest.approx(1.75)
@@ -139,7 +135,7 @@ def test_a_current_turns_the_horn_and_the_end_is_without_force() -> None:
         device.read(0.1)
 
 
-def test_a_host_that_reads_slowly_but_steadily_is_heard() -> None:
+def test_a_host_that_reads_slowly_but_steadily_is_heard():
     fake = DynamixelFake()
     device = armed(fake, rate_hz=10, watchdog_ms=200)
     device.set_current(0.03)
@@ -149,7 +145,7 @@ def test_a_host_that_reads_slowly_but_steadily_is_heard() -> None:
     device.close()
 
 
-def test_a_hardware_error_is_reported_in_words_and_cleared_by_a_restart() -> None:
+def test_a_hardware_error_is_reported_in_words_and_cleared_by_a_restart():
     fake = DynamixelFake()
     device = armed(fake)
     device.set_current(0.03)
@@ -167,19 +163,19 @@ def test_a_hardware_error_is_reported_in_words_and_cleared_by_a_restart() -> Non
     device.close()
 
 
-def test_a_disarm_is_not_believed_while_the_register_differs() -> None:
+def test_a_disarm_is_not_believed_while_the_register_differs():
     fake = DynamixelFake()
     device = armed(fake)
     write = fake._write
-    fake._write = lambda address, data: 0 if address == 64 else write(address, data)  # type: ignore[method-assign]
+    fake._write = lambda address, data: 0 if address == 64 else write(address, data)
     with pytest.raises(DisarmUnconfirmedError, match="holds 1"):
         device.disarm()
-    fake._write = write  # type: ignore[method-assign]
+    fake._write = write
     device.close()
     assert not fake.in_force
 
 
-def test_damage_is_asked_for_again_and_an_echo_is_dealt_with() -> None:
+def test_damage_is_asked_for_again_and_an_echo_is_dealt_with():
     cable = FaultyTransport(SimulatedTransport(DynamixelFake(echo=True)))
     device = Dynamixel(cable)
     cable.incoming = once(lambda data: data[:-1] + bytes([data[-1] ^ 1]))
@@ -189,7 +185,7 @@ def test_damage_is_asked_for_again_and_an_echo_is_dealt_with() -> None:
     device.close()
 
 
-def test_models_that_cannot_be_driven_so_are_refused() -> None:
+def test_models_that_cannot_be_driven_so_are_refused():
     with pytest.raises(DriverError, match="XL430-W250 neither"):
         Dynamixel(SimulatedTransport(DynamixelFake(model=1060))).start()
     with pytest.raises(DriverError, match="9999 is not known"):
@@ -202,7 +198,7 @@ def test_models_that_cannot_be_driven_so_are_refused() -> None:
         open_dynamixel("loop://", watchdog_ms=10)
 
 
-def test_a_refusal_gives_its_reason() -> None:
+def test_a_refusal_gives_its_reason():
     fake = DynamixelFake()
     device = armed(fake)
     with pytest.raises(InstructionRefusedError, match="cannot be accessed") as caught:

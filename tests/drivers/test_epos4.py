@@ -53,7 +53,7 @@ def armed(node: Epos4Fake) -> tuple[Epos4, Tapped]:
     return device, bus
 
 
-def test_a_torque_turns_the_motor_and_the_end_is_powerless() -> None:
+def test_a_torque_turns_the_motor_and_the_end_is_powerless():
     node = Epos4Fake()
     device, _ = armed(node)
     sent_n_m = device.set_torque(1.001e-3)
@@ -76,7 +76,7 @@ def test_a_torque_turns_the_motor_and_the_end_is_powerless() -> None:
         device.read(0.1)
 
 
-def test_set_up_and_arm_send_their_messages_in_order() -> None:
+def test_set_up_and_arm_send_their_messages_in_order():
     device, bus = armed(Epos4Fake())
     heartbeat = 0x700 + 127
     spoken = [frame for frame in bus.sent if frame.can_id != heartbeat]
@@ -123,7 +123,7 @@ def test_set_up_and_arm_send_their_messages_in_order() -> None:
     device.close()
 
 
-def test_an_unarmed_drive_is_only_watched() -> None:
+def test_an_unarmed_drive_is_only_watched():
     node = Epos4Fake()
     bus = Tapped(node)
     device = Epos4(bus)
@@ -139,7 +139,7 @@ def test_an_unarmed_drive_is_only_watched() -> None:
 
 
 @pytest.mark.parametrize("torque", [np.nan, np.inf, -np.inf, 0.025, -0.025])
-def test_a_torque_that_must_not_be_is_refused(torque: float) -> None:
+def test_a_torque_that_must_not_be_is_refused(torque):
     device, _ = armed(Epos4Fake())
     with pytest.raises(DriverError, match=r"cannot be commanded|beyond"):
         device.set_torque(torque)
@@ -148,11 +148,11 @@ def test_a_torque_that_must_not_be_is_refused(torque: float) -> None:
 
 
 @given(st.floats(-0.0249, 0.0249))
-def test_a_command_is_off_by_half_a_step_at_most(torque: float) -> None:
+def test_a_command_is_off_by_half_a_step_at_most(torque):
     assert abs(RATINGS.torque_n_m(RATINGS.per_mille(torque)) - torque) <= 0.5001 * 12.46e-6
 
 
-def test_an_error_stops_the_session_in_words_and_is_cleared_by_hand() -> None:
+def test_an_error_stops_the_session_in_words_and_is_cleared_by_hand():
     node = Epos4Fake()
     device, _ = armed(node)
     device.set_torque(1e-3)
@@ -175,7 +175,7 @@ def test_an_error_stops_the_session_in_words_and_is_cleared_by_hand() -> None:
     device.close()
 
 
-def test_a_drive_that_stops_operation_by_itself_is_reported() -> None:
+def test_a_drive_that_stops_operation_by_itself_is_reported():
     node = Epos4Fake()
     device, _ = armed(node)
     node.state = State.QUICK_STOP
@@ -197,7 +197,7 @@ def after_a_pause() -> tuple[Epos4Fake, Epos4]:
     return node, device
 
 
-def test_a_silent_host_is_noticed_by_the_drive_and_raised_at_the_next_sample() -> None:
+def test_a_silent_host_is_noticed_by_the_drive_and_raised_at_the_next_sample():
     node, device = after_a_pause()
     assert node.state is State.FAULT  # at once: no ramp along which the motor stays in force
     assert node.torque_n_m == 0.0
@@ -213,7 +213,7 @@ def test_a_silent_host_is_noticed_by_the_drive_and_raised_at_the_next_sample() -
     device.close()
 
 
-def test_a_lost_heartbeat_is_cleared_and_the_drive_runs_again() -> None:
+def test_a_lost_heartbeat_is_cleared_and_the_drive_runs_again():
     node, device = after_a_pause()
     with pytest.raises(DriveFaultError):
         device.read(0.1)
@@ -230,7 +230,7 @@ def test_a_lost_heartbeat_is_cleared_and_the_drive_runs_again() -> None:
     device.close()
 
 
-def test_another_program_clears_what_the_first_one_left() -> None:
+def test_another_program_clears_what_the_first_one_left():
     node, _ = after_a_pause()
     device = Epos4(SimulatedCanBus([node]))
     device.start()
@@ -244,7 +244,7 @@ def test_another_program_clears_what_the_first_one_left() -> None:
     assert node.state is State.SWITCH_ON_DISABLED
 
 
-def test_a_stopped_node_is_cleared_too() -> None:
+def test_a_stopped_node_is_cleared_too():
     node = Epos4Fake()
     node.fail(0x2310, 2)
     node.receive(CanFrame(0, bytes([0x02, 1])))
@@ -254,7 +254,7 @@ def test_a_stopped_node_is_cleared_too() -> None:
     device.close()
 
 
-def test_a_drive_that_somebody_takes_out_of_operation_is_reported_at_the_next_heartbeat() -> None:
+def test_a_drive_that_somebody_takes_out_of_operation_is_reported_at_the_next_heartbeat():
     node = Epos4Fake()
     device, _ = armed(node)
     device.read(0.1)
@@ -270,7 +270,7 @@ def test_a_drive_that_somebody_takes_out_of_operation_is_reported_at_the_next_he
     assert node.state is State.SWITCH_ON_DISABLED
 
 
-def test_a_drive_that_restarts_is_reported_and_not_commanded_any_more() -> None:
+def test_a_drive_that_restarts_is_reported_and_not_commanded_any_more():
     node = Epos4Fake()
     device, bus = armed(node)
     device.set_torque(1e-3)
@@ -287,9 +287,7 @@ def test_a_drive_that_restarts_is_reported_and_not_commanded_any_more() -> None:
 
 
 @pytest.mark.parametrize(("index", "subindex"), [(0x6007, 0), (0x1029, 1), (0x1A00, 2)])
-def test_a_setting_that_is_not_held_is_refused_before_the_motor_has_force(
-    index: int, subindex: int
-) -> None:
+def test_a_setting_that_is_not_held_is_refused_before_the_motor_has_force(index, subindex):
     node = Epos4Fake()
 
     def other(**asked: object) -> int | None:
@@ -300,7 +298,7 @@ def test_a_setting_that_is_not_held_is_refused_before_the_motor_has_force(
         Epos4(SimulatedCanBus([node])).start()
 
 
-def test_a_host_that_only_waits_beats_all_the_same() -> None:
+def test_a_host_that_only_waits_beats_all_the_same():
     node = Epos4Fake()
     bus = SimulatedCanBus([node])
     device = Epos4(bus, rate_hz=0.5)
@@ -312,7 +310,7 @@ def test_a_host_that_only_waits_beats_all_the_same() -> None:
     device.close()
 
 
-def test_a_disarm_that_nobody_confirms_is_no_disarm() -> None:
+def test_a_disarm_that_nobody_confirms_is_no_disarm():
     device, bus = armed(Epos4Fake())
     bus.lose = lambda frame: frame.can_id == 0x601
     with pytest.raises(DisarmUnconfirmedError, match=r"cut its supply.*250 ms"):
@@ -323,7 +321,7 @@ def test_a_disarm_that_nobody_confirms_is_no_disarm() -> None:
         bus.read(0.0)
 
 
-def test_a_disarm_is_not_believed_while_the_statusword_differs() -> None:
+def test_a_disarm_is_not_believed_while_the_statusword_differs():
     node = Epos4Fake()
     device, bus = armed(node)
     # the drive confirms the write of the controlword and does not follow it
@@ -331,7 +329,7 @@ def test_a_disarm_is_not_believed_while_the_statusword_differs() -> None:
     bus.lose = lambda frame: frame.can_id == 0x201
 
     original = node.receive
-    node.receive = lambda frame: (  # type: ignore[method-assign]
+    node.receive = lambda frame: (
         original(CanFrame(0x601, bytes.fromhex("2b716000 00000000")))
         if frame.data == deaf
         else original(frame)
@@ -339,12 +337,12 @@ def test_a_disarm_is_not_believed_while_the_statusword_differs() -> None:
     with pytest.raises(DisarmUnconfirmedError):
         device.disarm()
     assert node.state is State.OPERATION_ENABLED
-    node.receive = original  # type: ignore[method-assign]
+    node.receive = original
     device.close()
     assert node.state is State.SWITCH_ON_DISABLED
 
 
-def test_the_wrong_device_is_refused_before_anything_is_written() -> None:
+def test_the_wrong_device_is_refused_before_anything_is_written():
     bus = Tapped(Epos4Fake(objects={(0x1018, 1): 0x2E}))
     with pytest.raises(ProtocolMismatchError, match=r"0x2e.*0xfb"):
         Epos4(bus).start()
@@ -357,7 +355,7 @@ def test_the_wrong_device_is_refused_before_anything_is_written() -> None:
         Epos4(SimulatedCanBus([Epos4Fake()]), node_id=9).identify()
 
 
-def test_an_absent_object_is_refused_with_its_code() -> None:
+def test_an_absent_object_is_refused_with_its_code():
     link = CanopenLink(SimulatedCanBus([Epos4Fake(absent=(0x6502,))]), 1, DeviceCounters())
     with pytest.raises(ObjectRefusedError, match=r"0x6502.*does not exist") as caught:
         link.read(0x6502)
@@ -371,9 +369,9 @@ def test_an_absent_object_is_refused_with_its_code() -> None:
 
 
 @pytest.mark.parametrize("options", [{"node_id": 0}, {"node_id": 127}, {"rate_hz": 0.0}])
-def test_options_that_are_no_drives(options: dict[str, float]) -> None:
+def test_options_that_are_no_drives(options):
     with pytest.raises(LinkError, match="not"):
-        open_epos4("can:virtual:options", **options)  # type: ignore[arg-type]
+        open_epos4("can:virtual:options", **options)
 
 
 @pytest.mark.parametrize(
@@ -390,11 +388,11 @@ def test_options_that_are_no_drives(options: dict[str, float]) -> None:
         (0x0208, State.FAULT),
     ],
 )
-def test_a_statusword_is_a_state(word: int, state: State) -> None:
+def test_a_statusword_is_a_state(word, state):
     assert protocol.state_of(word) is state
 
 
-def test_process_data_and_codes_are_those_of_the_specification() -> None:
+def test_process_data_and_codes_are_those_of_the_specification():
     """Source: CiA 301, network states; CiA 402, controlwords; the TPDO's mapping."""
     feedback = protocol.Feedback(0x0637, -2, 258)
     data = bytes.fromhex("3706 feffffff 0201")
@@ -406,7 +404,7 @@ def test_process_data_and_codes_are_those_of_the_specification() -> None:
 
 
 @given(st.integers(0, 2**16 - 1))
-def test_any_statusword_is_read_or_refused(word: int) -> None:
+def test_any_statusword_is_read_or_refused(word):
     try:
         state = protocol.state_of(word)
     except FrameError:
@@ -427,7 +425,7 @@ def test_any_statusword_is_read_or_refused(word: int) -> None:
         ((0x5282,), "STO card"),
     ],
 )
-def test_an_error_is_named_as_in_the_specification(codes: tuple[int, ...], words: str) -> None:
+def test_an_error_is_named_as_in_the_specification(codes, words):
     for code in codes:
         assert words in faults.explain(code)[0]
     assert words not in faults.explain(codes[-1] + 1)[0]

@@ -47,7 +47,6 @@ def drive(port: int) -> Iterator[subprocess.Popen[str]]:
         stdout=subprocess.PIPE,
         text=True,
     ) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         yield process
         process.kill()
@@ -70,14 +69,11 @@ def samples(device: Epos4, count: int) -> None:
         count -= len(device.read(0.5))
 
 
-def test_it_runs_a_torque_and_clears_a_lost_heartbeat(
-    drive: subprocess.Popen[str], device: Epos4
-) -> None:
+def test_it_runs_a_torque_and_clears_a_lost_heartbeat(drive, device):
     assert device.identify().model.startswith("maxon EPOS4")
     device.arm()
     device.set_torque(2e-3)
     samples(device, 30)
-    assert drive.stdin is not None
     drive.stdin.write("8130\n")
     drive.stdin.flush()
     with pytest.raises(DriveFaultError, match="0x8130"):
@@ -88,9 +84,7 @@ def test_it_runs_a_torque_and_clears_a_lost_heartbeat(
     assert device.last_error == 0
 
 
-def test_a_drive_whose_process_dies_is_reported(
-    drive: subprocess.Popen[str], device: Epos4
-) -> None:
+def test_a_drive_whose_process_dies_is_reported(drive, device):
     device.arm()
     samples(device, 10)
     drive.kill()

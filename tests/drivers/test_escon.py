@@ -17,19 +17,17 @@ def core(library: Path) -> ctypes.CDLL:
 
 
 @given(current_a=st.floats(-3, 3))
-def test_a_current_is_commanded_to_half_a_step_and_within_the_limit(
-    core: ctypes.CDLL, current_a: float
-) -> None:
+def test_a_current_is_commanded_to_half_a_step_and_within_the_limit(core, current_a):
     duty = core.rig_escon_code(current_a) / 4095
     assert (duty - 0.1) / 0.8 * 2 == pytest.approx(min(abs(current_a), 2.0), abs=0.00031)
 
 
 @pytest.mark.parametrize("current_a", [math.nan, math.inf, -math.inf])
-def test_what_is_no_current_commands_none(core: ctypes.CDLL, current_a: float) -> None:
+def test_what_is_no_current_commands_none(core, current_a):
     assert core.rig_escon_code(current_a) == core.rig_escon_code(0.0)
 
 
-def test_a_reading_is_a_current_unless_the_converter_is_at_its_end(core: ctypes.CDLL) -> None:
+def test_a_reading_is_a_current_unless_the_converter_is_at_its_end(core):
     for reading in (1, 2000, 4094):
         expected = 2000 * (2 * reading / 4095 - 1)
         assert core.rig_escon_milliampere(reading) == pytest.approx(expected, abs=0.51)

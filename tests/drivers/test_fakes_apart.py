@@ -10,7 +10,7 @@ FAKES = {path.stem for path in ROOM.rglob("*fake*.py")}
 IMPORT = re.compile(r"^\s*(?:from|import) (drivers\.\S+)(?: import (.+))?", re.MULTILINE)
 
 
-def test_no_driver_imports_a_fake() -> None:
+def test_no_driver_imports_a_fake():
     assert "fake" in FAKES
     for path in ROOM.rglob("*.py"):
         if path.stem not in FAKES:

@@ -52,7 +52,7 @@ def read_all(cable: FaultyTransport, seconds: float) -> list[bytes]:
 
 @pytest.mark.parametrize("fault", [Fault.DROP, Fault.CORRUPT, Fault.DUPLICATE])
 @given(seed=st.integers(0, 2**16))
-def test_damage_is_one_short_run_and_the_same_for_a_seed(fault: Fault, seed: int) -> None:
+def test_damage_is_one_short_run_and_the_same_for_a_seed(fault, seed):
     def damaged() -> bytes:
         faults = Faults(seed)
         cable = FaultyTransport(SimulatedTransport(Counting()), faults)
@@ -75,7 +75,7 @@ def test_damage_is_one_short_run_and_the_same_for_a_seed(fault: Fault, seed: int
 
 
 @pytest.mark.parametrize("fault", [Fault.DELAY, Fault.STALL])
-def test_a_late_stream_loses_nothing_and_keeps_its_order(fault: Fault) -> None:
+def test_a_late_stream_loses_nothing_and_keeps_its_order(fault):
     faults = Faults()
     cable = FaultyTransport(SimulatedTransport(Counting()), faults)
     read_all(cable, 0.1)
@@ -88,7 +88,7 @@ def test_a_late_stream_loses_nothing_and_keeps_its_order(fault: Fault) -> None:
     assert faults.struck == {fault: 1}
 
 
-def test_packets_are_lost_repeated_and_overtaken_whole() -> None:
+def test_packets_are_lost_repeated_and_overtaken_whole():
     faults = Faults()
     cable = FaultyTransport(SimulatedTransport(Packets(), step_s=0.001), faults, packets=True)
     for fault in (Fault.DROP, Fault.CORRUPT, Fault.DUPLICATE, Fault.DELAY):

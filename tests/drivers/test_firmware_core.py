@@ -22,7 +22,7 @@ def has_doctest() -> bool:
 
 
 @pytest.mark.skipif(not has_doctest(), reason="needs g++, make and doctest (apt: doctest-dev)")
-def test_the_core_passes_its_own_tests_under_the_sanitizers() -> None:
+def test_the_core_passes_its_own_tests_under_the_sanitizers():
     done = subprocess.run(
         ["make", "-C", str(FIRMWARE), "test"], capture_output=True, text=True, check=False
     )

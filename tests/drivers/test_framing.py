@@ -45,20 +45,20 @@ def as_rows(payloads: list[bytes]) -> np.ndarray:
     return np.frombuffer(b"".join(payloads), np.uint8).reshape(-1, SIZE)
 
 
-def test_known_vectors() -> None:
+def test_known_vectors():
     assert crc16(b"123456789") == 0x29B1
     assert cobs_encode(bytes.fromhex("1100002233")) == bytes.fromhex("021101032233")
     assert cobs_decode(bytes.fromhex("021101032233")) == bytes.fromhex("1100002233")
 
 
 @given(long_binary)
-def test_cobs_is_the_cobs_packages(data: bytes) -> None:
+def test_cobs_is_the_cobs_packages(data):
     assert cobs_encode(data) == cobs.encode(data)
     assert cobs_decode(cobs_encode(data)) == data
 
 
 @given(long_binary)
-def test_cobs_accepts_what_the_cobs_package_accepts(encoded: bytes) -> None:
+def test_cobs_accepts_what_the_cobs_package_accepts(encoded):
     try:
         expected = cobs.decode(encoded)
     except cobs.DecodeError:
@@ -69,7 +69,7 @@ def test_cobs_accepts_what_the_cobs_package_accepts(encoded: bytes) -> None:
 
 
 @given(st.binary(max_size=1024))
-def test_a_frame_comes_back(payload: bytes) -> None:
+def test_a_frame_comes_back(payload):
     frame = encode_frame(payload)
     assert frame.endswith(b"\x00")
     assert 0 not in frame[:-1]
@@ -79,7 +79,7 @@ def test_a_frame_comes_back(payload: bytes) -> None:
 
 @given(st.integers(0, MAX_BULK_PAYLOAD), st.integers(0, 2**32 - 1))
 @settings(max_examples=40)
-def test_bulk_frames_are_single_frames(size: int, seed: int) -> None:
+def test_bulk_frames_are_single_frames(size, seed):
     random = np.random.default_rng(seed)
     rows = random.choice(np.array([0, 1, 7, 255], np.uint8), (5, size))
     wire = encode_frames(rows)
@@ -90,7 +90,7 @@ def test_bulk_frames_are_single_frames(size: int, seed: int) -> None:
 
 
 @given(payload_rows, st.lists(st.binary(max_size=600), max_size=4), st.randoms())
-def test_other_frames_are_handed_back_in_order(rows: list[bytes], others: list[bytes], order):
+def test_other_frames_are_handed_back_in_order(rows, others, order):
     others = [payload for payload in others if len(payload) != SIZE]
     turns = [True] * len(rows) + [False] * len(others)
     order.shuffle(turns)
@@ -104,9 +104,7 @@ def test_other_frames_are_handed_back_in_order(rows: list[bytes], others: list[b
 
 
 @given(payload_rows, st.lists(st.integers(0, 700), max_size=8), st.binary(max_size=80))
-def test_a_stream_cut_anywhere_decodes_the_same(
-    rows: list[bytes], cuts: list[int], noise: bytes
-) -> None:
+def test_a_stream_cut_anywhere_decodes_the_same(rows, cuts, noise):
     half = len(rows) // 2
     wire = encode_frames(as_rows(rows[:half])) + noise + b"\x00" + b"\x01" * 1200 + b"\x00"
     wire += encode_frame(b"a reply") + encode_frames(as_rows(rows[half:]))
@@ -123,7 +121,7 @@ def test_a_stream_cut_anywhere_decodes_the_same(
 
 @settings(derandomize=True)  # one damaged frame in 65536 has a good CRC by chance
 @given(payload_rows.filter(len), st.data())
-def test_a_damaged_frame_is_counted_and_its_neighbours_survive(rows, data) -> None:
+def test_a_damaged_frame_is_counted_and_its_neighbours_survive(rows, data):
     wire = bytearray(encode_frames(as_rows(rows)))
     frame = SIZE + 4
     index = data.draw(st.integers(0, len(rows) - 1))
@@ -137,7 +135,7 @@ def test_a_damaged_frame_is_counted_and_its_neighbours_survive(rows, data) -> No
 
 
 @given(st.binary(max_size=400))
-def test_noise_is_decoded_as_one_frame_at_a_time_would(noise: bytes) -> None:
+def test_noise_is_decoded_as_one_frame_at_a_time_would(noise):
     good = []
     for piece in noise.split(b"\x00")[:-1]:
         try:
@@ -151,6 +149,6 @@ def test_noise_is_decoded_as_one_frame_at_a_time_would(noise: bytes) -> None:
     assert decoded.others == [p for p in good if len(p) != 4]
 
 
-def test_a_bulk_payload_has_one_code_byte_at_most() -> None:
+def test_a_bulk_payload_has_one_code_byte_at_most():
     with pytest.raises(ValueError, match="253"):
         decode_frames(b"", MAX_BULK_PAYLOAD + 1)

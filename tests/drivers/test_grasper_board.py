@@ -49,7 +49,7 @@ def host_on(library: Path, inputs: NDArray[np.int32], gains: NDArray[Any] = GAIN
 STILL = [[0] * 50] * 3
 
 
-def test_a_whole_session_at_2_khz_with_three_motors_each_on_its_own_way(library: Path) -> None:
+def test_a_whole_session_at_2_khz_with_three_motors_each_on_its_own_way(library):
     ways = [[round(40 * k * np.sin(t / 9)) for t in range(50)] for k in (1, 2, 3)]
     host = host_on(library, moving(90))
     host.run(9)
@@ -85,7 +85,7 @@ GUARDS = {
 @pytest.mark.parametrize("state", [{}, HELD], ids=["release", "hold"])
 @pytest.mark.parametrize("motor", [0, 1, 2])
 @pytest.mark.parametrize("trip", list(GUARDS), ids=lambda trip: trip.name)
-def test_every_motor_has_every_guard(library: Path, trip: Trip, motor: int, state: dict) -> None:
+def test_every_motor_has_every_guard(library, trip, motor, state):
     axis, first, counts = GUARDS[trip]
     axes = [AxisLimits()] * 3
     axes[motor] = AxisLimits(**axis)
@@ -107,7 +107,7 @@ def test_every_motor_has_every_guard(library: Path, trip: Trip, motor: int, stat
     assert trip is Trip.STALLED or quiet.trip().code is Trip.NONE
 
 
-def test_refusals(library: Path) -> None:
+def test_refusals(library):
     for motor in range(3):
         for bad in (np.nan, np.inf, 1e7):
             gains = GAINS.copy()
@@ -124,7 +124,7 @@ def test_refusals(library: Path) -> None:
     assert host.setpoints(*STILL) is Result.OK
 
 
-def test_a_board_of_the_other_profile_is_named_before_anything_moves(library: Path) -> None:
+def test_a_board_of_the_other_profile_is_named_before_anything_moves(library):
     board = FirmwareBoard(scripted(moving(9)), library=library, profile=GRASPER)
     logger = TeensyLogger(SimulatedTransport(board))
     with pytest.raises(ProtocolMismatchError, match=r'grasper.*profile = "grasper"'):

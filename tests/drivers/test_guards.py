@@ -1,7 +1,6 @@
 """The guards of the compiled core on the reference rig: what trips, when, and what it does then."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,9 +34,7 @@ EDGES = {
 }
 
 
-def armed_on(
-    library: Path, inputs: np.ndarray, limits: Limits = WIDEST, gains: np.ndarray = GAINS
-) -> RawHost:
+def armed_on(library, inputs, limits=WIDEST, gains=GAINS):
     """A host that has armed a core whose inputs are given."""
     host = RawHost(FirmwareBoard(ScriptedBench(inputs), library=library), gains=gains)
     assert host.command(Kind.START) is Result.OK
@@ -47,7 +44,7 @@ def armed_on(
 
 @pytest.mark.parametrize("limits", [WIDEST, TIGHT], ids=["widest", "tight"])
 @pytest.mark.parametrize("channel", list(EDGES))
-def test_the_edges_of_every_channel(library: Path, channel: str, limits: Limits) -> None:
+def test_the_edges_of_every_channel(library, channel, limits):
     crossed = {}
     saturated = False
     for value in EDGES[channel]:
@@ -100,7 +97,7 @@ def moving_inputs(ticks: int) -> np.ndarray:
 
 @pytest.mark.parametrize("state", [{}, HELD], ids=["release", "hold"])
 @pytest.mark.parametrize("trip", list(GUARDS), ids=lambda trip: trip.name)
-def test_every_guard_trips_with_its_own_code(library: Path, trip: Trip, state: dict) -> None:
+def test_every_guard_trips_with_its_own_code(library, trip, state):
     changes, channel, counts = GUARDS[trip]
     inputs = moving_inputs(140)
     column = list(EDGES).index(channel)
@@ -119,7 +116,7 @@ def test_every_guard_trips_with_its_own_code(library: Path, trip: Trip, state: d
         assert (report.channel == channel) == (expected is not Trip.NONE)
 
 
-def test_the_guard_alone_finds_what_the_board_trips_over(library: Path) -> None:
+def test_the_guard_alone_finds_what_the_board_trips_over(library):
     for trip, (changes, channel, counts) in GUARDS.items():
         inputs = moving_inputs(140)
         inputs[10 : 10 + len(counts), list(EDGES).index(channel)] = counts
@@ -142,7 +139,7 @@ def test_the_guard_alone_finds_what_the_board_trips_over(library: Path) -> None:
         assert row * 1000 == report.tick_us
 
 
-def test_a_late_sample_is_judged_by_the_time_that_passed(library: Path) -> None:
+def test_a_late_sample_is_judged_by_the_time_that_passed(library):
     limits = dataclasses.replace(WIDEST, max_motor_step=10, max_motor_jump=40)
     rows = np.zeros((4, 6), np.int32)
     rows[:, 0] = (0, 90, 180, 270)
@@ -152,7 +149,7 @@ def test_a_late_sample_is_judged_by_the_time_that_passed(library: Path) -> None:
 
 
 @pytest.mark.parametrize("watchdog_us", [5_000, 50_000, 1_000_000])
-def test_the_watchdogs_patience_is_the_hosts_choice(library: Path, watchdog_us: int) -> None:
+def test_the_watchdogs_patience_is_the_hosts_choice(library, watchdog_us):
     host = armed_on(library, moving_inputs(9), dataclasses.replace(WIDEST, watchdog_us=watchdog_us))
     host.run(watchdog_us // 1000 + 1)
     assert host.armed
@@ -160,7 +157,7 @@ def test_the_watchdogs_patience_is_the_hosts_choice(library: Path, watchdog_us: 
     assert host.trip().code is Trip.HOST_SILENT
 
 
-def test_holding_keeps_the_spindle_where_it_was_and_a_second_trip_releases(library: Path) -> None:
+def test_holding_keeps_the_spindle_where_it_was_and_a_second_trip_releases(library):
     limits = dataclasses.replace(WIDEST, watchdog_us=20_000, max_proximal=20000, **HELD)
     inputs = moving_inputs(140)
     inputs[100, 3] = 20001
@@ -177,7 +174,7 @@ def test_holding_keeps_the_spindle_where_it_was_and_a_second_trip_releases(libra
     assert {s >> protocol.TRIP_SHIFT for s in samples["status"][21:].tolist()} == {1}
 
 
-def test_holding_ends_after_its_time(library: Path) -> None:
+def test_holding_ends_after_its_time(library):
     limits = dataclasses.replace(WIDEST, watchdog_us=20_000, hold_ticks=40, **HELD)
     host = armed_on(library, moving_inputs(140), limits)
     host.setpoints([0] * 100, [0] * 100)
@@ -189,9 +186,7 @@ def test_holding_ends_after_its_time(library: Path) -> None:
     assert host.trip().code is Trip.HOST_SILENT
 
 
-def test_a_queue_that_is_dry_for_too_long_is_a_trip_however_often_the_host_pings(
-    library: Path,
-) -> None:
+def test_a_queue_that_is_dry_for_too_long_is_a_trip_however_often_the_host_pings(library):
     host = armed_on(library, moving_inputs(900), dataclasses.replace(WIDEST, dry_ticks=100))
     for _ in range(30):
         host.run(10)
@@ -209,7 +204,7 @@ def test_a_queue_that_is_dry_for_too_long_is_a_trip_however_often_the_host_pings
     assert not samples["command_e4"][-170:].any()
 
 
-def test_heat_outlives_arming_and_clearing(library: Path) -> None:
+def test_heat_outlives_arming_and_clearing(library):
     limits = dataclasses.replace(WIDEST, continuous_current=100, i2t=1000)
     inputs = np.zeros((4000, 7), np.int32)
     inputs[:, 5] = 210 + np.arange(4000) % 3
@@ -230,7 +225,7 @@ def test_heat_outlives_arming_and_clearing(library: Path) -> None:
     assert squared / 1000 <= 1000 + 100**2 * 4.0
 
 
-def test_a_hot_motor_is_armed_again_when_it_has_cooled(library: Path) -> None:
+def test_a_hot_motor_is_armed_again_when_it_has_cooled(library):
     limits = dataclasses.replace(WIDEST, continuous_current=100, i2t=5000)
     inputs = np.zeros((3000, 7), np.int32)
     inputs[:80, 5] = 300
@@ -246,7 +241,7 @@ def test_a_hot_motor_is_armed_again_when_it_has_cooled(library: Path) -> None:
     assert host.arm(limits) is Result.OK
 
 
-def test_a_board_that_was_just_started_takes_its_motors_for_hot(library: Path) -> None:
+def test_a_board_that_was_just_started_takes_its_motors_for_hot(library):
     limits = dataclasses.replace(WIDEST, continuous_current=100, i2t=5000)  # cools in 0.5 s
     inputs = np.zeros((3000, 7), np.int32)
     board = FirmwareBoard(ScriptedBench(inputs), BoardStart(simulated=False), library)
@@ -258,7 +253,7 @@ def test_a_board_that_was_just_started_takes_its_motors_for_hot(library: Path) -
     assert host.arm(limits) is Result.OK
 
 
-def test_the_load_motors_heat_is_that_of_the_current_it_is_given(library: Path) -> None:
+def test_the_load_motors_heat_is_that_of_the_current_it_is_given(library):
     limits = dataclasses.replace(WIDEST, continuous_load_ma=500, load_i2t=75_000)
     host = armed_on(library, moving_inputs(3000), limits)
     for _ in range(30):
@@ -274,7 +269,7 @@ def test_the_load_motors_heat_is_that_of_the_current_it_is_given(library: Path) 
     assert host.arm(limits) is Result.TOO_HOT
 
 
-def test_an_emergency_stop_releases_at_once_and_is_cleared_when_it_is_let_go(library: Path) -> None:
+def test_an_emergency_stop_releases_at_once_and_is_cleared_when_it_is_let_go(library):
     host = armed_on(library, moving_inputs(300), dataclasses.replace(WIDEST, **HELD))
     host.setpoints([0] * 90, [0] * 90)
     host.run(20)
@@ -295,7 +290,7 @@ def test_an_emergency_stop_releases_at_once_and_is_cleared_when_it_is_let_go(lib
     assert host.arm() is Result.OK
 
 
-def test_setpoints_neither_jump_nor_begin_far_from_the_shaft(library: Path) -> None:
+def test_setpoints_neither_jump_nor_begin_far_from_the_shaft(library):
     limits = dataclasses.replace(WIDEST, max_target_step=30, max_following=400)
     inputs = np.zeros((300, 7), np.int32)
     inputs[:, 1] = 1000
@@ -314,7 +309,7 @@ def test_setpoints_neither_jump_nor_begin_far_from_the_shaft(library: Path) -> N
     assert host.setpoints([1340], [0]) is Result.OK
 
 
-def test_no_host_raises_a_limit_that_the_board_was_built_with(library: Path) -> None:
+def test_no_host_raises_a_limit_that_the_board_was_built_with(library):
     own = dataclasses.replace(TIGHT, watchdog_us=100_000, torque_e3=70, dry_ticks=500)
     board = FirmwareBoard(PlainBench(), library=library, own=([1, 0, 0, 0, 2700], own))
     within = {"gains": [20.0, 0, 0, 0.5, 2700.0], "limits": own}
@@ -336,7 +331,7 @@ def test_no_host_raises_a_limit_that_the_board_was_built_with(library: Path) -> 
     assert host.arm(narrower) is Result.OK
 
 
-def test_refusals(library: Path) -> None:
+def test_refusals(library):
     nan = GAINS.copy()
     nan[0] = np.nan
     for gains in (nan, GAINS * np.inf, GAINS * 1e5, GAINS * [1, 1, 1, -1, 1], -GAINS):
@@ -379,7 +374,7 @@ def test_refusals(library: Path) -> None:
     assert host.send(header[:3]) == host.send(b"") == []
 
 
-def test_a_host_that_does_not_read_loses_whole_frames_and_gets_their_number(library: Path) -> None:
+def test_a_host_that_does_not_read_loses_whole_frames_and_gets_their_number(library):
     board = FirmwareBoard(PlainBench(), library=library)
     host = RawHost(board)
     host.command(Kind.START)
@@ -392,7 +387,7 @@ def test_a_host_that_does_not_read_loses_whole_frames_and_gets_their_number(libr
     assert last["sequence"] == 4501
 
 
-def test_a_missing_library_reports_what_to_type(tmp_path: Path) -> None:
+def test_a_missing_library_reports_what_to_type(tmp_path):
     with pytest.raises(FirmwareMissingError, match="make -C firmware"):
         FirmwareBoard(PlainBench(), library=tmp_path / "none.so")
     (tmp_path / "other.so").write_bytes(b"no library")

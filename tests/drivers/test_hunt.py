@@ -16,12 +16,7 @@ pytestmark = [
 SANITIZED = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
-def built(
-    folder: Path,
-    flags: tuple[str, ...] = ("-O1",),
-    firmware: Path = FIRMWARE,
-    name: str = "hunt",
-) -> Path:
+def built(folder, flags=("-O1",), firmware=FIRMWARE, name="hunt"):
     program = folder / name
     words = ["g++", "-std=c++17", "-ffp-contract=off", *flags, "-o", str(program)]
     subprocess.run([*words, str(firmware / "proofs" / f"{name}.cpp")], check=True)
@@ -41,15 +36,15 @@ def sanitized(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_no_sequence_of_commands_arms_without_a_live_session_or_moves_beyond_the_limits(
-    sanitized: Path, settings: Path
-) -> None:
+    sanitized, settings
+):
     found = run(sanitized, settings, "commands", 0, 3000)
     assert found.found == []
     assert found.armings > 1000
     assert found.trips > 1000
 
 
-def test_no_sequence_of_faults_breaks_a_rule(sanitized: Path, settings: Path) -> None:
+def test_no_sequence_of_faults_breaks_a_rule(sanitized, settings):
     found = run(sanitized, settings, "faults", 0, 400)
     assert found.found == []
     assert found.trips > 200
@@ -92,9 +87,7 @@ BROKEN = {
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_core_that_breaks_a_rule_is_found_with_few_events(
-    name: str, settings: Path, tmp_path: Path
-) -> None:
+def test_a_core_that_breaks_a_rule_is_found_with_few_events(name, settings, tmp_path):
     file, text, change, rule = BROKEN[name]
     firmware = tmp_path / "firmware"
     for part in ("core", "proofs"):
@@ -112,9 +105,7 @@ def test_a_core_that_breaks_a_rule_is_found_with_few_events(
 
 
 @pytest.mark.long
-def test_every_small_input_and_every_short_sequence_of_commands(
-    settings: Path, tmp_path: Path
-) -> None:
+def test_every_small_input_and_every_short_sequence_of_commands(settings, tmp_path):
     program = built(tmp_path, SANITIZED, name="small")
     done = subprocess.run(
         [str(program), str(settings), "3"], capture_output=True, text=True, check=False

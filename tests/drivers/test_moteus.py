@@ -29,7 +29,7 @@ ANSWER = "2404000a005000000170ff230d181400"
 """Source: there, the answer to it."""
 
 
-def test_the_documented_frame_is_read_subframe_by_subframe() -> None:
+def test_the_documented_frame_is_read_subframe_by_subframe():
     assert list(protocol.subframes(bytes.fromhex(EXAMPLE))) == [
         (protocol.WRITE, 0, 0x000, 1, (10,)),
         (protocol.WRITE, 1, 0x020, 3, (0x60, 0x120, -176)),
@@ -41,7 +41,7 @@ def test_the_documented_frame_is_read_subframe_by_subframe() -> None:
     assert (written + asked).hex() == EXAMPLE
 
 
-def test_the_documented_answer_is_read() -> None:
+def test_the_documented_answer_is_read():
     assert protocol.registers(bytes.fromhex(ANSWER)) == {
         **{0x000: 10, 0x001: 80, 0x002: 256, 0x003: -144},
         **{0x00D: 24, 0x00E: 20, 0x00F: 0},
@@ -50,7 +50,7 @@ def test_the_documented_answer_is_read() -> None:
     assert answer.hex() == ANSWER
 
 
-def test_the_documented_lines() -> None:
+def test_the_documented_lines():
     data = bytes.fromhex(EXAMPLE)
     assert protocol.send_line(1, data) == f"can send 8001 {EXAMPLE}\n".encode()
     assert protocol.decode_line(f"rcv 100 {ANSWER}\r\n".encode()) == (0x100, bytes.fromhex(ANSWER))
@@ -64,7 +64,7 @@ def test_the_documented_lines() -> None:
             protocol.decode_line(line)
 
 
-def test_modes_faults_and_sizes_are_the_documented_ones() -> None:
+def test_modes_faults_and_sizes_are_the_documented_ones():
     """Source: "Register reference", 0x000 and 0x00f; ISO 11898-1 for the sizes of CAN FD."""
     modes = (protocol.STOPPED, protocol.FAULT, protocol.POSITION_MODE, protocol.TIMEOUT)
     assert modes == (0, 1, 10, 11)
@@ -77,7 +77,7 @@ def test_modes_faults_and_sizes_are_the_documented_ones() -> None:
         assert len(protocol.padded(bytes(size))) == min(fits for fits in sizes if fits >= size)
 
 
-def test_a_torque_command_holds_the_documented_registers() -> None:
+def test_a_torque_command_holds_the_documented_registers():
     """Source: "Register reference", 0x020 to 0x027; padding 0x50 to a size of CAN-FD."""
     command = protocol.torque_command(0.05, 0.2, 0.1)
     mode, values = protocol.subframes(command)
@@ -101,7 +101,7 @@ def test_a_torque_command_holds_the_documented_registers() -> None:
     assert wide.hex() == "1a8002" + "1ba002"
 
 
-def test_a_state_survives_its_frame_and_its_bytes_are_little_endian() -> None:
+def test_a_state_survives_its_frame_and_its_bytes_are_little_endian():
     state = State(10, 1.5, -0.25, 0.125, 2.5, 48, -5, 0)
     data = bytes.fromhex("21000a 2f01 0000c03f 000080be 0000003e 230d 30fb00 2d04 00002040")
     assert protocol.encode_state(state) == data
@@ -109,7 +109,7 @@ def test_a_state_survives_its_frame_and_its_bytes_are_little_endian() -> None:
 
 
 @given(data=st.binary(max_size=64))
-def test_any_frame_is_read_or_refused(data: bytes) -> None:
+def test_any_frame_is_read_or_refused(data):
     try:
         state = protocol.decode_state(data)
     except FrameError:
@@ -118,13 +118,13 @@ def test_any_frame_is_read_or_refused(data: bytes) -> None:
 
 
 def armed(fake: MoteusFake, **options: float) -> Moteus:
-    device = Moteus(SimulatedTransport(fake), **options)  # type: ignore[arg-type]
+    device = Moteus(SimulatedTransport(fake), **options)
     device.start()
     device.arm()
     return device
 
 
-def test_a_torque_turns_the_output_and_the_end_is_without_force() -> None:
+def test_a_torque_turns_the_output_and_the_end_is_without_force():
     fake = MoteusFake()
     device = armed(fake)
     assert device.set_torque(0.01) == 0.01
@@ -143,7 +143,7 @@ def test_a_torque_turns_the_output_and_the_end_is_without_force() -> None:
         device.read(0.1)
 
 
-def test_a_fault_is_reported_in_words_and_cleared_by_arming() -> None:
+def test_a_fault_is_reported_in_words_and_cleared_by_arming():
     fake = MoteusFake()
     device = armed(fake)
     device.read(0.1)
@@ -156,7 +156,7 @@ def test_a_fault_is_reported_in_words_and_cleared_by_arming() -> None:
     device.close()
 
 
-def test_a_controller_that_is_stopped_by_somebody_is_reported() -> None:
+def test_a_controller_that_is_stopped_by_somebody_is_reported():
     fake = MoteusFake()
     device = armed(fake)
     fake.receive(protocol.send_line(1, protocol.stop_command()))
@@ -167,18 +167,18 @@ def test_a_controller_that_is_stopped_by_somebody_is_reported() -> None:
     device.close()
 
 
-def test_a_disarm_is_not_believed_while_the_mode_differs() -> None:
+def test_a_disarm_is_not_believed_while_the_mode_differs():
     fake = MoteusFake()
     device = armed(fake)
-    change, fake._change = fake._change, lambda mode: None  # type: ignore[method-assign]
+    change, fake._change = fake._change, lambda mode: None
     with pytest.raises(DisarmUnconfirmedError, match="mode 10"):
         device.disarm()
-    fake._change = change  # type: ignore[method-assign]
+    fake._change = change
     device.close()
     assert fake.mode == protocol.STOPPED
 
 
-def test_who_answers_and_who_does_not() -> None:
+def test_who_answers_and_who_does_not():
     cable = FaultyTransport(SimulatedTransport(MoteusFake()))
     cable.incoming = once(lambda data: data.replace(b"rcv", b"r\xffv"))
     device = Moteus(cable)

@@ -15,7 +15,7 @@ from drivers.teensy.reference import REFERENCE, SAMPLE_DTYPE, SETPOINT_DTYPE
 ROOT = Path(__file__).parents[2]
 
 
-def test_the_sample_is_laid_out_as_documented() -> None:
+def test_the_sample_is_laid_out_as_documented():
     layout = SAMPLE_DTYPE
     assert layout.itemsize == 42
     offsets = {name: layout.fields[name][1] for name in layout.names}
@@ -23,18 +23,18 @@ def test_the_sample_is_laid_out_as_documented() -> None:
     assert all(layout[name].str[0] in "<|" for name in layout.names)
 
 
-def test_no_other_frame_has_the_size_of_a_sample() -> None:
+def test_no_other_frame_has_the_size_of_a_sample():
     layouts = {kind: layout for kind, layout in REFERENCE.layouts.items() if kind != Kind.SAMPLE}
     assert SAMPLE_DTYPE.itemsize not in {item.itemsize for item in layouts.values()}
     assert (SAMPLE_DTYPE.itemsize - 4) % SETPOINT_DTYPE.itemsize
 
 
-def test_the_text_names_every_kind() -> None:
+def test_the_text_names_every_kind():
     lines = REFERENCE.text.splitlines()
     assert [line.split(":")[0] for line in lines[2:-3]] == [f"{k} {k.name}" for k in Kind]
 
 
-def test_an_unknown_trip_is_refused() -> None:
+def test_an_unknown_trip_is_refused():
     fields = REFERENCE.decode(protocol.encode(Kind.TRIP_REPORT, 1, 99, 255, 0, 0, 0, 0))[2]
     with pytest.raises(FrameError, match="99"):
         REFERENCE.decode_trip_report(fields)
@@ -54,12 +54,12 @@ def test_an_unknown_trip_is_refused() -> None:
     ],
     ids=["short", "version", "kind", "long", "none", "part", "many", "sample"],
 )
-def test_anything_else_is_refused(payload: bytes) -> None:
+def test_anything_else_is_refused(payload):
     with pytest.raises(FrameError):
         REFERENCE.decode(payload)
 
 
-def test_the_boards_header_is_the_one_made_from_these_tables() -> None:
+def test_the_boards_header_is_the_one_made_from_these_tables():
     done = subprocess.run(
         [sys.executable, "-c", "import contract; print(contract.header(), end='')"],
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "firmware")])},

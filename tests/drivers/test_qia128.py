@@ -29,7 +29,7 @@ from drivers.transport.simulated import SimulatedTransport
         (protocol.set_rate(), "00 07 04 1E 00 07 BC"),
     ],
 )
-def test_packets_are_the_published_bytes(packet: bytes, published: str) -> None:
+def test_packets_are_the_published_bytes(packet, published):
     assert packet == bytes.fromhex(published)
     command, payload = protocol.decode_packet(packet)
     assert protocol.encode_packet(command, payload) == packet
@@ -38,14 +38,14 @@ def test_packets_are_the_published_bytes(packet: bytes, published: str) -> None:
 @pytest.mark.parametrize(
     ("raw", "published"), [(0x800000, "80 00 00 80"), (0x800102, "80 01 02 88")]
 )
-def test_readings_are_the_published_bytes(raw: int, published: str) -> None:
+def test_readings_are_the_published_bytes(raw, published):
     frames = np.frombuffer(bytes.fromhex(published), np.uint8)[np.newaxis]
     assert protocol.encode_frames(np.array([raw])) == frames.tobytes()
     assert protocol.frame_checks(frames).all()
     assert protocol.readings(frames).tolist() == [raw]
 
 
-def test_a_command_damaged_on_the_way_is_refused() -> None:
+def test_a_command_damaged_on_the_way_is_refused():
     with pytest.raises(FrameError, match="checksum"):
         protocol.decode_packet(bytes.fromhex("00 06 00 0C 01 42"))
     with pytest.raises(FrameError, match="length"):
@@ -66,9 +66,7 @@ def found(stream: bytes, cuts: list[int]) -> tuple[list[int], DeviceCounters]:
     skipped=st.integers(0, 3),
     cuts=st.lists(st.integers(0, 300), max_size=8),
 )
-def test_a_stream_that_begins_within_a_reading_is_found(
-    raw: list[int], skipped: int, cuts: list[int]
-) -> None:
+def test_a_stream_that_begins_within_a_reading_is_found(raw, skipped, cuts):
     stream = protocol.encode_frames(np.array(raw))[skipped:]
     values, counters = found(stream, cuts)
     expected = raw[bool(skipped) : -1]  # the newest waits for its successor
@@ -82,7 +80,7 @@ def test_a_stream_that_begins_within_a_reading_is_found(
 
 
 @pytest.mark.parametrize("damage", ["drop", "repeat", "change"])
-def test_a_damaged_stretch_is_left_out_and_counted(damage: str) -> None:
+def test_a_damaged_stretch_is_left_out_and_counted(damage):
     random = np.random.default_rng(1)
     wrong = unnoticed = 0
     for _ in range(300):
@@ -102,7 +100,7 @@ def test_a_damaged_stretch_is_left_out_and_counted(damage: str) -> None:
     assert wrong <= 6  # one in 256 passes the checksum of a reading damaged in place
 
 
-def test_it_identifies_itself_and_streams_in_the_unit_of_its_certificate() -> None:
+def test_it_identifies_itself_and_streams_in_the_unit_of_its_certificate():
     fake = Qia128Fake(serial=4711)
     device = Qia128(SimulatedTransport(fake), rated_load=0.5, unit="N m")
     assert device.identify().serial == "4711"
@@ -119,14 +117,14 @@ def test_it_identifies_itself_and_streams_in_the_unit_of_its_certificate() -> No
     assert not fake.streaming
 
 
-def test_a_stream_left_on_by_another_program_is_ended_first() -> None:
+def test_a_stream_left_on_by_another_program_is_ended_first():
     fake = Qia128Fake()
     fake.receive(protocol.set_stream(True))
     fake.advance(100)
     assert Qia128(SimulatedTransport(fake)).identify().serial == "712345"
 
 
-def test_silence_is_a_timeout_and_two_equal_points_are_no_calibration() -> None:
+def test_silence_is_a_timeout_and_two_equal_points_are_no_calibration():
     cable = FaultyTransport(SimulatedTransport(Qia128Fake()))
     cable.incoming = lambda data: b""
     with pytest.raises(LinkTimeoutError, match="bit rate"):
@@ -135,9 +133,9 @@ def test_silence_is_a_timeout_and_two_equal_points_are_no_calibration() -> None:
         Qia128(SimulatedTransport(Qia128Fake(zero=5, full_scale=5))).identify()
 
 
-def test_a_reading_at_the_end_of_the_range_is_flagged() -> None:
+def test_a_reading_at_the_end_of_the_range_is_flagged():
     fake = Qia128Fake(zero=protocol.TOP - 100, full_scale=protocol.TOP)
-    fake.raw = lambda numbers: np.full(len(numbers), protocol.TOP)  # type: ignore[method-assign]
+    fake.raw = lambda numbers: np.full(len(numbers), protocol.TOP)
     device = Qia128(SimulatedTransport(fake))
     device.start()
     batch = device.read(0.1)
@@ -145,7 +143,7 @@ def test_a_reading_at_the_end_of_the_range_is_flagged() -> None:
     assert (batch.flags == 1).all()
 
 
-def test_a_serial_number_from_the_label_is_not_asked_for() -> None:
+def test_a_serial_number_from_the_label_is_not_asked_for():
     class Deaf(Qia128Fake):
         def receive(self, data: bytes) -> None:
             if data != protocol.get_serial():

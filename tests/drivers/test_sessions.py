@@ -62,7 +62,7 @@ NO_SIGN_OF_LIFE: dict[str, Callable[[RawHost], bytes]] = {
 
 
 @pytest.mark.parametrize("name", list(NO_SIGN_OF_LIFE))
-def test_only_the_session_that_armed_keeps_a_board_armed(board: Board, name: str) -> None:
+def test_only_the_session_that_armed_keeps_a_board_armed(board, name):
     host = moving_host(board)
     for _ in range(30):
         host.run(5)
@@ -70,7 +70,7 @@ def test_only_the_session_that_armed_keeps_a_board_armed(board: Board, name: str
     assert host.trip().code is Trip.HOST_SILENT
 
 
-def test_pings_and_setpoints_of_the_session_keep_it_armed(board: Board) -> None:
+def test_pings_and_setpoints_of_the_session_keep_it_armed(board):
     host = moving_host(board)
     for _ in range(20):
         host.run(50)
@@ -81,7 +81,7 @@ def test_pings_and_setpoints_of_the_session_keep_it_armed(board: Board) -> None:
     assert host.armed
 
 
-def test_a_monitor_does_not_keep_a_killed_hosts_board_armed(board: Board) -> None:
+def test_a_monitor_does_not_keep_a_killed_hosts_board_armed(board):
     host = moving_host(board)
     monitor = RawHost(board)
     monitor.hello()
@@ -91,7 +91,7 @@ def test_a_monitor_does_not_keep_a_killed_hosts_board_armed(board: Board) -> Non
     assert host.trip().code is Trip.HOST_SILENT
 
 
-def test_a_second_host_neither_moves_nor_takes_over_an_armed_board(board: Board) -> None:
+def test_a_second_host_neither_moves_nor_takes_over_an_armed_board(board):
     moving_host(board)
     second = RawHost(board)
     assert second.setpoints([HERE], [0]) is Result.WRONG_SESSION
@@ -99,7 +99,7 @@ def test_a_second_host_neither_moves_nor_takes_over_an_armed_board(board: Board)
     assert second.setpoints([HERE], [0]) is Result.WRONG_SESSION
 
 
-def test_bytes_of_an_earlier_arming_neither_arm_nor_move(board: Board) -> None:
+def test_bytes_of_an_earlier_arming_neither_arm_nor_move(board):
     host = RawHost(board)
     host.command(Kind.START)
     arm = host.arm_payload(QUICK)
@@ -117,7 +117,7 @@ def test_bytes_of_an_earlier_arming_neither_arm_nor_move(board: Board) -> None:
     assert not host.samples()["command_e4"][-60:].any()
 
 
-def test_a_late_duplicate_of_arming_does_not_undo_a_disarming(board: Board) -> None:
+def test_a_late_duplicate_of_arming_does_not_undo_a_disarming(board):
     host = RawHost(board)
     arm = host.arm_payload()
     assert host.ack(arm)[0] is Result.OK
@@ -126,7 +126,7 @@ def test_a_late_duplicate_of_arming_does_not_undo_a_disarming(board: Board) -> N
     assert not host.armed
 
 
-def test_setpoints_that_come_twice_or_late_are_not_queued(board: Board) -> None:
+def test_setpoints_that_come_twice_or_late_are_not_queued(board):
     host = moving_host(board)
     earlier, later = (host.setpoints_payload([HERE] * 5, [0] * 5) for _ in range(2))
     assert host.ack(later)[0] is Result.OK
@@ -140,7 +140,7 @@ def test_setpoints_that_come_twice_or_late_are_not_queued(board: Board) -> None:
         assert ack["queue_free"] == protocol.QUEUE_CAPACITY - 11
 
 
-def test_sequence_numbers_may_wrap(board: Board) -> None:
+def test_sequence_numbers_may_wrap(board):
     host = RawHost(board)
     host.number = 2**16 - 3
     assert host.arm() is Result.OK
@@ -148,7 +148,7 @@ def test_sequence_numbers_may_wrap(board: Board) -> None:
         assert host.setpoints([HERE], [0]) is Result.OK
 
 
-def test_a_trip_is_cleared_by_its_name_alone(board: Board) -> None:
+def test_a_trip_is_cleared_by_its_name_alone(board):
     host = moving_host(board)
     host.run(300)
     assert host.arm() is Result.TRIPPED
@@ -161,7 +161,7 @@ def test_a_trip_is_cleared_by_its_name_alone(board: Board) -> None:
     assert host.clear(Trip.NONE) is Result.ALREADY_ARMED
 
 
-def test_offers_differ_between_starts_of_a_board(library: object) -> None:
+def test_offers_differ_between_starts_of_a_board(library):
     offers = set()
     for boot in range(1, 40):
         host = RawHost(FirmwareBoard(PlainBench(), BoardStart(boot=boot)))

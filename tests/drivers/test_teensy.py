@@ -65,7 +65,7 @@ def joined(batches: list[SampleBatch]) -> np.ndarray:
     return np.concatenate([batch.samples for batch in batches])
 
 
-def test_a_session_moves_the_spindle_and_ends_disarmed(make_board: MakeBoard) -> None:
+def test_a_session_moves_the_spindle_and_ends_disarmed(make_board):
     logger = logger_of(make_board())
     identity = logger.identify()
     assert identity.serial == "SIM-0001"
@@ -95,7 +95,7 @@ def test_a_session_moves_the_spindle_and_ends_disarmed(make_board: MakeBoard) ->
     logger.close()
 
 
-def test_samples_are_numbered_and_the_clock_is_unwrapped(make_board: MakeBoard) -> None:
+def test_samples_are_numbered_and_the_clock_is_unwrapped(make_board):
     start_us = 2**32 - 120_000
     logger = logger_of(make_board(start_us))
     logger.start()
@@ -112,7 +112,7 @@ def test_samples_are_numbered_and_the_clock_is_unwrapped(make_board: MakeBoard) 
     logger.close()
 
 
-def test_without_a_word_from_the_host_the_board_makes_itself_safe(make_board: MakeBoard) -> None:
+def test_without_a_word_from_the_host_the_board_makes_itself_safe(make_board):
     logger = logger_of(make_board())
     logger.start()
     logger.arm(GAINS, WIDEST)
@@ -136,7 +136,7 @@ def test_without_a_word_from_the_host_the_board_makes_itself_safe(make_board: Ma
     logger.close()
 
 
-def test_a_dry_queue_holds_the_last_target_and_reports_it(make_board: MakeBoard) -> None:
+def test_a_dry_queue_holds_the_last_target_and_reports_it(make_board):
     logger = logger_of(make_board())
     logger.start()
     logger.arm(GAINS, WIDEST)
@@ -164,7 +164,7 @@ def test_a_dry_queue_holds_the_last_target_and_reports_it(make_board: MakeBoard)
         (np.zeros((2, 2), int), np.zeros((2, 2), int)),
     ],
 )
-def test_setpoints_are_whole_numbers_in_range(targets: np.ndarray, loads: np.ndarray) -> None:
+def test_setpoints_are_whole_numbers_in_range(targets, loads):
     logger = logger_of(PythonBoard(PlainBench()))
     logger.arm(GAINS, WIDEST)
     with pytest.raises(DriverError):
@@ -175,7 +175,7 @@ def test_setpoints_are_whole_numbers_in_range(targets: np.ndarray, loads: np.nda
 # what can go wrong on the way
 
 
-def test_another_protocol_is_refused_by_name_before_anything_moves() -> None:
+def test_another_protocol_is_refused_by_name_before_anything_moves():
     board = PythonBoard(PlainBench(), protocol_hash=0xDEADBEEF)
     logger = logger_of(board)
     with pytest.raises(
@@ -185,14 +185,14 @@ def test_another_protocol_is_refused_by_name_before_anything_moves() -> None:
     logger.close()
 
 
-def test_a_hello_reply_of_another_layout_is_a_mismatch() -> None:
+def test_a_hello_reply_of_another_layout_is_a_mismatch():
     cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     cable.incoming = once(lambda _: encode_frame(b"\x02\x02\x01\x00" + bytes(60)))
     with pytest.raises(ProtocolMismatchError, match="another layout"):
         logger.identify()
 
 
-def test_a_half_frame_at_the_start_does_no_harm(make_board: MakeBoard) -> None:
+def test_a_half_frame_at_the_start_does_no_harm(make_board):
     board = make_board()
     board.receive(b"\x01\x02half a command of an earlier program")
     logger_of(board).start()
@@ -210,7 +210,7 @@ def test_a_half_frame_at_the_start_does_no_harm(make_board: MakeBoard) -> None:
     logger.close()
 
 
-def test_a_silent_board_is_a_timeout_after_the_retries() -> None:
+def test_a_silent_board_is_a_timeout_after_the_retries():
     cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     cable.incoming = lambda _: b""
     with pytest.raises(LinkTimeoutError, match="sim://"):
@@ -218,7 +218,7 @@ def test_a_silent_board_is_a_timeout_after_the_retries() -> None:
     assert logger.counters.retries == 2
 
 
-def test_a_lost_answer_does_not_carry_a_command_out_twice(make_board: MakeBoard) -> None:
+def test_a_lost_answer_does_not_carry_a_command_out_twice(make_board):
     cable, logger = behind_a_bad_cable(make_board())
     logger.start()
     logger.arm(GAINS, WIDEST)
@@ -233,7 +233,7 @@ def test_a_lost_answer_does_not_carry_a_command_out_twice(make_board: MakeBoard)
     logger.close()
 
 
-def test_arming_is_not_believed_of_a_board_that_tripped_meanwhile(make_board: MakeBoard) -> None:
+def test_arming_is_not_believed_of_a_board_that_tripped_meanwhile(make_board):
     cable, logger = behind_a_bad_cable(make_board())
     logger.identify()
     came = itertools.count()
@@ -244,7 +244,7 @@ def test_arming_is_not_believed_of_a_board_that_tripped_meanwhile(make_board: Ma
     logger.close()
 
 
-def test_lost_and_repeated_samples_are_counted_and_never_made_up(make_board: MakeBoard) -> None:
+def test_lost_and_repeated_samples_are_counted_and_never_made_up(make_board):
     cable, logger = behind_a_bad_cable(make_board())
     logger.start()
     first = logger.read(0.1)
@@ -270,7 +270,7 @@ def test_lost_and_repeated_samples_are_counted_and_never_made_up(make_board: Mak
     logger.close()
 
 
-def test_frames_nobody_expected_are_counted() -> None:
+def test_frames_nobody_expected_are_counted():
     cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     logger.start()
     strange = encode_frame(bytes(42)) + encode_frame(b"\x01\x63ab") + encode_frame(b"\x01\x10ab")
@@ -280,7 +280,7 @@ def test_frames_nobody_expected_are_counted() -> None:
     logger.close()
 
 
-def test_disarm_is_not_believed_without_an_answer() -> None:
+def test_disarm_is_not_believed_without_an_answer():
     cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     logger.arm(GAINS, WIDEST)
     cable.incoming = lambda _: b""
@@ -292,7 +292,7 @@ def test_disarm_is_not_believed_without_an_answer() -> None:
         cable.read(0.0)
 
 
-def test_disarm_is_not_believed_when_the_board_reports_that_it_is_armed() -> None:
+def test_disarm_is_not_believed_when_the_board_reports_that_it_is_armed():
     cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
     logger.arm(GAINS, WIDEST)
 
@@ -313,7 +313,7 @@ def arm_and_fail(logger: TeensyLogger) -> None:
         raise ZeroDivisionError
 
 
-def test_leaving_the_with_block_disarms(make_board: MakeBoard) -> None:
+def test_leaving_the_with_block_disarms(make_board):
     board = make_board()
     with pytest.raises(ZeroDivisionError):
         arm_and_fail(logger_of(board))
@@ -323,7 +323,7 @@ def test_leaving_the_with_block_disarms(make_board: MakeBoard) -> None:
         assert (status == protocol.STATUS_REFERENCED).all()
 
 
-def test_a_disarm_needs_no_matching_protocol() -> None:
+def test_a_disarm_needs_no_matching_protocol():
     logger = logger_of(PythonBoard(PlainBench(), protocol_hash=1))
     logger.disarm()
     logger.close()

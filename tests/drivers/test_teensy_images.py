@@ -139,7 +139,7 @@ def set_in_motion(name: str, image: TeensyImage) -> int:
 
 
 @pytest.mark.parametrize(("name", "mhz"), [("teensy35", 120), ("teensy41", 600)])
-def test_a_frame_from_the_host_keeps_no_edge_waiting(images: Images, name: str, mhz: int) -> None:
+def test_a_frame_from_the_host_keeps_no_edge_waiting(images, name, mhz):
     """At one instruction a cycle; the longest set-point frame, its acknowledgement, and samples."""
     image = images(name)
     say(image, protocol.encode(Kind.START, 9))
@@ -148,9 +148,7 @@ def test_a_frame_from_the_host_keeps_no_edge_waiting(images: Images, name: str, 
 
 
 @pytest.mark.parametrize("name", ["teensy41", "teensy41-grasper"])
-def test_every_decoder_input_of_a_teensy_41_comes_from_a_pin_of_its_own(
-    images: Images, name: str
-) -> None:
+def test_every_decoder_input_of_a_teensy_41_comes_from_a_pin_of_its_own(images, name):
     image = images(name)
     inputs = []
     for decoder in range(3):
@@ -162,7 +160,7 @@ def test_every_decoder_input_of_a_teensy_41_comes_from_a_pin_of_its_own(
 
 
 @pytest.mark.parametrize("name", list(CHIPS))
-def test_a_board_boots_with_its_enables_low(images: Images, name: str) -> None:
+def test_a_board_boots_with_its_enables_low(images, name):
     written = enable_writes(name, images(name))
     for pin in range(len(ENABLES[name])):
         assert ("clear", pin) in written
@@ -171,7 +169,7 @@ def test_a_board_boots_with_its_enables_low(images: Images, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", list(CHIPS))
-def test_a_fault_takes_the_enables_low_and_leaves_them(images: Images, name: str) -> None:
+def test_a_fault_takes_the_enables_low_and_leaves_them(images, name):
     image = images(name)
     set_in_motion(name, image)
     pins = set(range(len(ENABLES[name])))
@@ -187,7 +185,7 @@ def test_a_fault_takes_the_enables_low_and_leaves_them(images: Images, name: str
 
 
 @pytest.mark.parametrize("name", list(CHIPS))
-def test_the_watchdog_runs_and_is_fed_only_by_tick_and_loop(images: Images, name: str) -> None:
+def test_the_watchdog_runs_and_is_fed_only_by_tick_and_loop(images, name):
     image = images(name)
     if CHIPS[name] is K64:
         fed_at = WDOG_REFRESH

@@ -35,7 +35,7 @@ def at_rest(logger: TeensyLogger) -> None:
         logger.heartbeat()
 
 
-def test_a_board_that_was_started_is_not_armed_before_it_is_referenced(library: Path) -> None:
+def test_a_board_that_was_started_is_not_armed_before_it_is_referenced(library):
     with logger_of(library) as logger:
         identity = logger.identify()
         assert (identity.boot, identity.referenced) == (7, False)
@@ -54,7 +54,7 @@ def test_a_board_that_was_started_is_not_armed_before_it_is_referenced(library: 
         assert logger.identify().referenced
 
 
-def test_the_index_gives_the_reference_once_wherever_the_shaft_stands_then(library: Path) -> None:
+def test_the_index_gives_the_reference_once_wherever_the_shaft_stands_then(library):
     inputs = STANDS.copy()
     inputs[:300, :3] += np.outer(np.clip(np.arange(300) - 280, -20, 0), [35, 2, 1])
     board = FirmwareBoard(ScriptedBench(inputs), BoardStart(simulated=False), library)
@@ -77,7 +77,7 @@ def test_the_index_gives_the_reference_once_wherever_the_shaft_stands_then(libra
         assert refused.value.code == Result.NO_INDEX
 
 
-def test_a_shaft_that_turns_is_not_referenced(library: Path) -> None:
+def test_a_shaft_that_turns_is_not_referenced(library):
     turning = STANDS.copy()
     turning[:, 0] += 5 * np.arange(len(turning))
     with logger_of(library, turning) as logger:
@@ -87,7 +87,7 @@ def test_a_shaft_that_turns_is_not_referenced(library: Path) -> None:
             logger.reference([0, 0, 0])
 
 
-def test_a_trip_that_doubts_an_encoder_takes_its_reference(library: Path) -> None:
+def test_a_trip_that_doubts_an_encoder_takes_its_reference(library):
     jumps = STANDS.copy()
     jumps[600:, 1] += 500
     with logger_of(library, jumps) as logger:

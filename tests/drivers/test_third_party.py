@@ -39,9 +39,7 @@ def with_scale(url: str, **options: object) -> Config:
     return load_config().changed(devices={"scale": scale})
 
 
-def test_it_is_one_of_the_drivers_and_is_opened_with_its_options(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_is_one_of_the_drivers_and_is_opened_with_its_options(tmp_path, monkeypatch):
     install(tmp_path, monkeypatch, "acme_scale:DRIVER")
     assert drivers()["acme-scale"].options == {"rate_hz": 10.0}
     with pytest.raises(DriverError, match=r"no scale at /dev/ttyS9, 5.0 Hz"):
@@ -51,9 +49,7 @@ def test_it_is_one_of_the_drivers_and_is_opened_with_its_options(
     assert "colour" in problem.what
 
 
-def test_a_missing_fake_is_reported_where_one_is_required(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_fake_is_reported_where_one_is_required(tmp_path, monkeypatch):
     install(tmp_path, monkeypatch, "acme_scale:DRIVER")
     config = with_scale("sim://")
     (problem,) = problems(config)
@@ -63,9 +59,7 @@ def test_a_missing_fake_is_reported_where_one_is_required(
 
 
 @pytest.mark.parametrize("entry", ["acme_scale:NONE", "acme_nonesuch:DRIVER", "acme_scale:MODULE"])
-def test_a_broken_one_names_its_package(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, entry: str
-) -> None:
+def test_a_broken_one_names_its_package(tmp_path, monkeypatch, entry):
     install(tmp_path, monkeypatch, entry)
     with pytest.raises(UnknownDriverError, match=r"acme"):
         drivers()

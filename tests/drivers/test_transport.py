@@ -6,7 +6,6 @@ import socket
 import termios
 import tty
 from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -49,7 +48,7 @@ def pty() -> Iterator[Pty]:
     cable.unplug()
 
 
-def test_bytes_go_both_ways(pty: Pty) -> None:
+def test_bytes_go_both_ways(pty):
     transport = open_transport(pty.path)
     os.write(pty.device, b"\x00\x11from the device\x13\xff")
     got = b""
@@ -68,7 +67,7 @@ def test_bytes_go_both_ways(pty: Pty) -> None:
         transport.read(0.0)
 
 
-def test_a_line_has_its_own_speed_and_parity(pty: Pty) -> None:
+def test_a_line_has_its_own_speed_and_parity(pty):
     transport = open_line(pty.path, 1_250_000)
     os.write(pty.device, b"at this speed")
     got = b""
@@ -93,14 +92,14 @@ class RefusingPort:
         type(self).closed = True
 
 
-def test_a_speed_the_adapter_does_not_have_is_reported() -> None:
+def test_a_speed_the_adapter_does_not_have_is_reported():
     register_scheme("refusing", lambda url: SerialTransport(url, RefusingPort()))
     with pytest.raises(LinkError, match="cannot be set to 1250000 bit/s"):
         open_line("refusing:", 1_250_000, "E")
     assert RefusingPort.closed
 
 
-def test_a_port_is_opened_by_one_program_only(pty: Pty) -> None:
+def test_a_port_is_opened_by_one_program_only(pty):
     first = open_transport(pty.path)
     with pytest.raises(PortBusyError, match=rf"PID {os.getpid()} \("):
         open_transport(pty.path)
@@ -108,7 +107,7 @@ def test_a_port_is_opened_by_one_program_only(pty: Pty) -> None:
     open_transport(pty.path).close()
 
 
-def test_an_unplugged_cable_is_a_lost_link_from_then_on(pty: Pty) -> None:
+def test_an_unplugged_cable_is_a_lost_link_from_then_on(pty):
     transport = open_transport(pty.path)
     pty.unplug()
     for _ in range(2):
@@ -119,13 +118,13 @@ def test_an_unplugged_cable_is_a_lost_link_from_then_on(pty: Pty) -> None:
     transport.close()
 
 
-def test_a_missing_port_names_those_that_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_port_names_those_that_are_there(monkeypatch):
     present(monkeypatch, ("/dev/ttyACM3", 0x16C0, 0x0483, "1234567"))
     with pytest.raises(PortNotFoundError, match=r"ttyACM3.*usb:16c0:0483:1234567"):
         open_transport("/dev/tty_that_is_not_there")
 
 
-def test_a_refused_port_names_the_group(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_refused_port_names_the_group(monkeypatch, tmp_path):
     port = tmp_path / "port"
     port.touch(mode=0o660)
 
@@ -147,9 +146,7 @@ def present(monkeypatch: pytest.MonkeyPatch, *ports: tuple[str, int, int, str]) 
     monkeypatch.setattr(list_ports, "comports", lambda: found)
 
 
-def test_a_usb_device_is_found_by_its_serial_number(
-    monkeypatch: pytest.MonkeyPatch, pty: Pty
-) -> None:
+def test_a_usb_device_is_found_by_its_serial_number(monkeypatch, pty):
     present(monkeypatch, ("/dev/none", 0x16C0, 0x0483, "1"), (pty.path, 0x16C0, 0x0483, "2"))
     transport = open_transport("usb:16c0:0483:2")
     os.write(pty.device, b"it is me")
@@ -163,7 +160,7 @@ def test_a_usb_device_is_found_by_its_serial_number(
         open_transport("usb:teensy")
 
 
-def test_a_socket_url_is_a_client() -> None:
+def test_a_socket_url_is_a_client():
     with socket.create_server(("127.0.0.1", 0)) as server:
         transport = open_transport(f"socket://127.0.0.1:{server.getsockname()[1]}")
         device, _ = server.accept()
@@ -179,7 +176,7 @@ def test_a_socket_url_is_a_client() -> None:
         transport.close()
 
 
-def test_an_unknown_scheme_is_named() -> None:
+def test_an_unknown_scheme_is_named():
     with pytest.raises(UnknownSchemeError, match=r"'smoke'.*serial"):
         open_transport("smoke://signals")
 
@@ -203,7 +200,7 @@ class CountingBoard:
         return data
 
 
-def test_virtual_time_passes_by_reading_alone() -> None:
+def test_virtual_time_passes_by_reading_alone():
     transport = SimulatedTransport(CountingBoard(), step_s=0.01)
     assert transport.now_s == 0.0
     transport.write(b"echo")
@@ -221,7 +218,7 @@ def test_virtual_time_passes_by_reading_alone() -> None:
         transport.read(1.0)
 
 
-def test_a_pace_waits_only_for_time_not_yet_passed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pace_waits_only_for_time_not_yet_passed(monkeypatch):
     real_s = [100.0]
     waits: list[float] = []
 

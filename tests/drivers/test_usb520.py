@@ -18,7 +18,7 @@ from tests.drivers.taps import once
     ("line", "value", "unit"),
     [(b"-0.00190 N-m\r\n", -0.0019, "N-m"), (b"+0.00000 deg\r\n", 0.0, "deg")],
 )
-def test_lines_are_read_and_written_as_published(line: bytes, value: float, unit: str) -> None:
+def test_lines_are_read_and_written_as_published(line, value, unit):
     assert protocol.decode_line(line) == (value, unit)
     assert protocol.encode_line(value or 0.0, unit) == line
 
@@ -37,7 +37,7 @@ def test_lines_are_read_and_written_as_published(line: bytes, value: float, unit
         b"-0.00190 lb\r\n",
     ],
 )
-def test_anything_else_is_refused(line: bytes) -> None:
+def test_anything_else_is_refused(line):
     with pytest.raises(FrameError):
         protocol.decode_line(line)
 
@@ -48,7 +48,7 @@ def readings(device: Usb520, seconds: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("N-m", 1.0), ("deg", math.pi / 180)])
-def test_values_come_in_si(unit: str, factor: float) -> None:
+def test_values_come_in_si(unit, factor):
     device = Usb520(SimulatedTransport(Usb520Fake(unit)))
     assert device.identify().model == "USB520"
     device.start()
@@ -57,7 +57,7 @@ def test_values_come_in_si(unit: str, factor: float) -> None:
     assert device.channels[0].unit == protocol.QUANTITIES[unit].unit
 
 
-def test_it_starts_within_a_line_and_merged_lines_cost_no_more_than_themselves() -> None:
+def test_it_starts_within_a_line_and_merged_lines_cost_no_more_than_themselves():
     cable = FaultyTransport(SimulatedTransport(Usb520Fake()))
     cable.incoming = once(lambda data: data[5:])
     device = Usb520(cable)
@@ -70,7 +70,7 @@ def test_it_starts_within_a_line_and_merged_lines_cost_no_more_than_themselves()
     assert device.counters["crc_errors"] == 1
 
 
-def test_a_change_of_unit_is_not_mixed_in() -> None:
+def test_a_change_of_unit_is_not_mixed_in():
     fake = Usb520Fake()
     device = Usb520(SimulatedTransport(fake))
     device.start()
@@ -79,7 +79,7 @@ def test_a_change_of_unit_is_not_mixed_in() -> None:
     assert device.counters["unknown_frames"] > 0
 
 
-def test_noise_without_end_of_line_is_not_kept() -> None:
+def test_noise_without_end_of_line_is_not_kept():
     cable = FaultyTransport(SimulatedTransport(Usb520Fake()))
     device = Usb520(cable)
     device.start()

@@ -44,7 +44,7 @@ class Wrapped:
         self._board.advance(ticks)
 
     def transmit(self) -> bytes:
-        return self._change(self._board.transmit())  # type: ignore[operator,no-any-return]
+        return self._change(self._board.transmit())
 
 
 def status_of(board: Board, profile: Profile = REFERENCE) -> NDArray[np.uint16]:

@@ -42,7 +42,7 @@ class Rig:
     def __init__(self, name: str, **changes: object) -> None:
         make_fake, make_device = DRIVES[name]
         self.fake = make_fake()
-        self.link = SimulatedTransport(self.fake)  # type: ignore[arg-type]
+        self.link = SimulatedTransport(self.fake)
         self.device = make_device(self.link)
         self.config: Config = load_config(Path(f"{name}_simulated")).changed(**changes)
 
@@ -69,7 +69,7 @@ def moving(session: Session, seconds: float = 2.0, travel_rad: float = 0.4):
 
 
 @pytest.mark.parametrize("name", sorted(fakes()))
-def test_every_driver_is_recorded_and_shown(name: str, tmp_path: Path, capsys) -> None:
+def test_every_driver_is_recorded_and_shown(name, tmp_path, capsys):
     lines = ""
     if name in COUNTED:
         lines = f'[channels.shaft_rad]\ncounts = "{COUNTED[name]}"\nslope = 1e-3\n'
@@ -104,7 +104,7 @@ def test_every_driver_is_recorded_and_shown(name: str, tmp_path: Path, capsys) -
 
 
 @pytest.mark.parametrize("name", sorted(DRIVES))
-def test_a_drive_follows_its_target_and_gives_all_that_it_measures(rig_of, name: str) -> None:
+def test_a_drive_follows_its_target_and_gives_all_that_it_measures(rig_of, name):
     rig = rig_of(name)
     with Session(rig.config, open_logger(rig.config)) as session:
         next(session.rest(0.1))
@@ -146,7 +146,7 @@ WAYS_OUT = {
 
 @pytest.mark.parametrize("name", sorted(DRIVES))
 @pytest.mark.parametrize("way_out", WAYS_OUT, ids=lambda way: way.__name__)
-def test_no_way_out_leaves_a_motor_in_force(rig_of, name: str, way_out) -> None:
+def test_no_way_out_leaves_a_motor_in_force(rig_of, name, way_out):
     rig = rig_of(name)
     with pytest.raises(WAYS_OUT[way_out]), Session(rig.config, open_logger(rig.config)) as session:  # noqa: PT012
         next(session.rest(0.1))
@@ -170,7 +170,7 @@ def test_no_way_out_leaves_a_motor_in_force(rig_of, name: str, way_out) -> None:
         ({"plausibility": {"following_rad": 0.01, "following_s": 0.02}}, "behind its target"),
     ],
 )
-def test_the_limits_hold_on_a_drive(rig_of, name: str, change: dict, message: str) -> None:
+def test_the_limits_hold_on_a_drive(rig_of, name, change, message):
     rig = rig_of(name, **change)
     unsafe = pytest.raises((SafetyTripError, DriverError), match=message)
     with unsafe, Session(rig.config, open_logger(rig.config)) as session:
@@ -180,7 +180,7 @@ def test_the_limits_hold_on_a_drive(rig_of, name: str, change: dict, message: st
 
 
 @pytest.mark.parametrize("name", sorted(DRIVES))
-def test_a_drive_that_falls_silent_is_reported_as_unknown(rig_of, name: str, monkeypatch) -> None:
+def test_a_drive_that_falls_silent_is_reported_as_unknown(rig_of, name, monkeypatch):
     rig = rig_of(name)
     unsafe = pytest.raises((SafetyTripError, DisarmUnconfirmedError), match="not confirm")
     with unsafe, Session(rig.config, open_logger(rig.config)) as session:
@@ -192,7 +192,7 @@ def test_a_drive_that_falls_silent_is_reported_as_unknown(rig_of, name: str, mon
     assert current == 0
 
 
-def test_the_current_of_a_drive_is_calibrated_without_a_torque_sensor(tmp_path, capsys) -> None:
+def test_the_current_of_a_drive_is_calibrated_without_a_torque_sensor(tmp_path, capsys):
     words = ("--yes", "--operator", "a", "--store", str(tmp_path / "s"), "--json")
     rig = ("-c", "dynamixel_simulated", "-o", str(tmp_path / "raw"))
     assert main(["calibrate", "current", *rig, *words]) == 0
@@ -205,7 +205,7 @@ def test_the_current_of_a_drive_is_calibrated_without_a_torque_sensor(tmp_path, 
     assert abs(said["found"]["friction_current_a"]) < 1e-3
 
 
-def test_what_needs_a_motor_is_refused_in_words(tmp_path: Path, capsys) -> None:
+def test_what_needs_a_motor_is_refused_in_words(tmp_path, capsys):
     text = 'name = "cell"\ncalibration = "sensor"\n[logger]\ndriver = "{}"\nprofile = "{}"\n'
     sensor = tmp_path / "sensor.toml"
     sensor.write_text(text.format("amt21", "sensor") + 'url = "sim://"\n')
@@ -224,14 +224,12 @@ def test_what_needs_a_motor_is_refused_in_words(tmp_path: Path, capsys) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(DRIVES))
-def test_a_trip_stays_over_processes_until_it_is_cleared_by_its_name(
-    name: str, tmp_path: Path
-) -> None:
+def test_a_trip_stays_over_processes_until_it_is_cleared_by_its_name(name, tmp_path):
     rig = Rig(name, safety={"continuous_current_a": 0.001, "heat_a2_s": 1e-6})
     latch = TripLatch("/dev/serial/by-id/some", tmp_path)
 
     def link() -> LogicLink:
-        device = DRIVES[name][1](SimulatedTransport(rig.fake))  # type: ignore[arg-type]
+        device = DRIVES[name][1](SimulatedTransport(rig.fake))
         rate_hz = device.channels[0].rate_hz
         return LogicLink(device, "some", rate_hz=rate_hz, latch=latch)
 
@@ -253,7 +251,7 @@ def test_a_trip_stays_over_processes_until_it_is_cleared_by_its_name(
     assert latch.code == 0
 
 
-def test_a_latch_that_cannot_be_read_is_a_trip(tmp_path: Path) -> None:
+def test_a_latch_that_cannot_be_read_is_a_trip(tmp_path):
     latch = TripLatch("a", tmp_path)
     latch.keep(9)
     (file,) = tmp_path.iterdir()

@@ -35,7 +35,7 @@ class BoardThatIsReset:
         self._board.advance(ticks)
 
 
-def test_a_session_detects_that_its_board_was_reset_and_reports_what_to_do(library: Path) -> None:
+def test_a_session_detects_that_its_board_was_reset_and_reports_what_to_do(library):
     link = SimulatedTransport(BoardThatIsReset(library, 800), "sim://")
     with Session(simulated(), link) as session:
         assert session.board["board_start"] == "4"

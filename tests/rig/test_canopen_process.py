@@ -23,7 +23,7 @@ def config(**changes: object) -> Config:
     return settings.changed(devices={}, safety={"watchdog_s": 1.0}, **changes)
 
 
-def test_a_session_runs_on_it_and_nothing_is_lost_while_the_host_pauses() -> None:
+def test_a_session_runs_on_it_and_nothing_is_lost_while_the_host_pauses():
     settings = config()
     with Session(settings, open_logger(settings)) as session:
         next(session.rest(0.1))
@@ -42,7 +42,7 @@ def test_a_session_runs_on_it_and_nothing_is_lost_while_the_host_pauses() -> Non
     assert moved[-1] - moved[0] > 0.05
 
 
-def test_a_drive_that_cannot_be_reached_is_reported_with_what_to_type() -> None:
+def test_a_drive_that_cannot_be_reached_is_reported_with_what_to_type():
     settings = load_config(Path("canopen")).changed(
         logger={"url": "can:slcan:/dev/nonesuch?bitrate=1000000"}
     )
@@ -67,11 +67,10 @@ with Session(config, link) as session:
 """
 
 
-def test_a_host_that_is_killed_leaves_no_process_behind() -> None:
+def test_a_host_that_is_killed_leaves_no_process_behind():
     with subprocess.Popen(
         [sys.executable, "-c", HOST], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ) as host:
-        assert host.stdout is not None
         worker = int(host.stdout.readline())
         host.kill()
         host.stdout.read()
@@ -88,7 +87,7 @@ def _state(process: int) -> str:
         return "Z"
 
 
-def test_ctrl_c_of_the_whole_group_lets_the_host_disarm_first() -> None:
+def test_ctrl_c_of_the_whole_group_lets_the_host_disarm_first():
     with subprocess.Popen(
         [sys.executable, "-c", HOST],
         stdout=subprocess.PIPE,
@@ -96,8 +95,6 @@ def test_ctrl_c_of_the_whole_group_lets_the_host_disarm_first() -> None:
         text=True,
         start_new_session=True,
     ) as host:
-        assert host.stdout is not None
-        assert host.stderr is not None
         host.stdout.readline()
         os.killpg(host.pid, signal.SIGINT)
         os.killpg(host.pid, signal.SIGINT)

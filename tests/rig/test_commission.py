@@ -8,7 +8,6 @@ import pytest
 from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.transport.simulated import SimulatedTransport
 from rig.cli.main import main
-from rig.configuration.config import Config
 from rig.doctor.commission import REACH_RAD, commission
 from rig.simulation.bench import SimulatedBench
 from tests.rig.simulated import simulated
@@ -33,9 +32,7 @@ class MiswiredBench:
         self._command = command
         self.spindle: list[int] = []
 
-    def advance_with_board(
-        self, ticks: int, tick_address: int, board_address: int, tick_us: int
-    ) -> None:
+    def advance_with_board(self, ticks, tick_address, board_address, tick_us):
         core = TICK(tick_address)
 
         def between(board: int, now_us: int, inputs: int, outputs: int) -> None:
@@ -52,15 +49,13 @@ class MiswiredBench:
         self._inner.advance_with_board(ticks, address, board_address, tick_us)
 
 
-def results(
-    bench: MiswiredBench, monkeypatch: pytest.MonkeyPatch, config: Config | None = None
-) -> dict[str, bool]:
+def results(bench, monkeypatch, config=None):
     link = SimulatedTransport(FirmwareBoard(bench), step_s=0.02)
     monkeypatch.setattr("rig.bench.logger.open_logger", lambda _: link)
     return {check.name: check.passed for check in commission(config or simulated())}
 
 
-def test_a_sound_rig_passes_both_ways() -> None:
+def test_a_sound_rig_passes_both_ways():
     assert main(["commission", "--sim"]) == 0
 
 
@@ -77,9 +72,7 @@ def test_a_sound_rig_passes_both_ways() -> None:
         ({}, 0, "the measured current follows the command, closing"),
     ],
 )
-def test_a_wrong_wire_is_named_and_the_shaft_hardly_turns(
-    monkeypatch: pytest.MonkeyPatch, factors: dict[int, int], command: int, failed: str
-) -> None:
+def test_a_wrong_wire_is_named_and_the_shaft_hardly_turns(monkeypatch, factors, command, failed):
     bench = MiswiredBench(factors, command)
     made = results(bench, monkeypatch)
     assert [name for name, passed in made.items() if not passed] == [failed]
@@ -87,7 +80,7 @@ def test_a_wrong_wire_is_named_and_the_shaft_hardly_turns(
     assert turned_rad < 2 * REACH_RAD
 
 
-def test_a_board_without_zeros_does_not_move(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_board_without_zeros_does_not_move(monkeypatch):
     bench = MiswiredBench({})
     link = SimulatedTransport(FirmwareBoard(bench, BoardStart(simulated=False)), step_s=0.02)
     monkeypatch.setattr("rig.bench.logger.open_logger", lambda _: link)

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,7 +33,7 @@ def runs() -> Campaign:
     return Campaign.of(made)
 
 
-def test_a_joint_is_diagnosed_like_any_balance(tmp_path: Path, monkeypatch, capsys) -> None:
+def test_a_joint_is_diagnosed_like_any_balance(tmp_path, monkeypatch, capsys):
     campaign = runs()
     monkeypatch.setattr(subject, "open_campaign", lambda *_: campaign)
     out, report = tmp_path / "diagnosis.json", tmp_path / "report"
@@ -56,7 +55,7 @@ def test_a_joint_is_diagnosed_like_any_balance(tmp_path: Path, monkeypatch, caps
     assert "joint.6" in capsys.readouterr().err
 
 
-def test_whole_periods_of_one_path_are_repeats() -> None:
+def test_whole_periods_of_one_path_are_repeats():
     time_s = np.arange(1700) / 100
     angles = [np.sin(time_s * 2 * np.pi / period_s) for period_s in (4.0, 5.0)]
     paths = [

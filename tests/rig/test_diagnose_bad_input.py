@@ -111,7 +111,7 @@ def test_what_limits_a_diagnosis_is_reported(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("what", CASES)
-def test_nothing_is_decided_and_the_reason_is_reported(monkeypatch, tmp_path, capsys, what) -> None:
+def test_nothing_is_decided_and_the_reason_is_reported(monkeypatch, tmp_path, capsys, what):
     spoil, reason = CASES[what]
     recordings = spoil(runs(spring, count=9, seconds=2.0))
     assert main(command(monkeypatch, tmp_path, recordings)) == 5

@@ -77,7 +77,7 @@ def diagnoses(draw: st.DrawFn) -> Diagnosis:
 
 @settings(deadline=None, max_examples=60)
 @given(diagnosis=diagnoses())
-def test_every_field_is_there_and_no_number_is_undefined(diagnosis: Diagnosis) -> None:
+def test_every_field_is_there_and_no_number_is_undefined(diagnosis):
     text = json.dumps(diagnosis.to_json(), allow_nan=False)
     found: dict[str, Any] = json.loads(text)
     DiagnosisSchema.model_validate(found)
@@ -87,7 +87,7 @@ def test_every_field_is_there_and_no_number_is_undefined(diagnosis: Diagnosis) -
     assert [f["family"] for f in found["findings"]] == [f.family for f in diagnosis.findings]
 
 
-def test_the_published_schema_is_the_one_that_checks_and_nothing_is_optional() -> None:
+def test_the_published_schema_is_the_one_that_checks_and_nothing_is_optional():
     schema = json.loads((Path(__file__).parents[2] / FILE).read_text())
     assert json_schema() == json.dumps(schema, indent=2) + "\n"
     finding = schema["$defs"]["Finding"]
@@ -106,7 +106,7 @@ def test_the_published_schema_is_the_one_that_checks_and_nothing_is_optional() -
         {"runs": {"discover": []}},
     ],
 )
-def test_the_contract_refuses_what_it_does_not_allow(change: dict[str, Any]) -> None:
+def test_the_contract_refuses_what_it_does_not_allow(change):
     found = Diagnosis((), {}, {}, {}, {}, Sealed((), (), 0, "", "")).to_json()
     DiagnosisSchema.model_validate(found)
     with pytest.raises(ValueError, match=re.escape(next(iter(change)))):

@@ -34,13 +34,11 @@ def by_check(findings: list[Finding]) -> dict[str, Finding]:
     return {finding.check: finding for finding in findings}
 
 
-def test_a_healthy_simulated_rig_has_no_complaint() -> None:
+def test_a_healthy_simulated_rig_has_no_complaint():
     assert worst(examine(simulated())) is Level.OK
 
 
-def test_a_board_that_was_restarted_needs_its_reference(
-    monkeypatch: pytest.MonkeyPatch, library: Path
-) -> None:
+def test_a_board_that_was_restarted_needs_its_reference(monkeypatch, library):
     board = FirmwareBoard(SimulatedBench(), BoardStart(simulated=False), library)
     link = SimulatedTransport(board)
     monkeypatch.setattr("rig.doctor.examine.open_logger", lambda _: link)
@@ -49,13 +47,13 @@ def test_a_board_that_was_restarted_needs_its_reference(
 
 
 @pytest.mark.parametrize("name", sorted(fakes()))
-def test_every_fake_is_healthy_and_at_its_rate(name: str) -> None:
+def test_every_fake_is_healthy_and_at_its_rate(name):
     findings = device_findings(name, lambda: fakes()[name](Faults()))
     assert worst(findings) is Level.OK, findings
     assert by_check(findings)["sample rate"].what.count("Hz") == 2
 
 
-def test_a_bad_cable_is_a_warning_with_numbers() -> None:
+def test_a_bad_cable_is_a_warning_with_numbers():
     faults = Faults(rates={Fault.CORRUPT: 0.3})
     finding = by_check(device_findings("logger", lambda: fakes()["teensy"](faults)))["link"]
     assert finding.level is Level.WARNING
@@ -63,7 +61,7 @@ def test_a_bad_cable_is_a_warning_with_numbers() -> None:
     assert "cable" in finding.fix
 
 
-def test_another_firmware_is_reported_with_the_command_that_fixes_it() -> None:
+def test_another_firmware_is_reported_with_the_command_that_fixes_it():
     board = PythonBoard(HandMovedBench(), protocol_hash=0xDEADBEEF)
     (finding,) = device_findings("logger", lambda: TeensyDevice(SimulatedTransport(board)))
     assert (finding.check, finding.level) == ("firmware", Level.ERROR)
@@ -80,7 +78,7 @@ class Changed:
         return getattr(self._device, name)
 
     def read(self, timeout_s: float) -> Batch:
-        return self._change(self._device.read(timeout_s))  # type: ignore[operator,no-any-return]
+        return self._change(self._device.read(timeout_s))
 
 
 def stuck(batch: Batch) -> Batch:
@@ -106,7 +104,7 @@ def slow(batch: Batch) -> Batch:
         (slow, "sample rate", Level.ERROR, "909.1 Hz"),
     ],
 )
-def test_what_a_stream_may_have(change: object, check: str, level: Level, words: str) -> None:
+def test_what_a_stream_may_have(change, check, level, words):
     findings = device_findings("logger", lambda: Changed(fakes()["teensy"](Faults()), change))
     finding = by_check(findings)[check]
     assert finding.level is level
@@ -114,7 +112,7 @@ def test_what_a_stream_may_have(change: object, check: str, level: Level, words:
     assert finding.fix
 
 
-def test_a_device_that_sends_nothing_is_an_error() -> None:
+def test_a_device_that_sends_nothing_is_an_error():
     def nothing(batch: Batch) -> Batch:
         empty = {name: values[:0] for name, values in batch.columns.items()}
         few = (batch.time_s[:0], batch.clock, batch.sequence[:0], batch.flags[:0], batch.lost)
@@ -139,7 +137,7 @@ def computer(root: Path, rule: bool, modem_manager: bool) -> Path:
 
 
 @pytest.mark.parametrize(("rule", "modem_manager"), [(a, b) for a in (0, 1) for b in (0, 1)])
-def test_rules_and_modem_manager(tmp_path: Path, rule: bool, modem_manager: bool) -> None:
+def test_rules_and_modem_manager(tmp_path, rule, modem_manager):
     device = tmp_path / "ttyACM0"
     device.touch()
     root = computer(tmp_path / "root", rule, modem_manager)
@@ -150,7 +148,7 @@ def test_rules_and_modem_manager(tmp_path: Path, rule: bool, modem_manager: bool
         assert finding.level is Level.OK or "rig udev | sudo tee" in finding.fix
 
 
-def test_who_holds_a_port_is_named(tmp_path: Path) -> None:
+def test_who_holds_a_port_is_named(tmp_path):
     device = tmp_path / "ttyACM0"
     device.touch()
     root = computer(tmp_path / "root", True, False)
@@ -166,7 +164,7 @@ def test_who_holds_a_port_is_named(tmp_path: Path) -> None:
     assert finding.fix.endswith(f"kill -TERM {holder.pid}")
 
 
-def test_a_slow_ftdi_adapter_is_reported(tmp_path: Path) -> None:
+def test_a_slow_ftdi_adapter_is_reported(tmp_path):
     root = computer(tmp_path / "root", True, False)
     timer = root / "sys/bus/usb-serial/devices/ttyUSB7/latency_timer"
     timer.parent.mkdir(parents=True)
@@ -176,18 +174,18 @@ def test_a_slow_ftdi_adapter_is_reported(tmp_path: Path) -> None:
     assert "16 ms" in by_check(port_findings([port], root))["latency"].what
 
 
-def test_other_peoples_ports_are_left_alone(tmp_path: Path) -> None:
+def test_other_peoples_ports_are_left_alone(tmp_path):
     assert port_findings([Port("/dev/ttyS0", "", "")], computer(tmp_path, False, True)) == []
 
 
-def test_the_rules_name_every_device() -> None:
+def test_the_rules_name_every_device():
     for identity in USB:
         vendor, product = identity.split(":")
         assert f'ATTRS{{idVendor}}=="{vendor}", ATTRS{{idProduct}}=="{product}"' in udev_rules()
     assert "0666" not in udev_rules()
 
 
-def test_can_interfaces_are_known_by_their_kind(tmp_path: Path) -> None:
+def test_can_interfaces_are_known_by_their_kind(tmp_path):
     for name, kind in (("can0", "280"), ("eth0", "1")):
         (tmp_path / "sys/class/net" / name).mkdir(parents=True)
         (tmp_path / "sys/class/net" / name / "type").write_text(f"{kind}\n")
@@ -199,7 +197,7 @@ def told(capsys: pytest.CaptureFixture[str], words: list[str]) -> tuple[int, dic
     return code, json.loads(capsys.readouterr().out)
 
 
-def test_the_verbs_speak_to_machines(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_verbs_speak_to_machines(capsys):
     code, result = told(capsys, ["doctor"])
     assert code == 0
     assert all(f["level"] == "ok" for f in result["findings"] if f["subject"] == "logger")
@@ -210,9 +208,7 @@ def test_the_verbs_speak_to_machines(capsys: pytest.CaptureFixture[str]) -> None
     assert (code, result["state"]) == (0, "disarmed")
 
 
-def test_a_rig_that_is_not_there_is_named_and_its_state_unknown(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_rig_that_is_not_there_is_named_and_its_state_unknown(tmp_path, capsys):
     path = tmp_path / "rig.toml"
     path.write_text(
         (SHIPPED / "reference.toml").read_text().replace("usb:16c0:0483", "/dev/nonesuch")
@@ -228,7 +224,7 @@ def test_a_rig_that_is_not_there_is_named_and_its_state_unknown(
     assert not result["fits"]
 
 
-def test_the_hash_of_the_sources_is_that_of_posix_cksum(library: Path) -> None:
+def test_the_hash_of_the_sources_is_that_of_posix_cksum(library):
     assert firmware.posix_cksum(b"123456789") == 930766865
     versions = firmware.compare(load_config())
     assert versions.fits
@@ -236,14 +232,12 @@ def test_the_hash_of_the_sources_is_that_of_posix_cksum(library: Path) -> None:
     assert versions.remarks == ("Program and board have the same protocol.",)
 
 
-def test_a_build_of_other_sources_is_reported(
-    library: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_build_of_other_sources_is_reported(library, monkeypatch):
     monkeypatch.setattr(firmware, "source_hash", lambda: 1)
     assert any("rig firmware flash" in r for r in firmware.compare(load_config()).remarks)
 
 
-def test_flashing_reports_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flashing_reports_what_is_missing(monkeypatch):
     with pytest.raises(UsageError, match="teensy41"):
         firmware.flash("uno")
     monkeypatch.setattr(firmware.shutil, "which", lambda tool: None)

@@ -48,16 +48,12 @@ def program(library: Path) -> Path:
 
 
 @pytest.mark.parametrize("safe_state", ["release", "hold"])
-def test_a_host_that_is_killed_leaves_a_board_that_makes_itself_safe(
-    program: Path, safe_state: str
-) -> None:
+def test_a_host_that_is_killed_leaves_a_board_that_makes_itself_safe(program, safe_state):
     with subprocess.Popen([str(program)], stdout=subprocess.PIPE, text=True) as board:
-        assert board.stdout is not None
         path = board.stdout.readline().strip()
         with subprocess.Popen(
             [sys.executable, "-c", HOST, path, safe_state], stdout=subprocess.PIPE, text=True
         ) as host:
-            assert host.stdout is not None
             assert host.stdout.readline().strip() == "playing"
             host.kill()
         with TeensyLogger(open_transport(path)) as logger:
@@ -73,18 +69,14 @@ def test_a_host_that_is_killed_leaves_a_board_that_makes_itself_safe(
     assert 50_000 < report.late_us <= 52_000
 
 
-def test_a_second_program_on_the_port_is_refused_and_the_first_goes_on(
-    program: Path, tmp_path: Path
-) -> None:
+def test_a_second_program_on_the_port_is_refused_and_the_first_goes_on(program, tmp_path):
     rig = [sys.executable, "-m", "rig"]
     with subprocess.Popen([str(program)], stdout=subprocess.PIPE, text=True) as board:
-        assert board.stdout is not None
         path = board.stdout.readline().strip()
         config = tmp_path / "rig.toml"
         config.write_text((SHIPPED / "pty.toml").read_text().replace("sim://pty", path))
         first = [*rig, "live", "-c", str(config), "--json"]
         with subprocess.Popen(first, stdout=subprocess.PIPE, text=True) as live:
-            assert live.stdout is not None
             live.stdout.readline()
             second = [*rig, "record", "-c", str(config), "-p", "quick", "-o", str(tmp_path / "a")]
             refused = subprocess.run(second, capture_output=True, text=True, check=False)
@@ -100,9 +92,7 @@ def test_a_second_program_on_the_port_is_refused_and_the_first_goes_on(
 @pytest.mark.parametrize(
     ("name", "kind"), [("pty", FirmwareProcess), ("canopen_virtual", CanopenProcess)]
 )
-def test_a_process_that_dies_is_a_lost_link(
-    program: Path, name: str, kind: type[FirmwareProcess] | type[CanopenProcess]
-) -> None:
+def test_a_process_that_dies_is_a_lost_link(program, name, kind):
     config = load_config(Path(name)).changed(devices={}, safety={"watchdog_s": 1.0})
     link = open_logger(config)
     assert isinstance(link, kind)
@@ -133,13 +123,10 @@ except BaseException as error:
 """
 
 
-def test_a_signal_to_the_whole_group_ends_the_program_after_the_board_is_safe(
-    program: Path,
-) -> None:
+def test_a_signal_to_the_whole_group_ends_the_program_after_the_board_is_safe(program):
     with subprocess.Popen(
         [sys.executable, "-c", WATCHER], stdout=subprocess.PIPE, text=True, start_new_session=True
     ) as host:
-        assert host.stdout is not None
         assert host.stdout.readline().strip() == "watching"
         os.killpg(host.pid, signal.SIGTERM)
         told = host.stdout.read().splitlines()[-1]
@@ -148,7 +135,7 @@ def test_a_signal_to_the_whole_group_ends_the_program_after_the_board_is_safe(
     assert told.startswith(("KeyboardInterrupt", "SystemExit", "Terminated")), told
 
 
-def test_a_motion_in_real_time_is_not_held_up_by_a_collection_of_all_objects(library: Path) -> None:
+def test_a_motion_in_real_time_is_not_held_up_by_a_collection_of_all_objects(library):
     config = load_config(Path("pty"))
     before = gc.get_freeze_count()
     with Session(config, open_logger(config)) as session:

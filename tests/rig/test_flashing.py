@@ -30,7 +30,6 @@ def board(library: Path) -> Iterator[str]:
     if not PROGRAM.is_file():
         pytest.skip("the firmware process is built on Linux only")
     with subprocess.Popen([str(PROGRAM)], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         yield process.stdout.readline().strip()
         process.kill()
 
@@ -42,7 +41,7 @@ def plug_in(monkeypatch: pytest.MonkeyPatch, **boards: str) -> None:
     monkeypatch.setattr(list_ports, "comports", lambda: [other, *ports])
 
 
-def test_the_one_board_is_named_with_its_state(board: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_one_board_is_named_with_its_state(board, monkeypatch):
     plug_in(monkeypatch, A1=board)
     found = board_to_flash("", REFERENCE)
     assert (found.serial, found.port, found.state) == ("A1", board, "it is disarmed")
@@ -51,7 +50,7 @@ def test_the_one_board_is_named_with_its_state(board: str, monkeypatch: pytest.M
         board_to_flash("B2", REFERENCE)
 
 
-def test_several_boards_and_none_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_several_boards_and_none_are_refused(monkeypatch):
     plug_in(monkeypatch, A1="/dev/ttyACM0", B2="/dev/ttyACM1")
     with pytest.raises(UsageError, match=r"A1 at /dev/ttyACM0, B2 at /dev/ttyACM1"):
         board_to_flash("B2", REFERENCE)
@@ -60,9 +59,7 @@ def test_several_boards_and_none_are_refused(monkeypatch: pytest.MonkeyPatch) ->
         board_to_flash("", REFERENCE)
 
 
-def test_a_board_that_another_program_has_is_refused(
-    board: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_board_that_another_program_has_is_refused(board, monkeypatch):
     plug_in(monkeypatch, A1=board)
     link = open_transport(board)
     with pytest.raises(PortBusyError, match="may be armed"):
@@ -70,9 +67,7 @@ def test_a_board_that_another_program_has_is_refused(
     link.close()
 
 
-def test_an_armed_board_is_refused_and_nothing_is_written(
-    board: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_armed_board_is_refused_and_nothing_is_written(board, monkeypatch):
     plug_in(monkeypatch, A1=board)
     settings = load_config(Path("pty")).changed(
         safety={"watchdog_s": 1.0, "safe_state": "hold"}  # a slow computer finds it holding
@@ -90,7 +85,7 @@ def test_an_armed_board_is_refused_and_nothing_is_written(
     assert run == []
 
 
-def test_a_disarmed_board_is_flashed(board: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disarmed_board_is_flashed(board, monkeypatch):
     plug_in(monkeypatch, A1=board)
     run: list[list[str]] = []
     monkeypatch.setattr(firmware, "_require_platformio", lambda _: None)

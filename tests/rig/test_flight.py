@@ -28,7 +28,7 @@ def recorded(folder: Path, config: Config, runs: dict = SHORT) -> list[Path]:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_every_run_is_made_again_bit_for_bit(tmp_path: Path, seed: int, capsys) -> None:
+def test_every_run_is_made_again_bit_for_bit(tmp_path, seed, capsys):
     config = load_config(Path("simulated")).changed(simulation={"seed": seed, "spread": 0.1})
     for path in recorded(tmp_path, config):
         found = replay_core(path)
@@ -39,7 +39,7 @@ def test_every_run_is_made_again_bit_for_bit(tmp_path: Path, seed: int, capsys) 
         assert "1000 of 1000 samples are the same" in capsys.readouterr().out
 
 
-def test_a_run_that_tripped_is_made_again_with_its_trip(tmp_path: Path) -> None:
+def test_a_run_that_tripped_is_made_again_with_its_trip(tmp_path):
     config = load_config(Path("simulated")).changed(
         safety={"continuous_current_a": 0.1, "heat_a2_s": 0.02}
     )
@@ -51,7 +51,7 @@ def test_a_run_that_tripped_is_made_again_with_its_trip(tmp_path: Path) -> None:
     assert found.trips == ("overheated",)
 
 
-def test_another_plant_or_a_changed_command_does_not_pass(tmp_path: Path, capsys) -> None:
+def test_another_plant_or_a_changed_command_does_not_pass(tmp_path, capsys):
     config = load_config(Path("simulated"))
     path = recorded(tmp_path, config)[0]
     other = replay_core(path, config.changed(simulation={"seed": 7}))
@@ -60,14 +60,14 @@ def test_another_plant_or_a_changed_command_does_not_pass(tmp_path: Path, capsys
     assert other.same < other.samples
 
 
-def test_hidden_effects_are_in_no_log_and_are_given_to_a_replay(tmp_path: Path) -> None:
+def test_hidden_effects_are_in_no_log_and_are_given_to_a_replay(tmp_path):
     config = load_config(Path("simulated")).changed(simulation={"hidden": {"motor_ripple": 1.0}})
     path = recorded(tmp_path, config)[0]
     assert not replay_core(path).passed
     assert replay_core(path, config).passed
 
 
-def test_what_cannot_be_made_again_is_refused_in_words(tmp_path: Path) -> None:
+def test_what_cannot_be_made_again_is_refused_in_words(tmp_path):
     path = recorded(tmp_path, load_config(Path("simulated")))[0]
     with pytest.raises(UsageError, match="real shaft"):
         replay_core(path, load_config(Path("reference")))

@@ -39,21 +39,18 @@ def config(request: pytest.FixtureRequest, library: Path) -> Config:
     return grasper(simulation={"firmware": request.param == "firmware"})
 
 
-def test_joints_become_motors_of_which_the_jaws_close_on_one_another() -> None:
+def test_joints_become_motors_of_which_the_jaws_close_on_one_another():
     joints = np.array([[0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.4], [0.0, 0.1, 0.4]])
     expected = [[0.1, 0, 0], [0, 0.2, -0.2], [0, 0.2, 0.2], [0, 0.3, 0.1]]
     np.testing.assert_allclose(axes_of_joints(joints), expected, atol=1e-12)
 
 
-def test_a_campaign_at_2_khz_closes_the_jaws_and_measures_their_force(
-    config: Config, tmp_path: Path
-) -> None:
+def test_a_campaign_at_2_khz_closes_the_jaws_and_measures_their_force(config, tmp_path):
     protocol = Protocol.model_validate(
         {"name": "short", "runs": [table("yaw", 0.05), table("grasp", 0.28)]}
     )
     todo = open_campaign_folder(tmp_path / "runs", protocol, config, resume=False)
     link = open_logger(config)
-    assert isinstance(link, SimulatedTransport)
     assert isinstance(link.board, FirmwareBoard) == config.simulation.firmware
     with Session(config, link) as session:
         free, closed = record_campaign(session, todo, tmp_path / "runs")
@@ -82,9 +79,7 @@ def test_a_campaign_at_2_khz_closes_the_jaws_and_measures_their_force(
         ({"safety": {"continuous_current_a": 0.004, "heat_a2_s": 1e-5}}, (0.12, 0, 0), 8),
     ],
 )
-def test_a_trip_of_any_motor_takes_all_three_out_of_force(
-    library: Path, change: dict, motion: tuple[float, ...], trip: int
-) -> None:
+def test_a_trip_of_any_motor_takes_all_three_out_of_force(library, change, motion, trip):
     settings = grasper(simulation={"firmware": True}, **change)
     link = open_logger(settings)
     ramp = np.minimum(np.arange(3000) / 1000, 1.0)
@@ -104,12 +99,11 @@ def test_a_trip_of_any_motor_takes_all_three_out_of_force(
 
 def link_again(link: object) -> SimulatedTransport:
     """A fresh link to the same board."""
-    assert isinstance(link, SimulatedTransport)
     return SimulatedTransport(link.board, tick_s=5e-4)
 
 
 @pytest.mark.parametrize("bad", [1.01, -1.01, np.nan, np.inf])
-def test_no_target_beyond_a_motors_travel_or_no_number_is_sent(config: Config, bad: float) -> None:
+def test_no_target_beyond_a_motors_travel_or_no_number_is_sent(config, bad):
     with Session(config, open_logger(config)) as session:
         targets = STILL.copy()
         targets[-1] = bad
@@ -117,7 +111,7 @@ def test_no_target_beyond_a_motors_travel_or_no_number_is_sent(config: Config, b
             next(session.play(STILL, STILL, targets))
 
 
-def test_protocols_and_rigs_of_different_kinds_refuse_each_other(tmp_path: Path) -> None:
+def test_protocols_and_rigs_of_different_kinds_refuse_each_other(tmp_path):
     with pytest.raises(UsageError, match="grasper"):
         load_protocol("grasper").plans()
     with pytest.raises(UsageError, match=r"spindle.*Choose a protocol"):
@@ -138,9 +132,7 @@ def mixed(config: Config, protocol: str, folder: Path) -> None:
         list(record_campaign(session, todo[:1], folder))
 
 
-def test_commands_on_the_grasper_as_a_person_types_them(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_commands_on_the_grasper_as_a_person_types_them(tmp_path, capsys):
     path = tmp_path / "short.toml"
     path.write_text(
         'name = "short"\n[[runs]]\nkind = "joint_sine"\njoints = ["grasp"]\nangles_rad = [0.25]\n'

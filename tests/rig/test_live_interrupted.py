@@ -25,7 +25,7 @@ def _swallowed() -> Iterator[SampleBlock]:
             yield block(10 * k, 1)
 
 
-def test_a_request_that_was_lost_in_a_callback_ends_the_display() -> None:
+def test_a_request_that_was_lost_in_a_callback_ends_the_display():
     console = Console(file=io.StringIO(), width=100)
     summary = show(_swallowed(), ShowOptions("x", plain=True), console)
     assert summary.ended == "interrupted"

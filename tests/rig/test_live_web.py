@@ -36,7 +36,6 @@ def live(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     with subprocess.Popen(
         command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
-        assert process.stderr is not None
         lines = iter(process.stderr.readline, "")
         yield process, next(found[0] for line in lines if (found := re.search("http://.*", line)))
         process.kill()

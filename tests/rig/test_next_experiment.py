@@ -64,22 +64,20 @@ def bare(rippled: list[Recording]) -> list[Recording]:
     ]
 
 
-def test_a_sure_name_needs_no_experiment(answered: Answer, rippled: list[Recording]) -> None:
+def test_a_sure_name_needs_no_experiment(answered, rippled):
     assert answered.diagnosis.findings[0].family == "ripple.motor"
     assert answered.diagnosis.verdict == "identified"
     assert propose(answered, rippled) is None
 
 
-def test_a_name_without_a_likely_alternative_needs_no_experiment(
-    doubtful: Answer, rippled: list[Recording]
-) -> None:
+def test_a_name_without_a_likely_alternative_needs_no_experiment(doubtful, rippled):
     kept = doubtful.kept[0]
     alone = [kept.ranked[0], *(replace(other, score=-1e9) for other in kept.ranked[1:])]
     single = replace(doubtful, kept=(replace(kept, ranked=alone), *doubtful.kept[1:]))
     assert propose(single, rippled) is None
 
 
-def test_repeats_are_found_by_what_was_asked(rippled: list[Recording]) -> None:
+def test_repeats_are_found_by_what_was_asked(rippled):
     names = [r.name for r in rippled]
     assert repeats(rippled) == [
         (names[6], names[7]),
@@ -88,18 +86,13 @@ def test_repeats_are_found_by_what_was_asked(rippled: list[Recording]) -> None:
     ]
 
 
-def test_the_noise_floor_is_below_the_error_that_remains(
-    answered: Answer, rippled: list[Recording]
-) -> None:
+def test_the_noise_floor_is_below_the_error_that_remains(answered, rippled):
     floor = noise_floors(answered.refits, rippled)["motor"]
-    assert floor is not None
     assert 0.3 * answered.diagnosis.errors["motor"].after < floor
     assert floor < 1.2 * answered.diagnosis.errors["motor"].after
 
 
-def test_a_repeat_that_was_left_out_has_no_part_in_the_noise_floor(
-    answered: Answer, rippled: list[Recording]
-) -> None:
+def test_a_repeat_that_was_left_out_has_no_part_in_the_noise_floor(answered, rippled):
     short = replace(rippled[6], name="left out")
     assert (short.name, rippled[7].name) in repeats([short, *rippled])
     assert noise_floors(answered.refits, [short, *rippled]) == noise_floors(
@@ -107,11 +100,8 @@ def test_a_repeat_that_was_left_out_has_no_part_in_the_noise_floor(
     )
 
 
-def test_every_experiment_of_the_menu_is_a_protocol_within_the_limits(
-    answered: Answer, rippled: list[Recording], tmp_path
-) -> None:
+def test_every_experiment_of_the_menu_is_a_protocol_within_the_limits(answered, rippled, tmp_path):
     rig = simulated_rig([e.model for e in answered.layout.equations.values()], rippled)
-    assert rig is not None
     limits = load_config().limits
     offered = menu(rippled, limits)
     assert len({protocol.name for protocol in offered}) == len(offered) >= 8
@@ -127,9 +117,7 @@ def test_every_experiment_of_the_menu_is_a_protocol_within_the_limits(
     assert not within(rippled[:1], tight)
 
 
-def test_a_set_gets_an_experiment_that_record_can_run(
-    proposed: dict[str, Any], doubtful: Answer, tmp_path
-) -> None:
+def test_a_set_gets_an_experiment_that_record_can_run(proposed, doubtful, tmp_path):
     assert proposed["between"][0] == "ripple.motor"
     assert len(set(proposed["between"])) == len(proposed["between"]) >= 2
     assert proposed["discrimination"] > max(0.0, *proposed["others"].values()) - 0.1
@@ -140,12 +128,9 @@ def test_a_set_gets_an_experiment_that_record_can_run(
     assert load_protocol(str(path)).plans()
 
 
-def test_without_a_simulated_rig_the_experiment_is_described(
-    bare: list[Recording], doubtful: Answer, tmp_path
-) -> None:
+def test_without_a_simulated_rig_the_experiment_is_described(bare, doubtful, tmp_path):
     assert simulated_rig([e.model for e in doubtful.layout.equations.values()], bare) is None
     by_hand = propose(doubtful, bare)
-    assert by_hand is not None
     assert by_hand["protocol"] is None
     assert by_hand["description"]
     diagnosis = replace(doubtful.diagnosis, next_experiment=by_hand)
@@ -153,9 +138,7 @@ def test_without_a_simulated_rig_the_experiment_is_described(
     assert not (tmp_path / "no.toml").exists()
 
 
-def test_processes_propose_the_experiment_of_one(
-    proposed: dict[str, Any], rippled: list[Recording], doubtful: Answer
-) -> None:
+def test_processes_propose_the_experiment_of_one(proposed, rippled, doubtful):
     with ProcessPoolExecutor(2) as executor:
         assert propose(doubtful, rippled, executor) == proposed
 
@@ -213,8 +196,8 @@ class Losing:
 
 @pytest.mark.filterwarnings("ignore")  # the cluster's own, about sizes and versions
 def test_a_cluster_that_loses_a_worker_gives_the_same_experiment(
-    cluster: Cluster, proposed: dict[str, Any], rippled: list[Recording], doubtful: Answer
-) -> None:
+    cluster, proposed, rippled, doubtful
+):
     import distributed
 
     with engine(scheduler=cluster.address) as executor:
@@ -227,7 +210,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_experiment(
     assert there == proposed
 
 
-def test_without_workers_the_work_is_done_here() -> None:
+def test_without_workers_the_work_is_done_here():
     with engine() as executor:
         assert executor is None
     with engine(2) as executor:
@@ -235,7 +218,7 @@ def test_without_workers_the_work_is_done_here() -> None:
         assert future.result() == 3
 
 
-def test_no_workers_and_no_scheduler_are_usage_errors() -> None:
+def test_no_workers_and_no_scheduler_are_usage_errors():
     pytest.importorskip("distributed")
     with pytest.raises(UsageError, match="1 or more"), engine(0):
         pass

@@ -37,9 +37,7 @@ def played(board: FirmwareBoard) -> float:
         return max(abs(session.spindle_angle_rad - 0.3) for _ in session.play(*STILL))
 
 
-def test_a_restarted_board_moves_only_after_the_command(
-    restarted: FirmwareBoard, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_restarted_board_moves_only_after_the_command(restarted, capsys):
     with pytest.raises(CommandRefusedError, match="Run: rig reference"):
         played(restarted)
     assert main(["reference", "--sim", "--yes", "--at", "0.3", "--json"]) == 0
@@ -47,9 +45,7 @@ def test_a_restarted_board_moves_only_after_the_command(
     assert played(restarted) < 0.02
 
 
-def test_without_a_confirmation_nothing_is_referenced(
-    restarted: FirmwareBoard, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_confirmation_nothing_is_referenced(restarted, monkeypatch):
     monkeypatch.setattr("sys.stdin", StringIO("n\n"))
     assert main(["reference", "--sim"]) == 130
     with pytest.raises(CommandRefusedError, match="Run: rig reference"):
@@ -64,16 +60,12 @@ def test_without_a_confirmation_nothing_is_referenced(
         (["-c", "grasper", "--at", "0"], "yaw_angle_rad, jaw_1_angle_rad, jaw_2_angle_rad"),
     ],
 )
-def test_a_place_that_does_not_fit_the_rig_is_refused(
-    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_place_that_does_not_fit_the_rig_is_refused(words, message, capsys):
     assert main(["reference", "--yes", *words]) == 2
     assert message in capsys.readouterr().err
 
 
-def test_the_index_stands_for_the_mark(
-    restarted: FirmwareBoard, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_index_stands_for_the_mark(restarted, capsys):
     words = ["reference", "--sim", "--index", "--at", "0.3"]
     assert main(words) != 0
     assert "through its index" in capsys.readouterr().err
@@ -88,9 +80,7 @@ def driven(*words: str) -> int:
 
 
 @pytest.mark.parametrize("stop", ["closed", "open"])
-def test_a_gentle_drive_finds_the_same_stop_from_two_places(
-    library: Path, monkeypatch: pytest.MonkeyPatch, stop: str
-) -> None:
+def test_a_gentle_drive_finds_the_same_stop_from_two_places(library, monkeypatch, stop):
     found_rad = []
     for start_count in (900, 300):
         bench = SimulatedBench(start_count=start_count)
@@ -104,15 +94,13 @@ def test_a_gentle_drive_finds_the_same_stop_from_two_places(
     assert abs(bench.state[JAW_ANGLE] - stands) < 0.05
 
 
-def test_a_shaft_that_does_not_turn_is_no_stop(
-    restarted: FirmwareBoard, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_shaft_that_does_not_turn_is_no_stop(restarted, capsys):
     assert driven("--hard-stop", "closed") == 0
     assert driven("--hard-stop", "closed") == 2
     assert "did not turn" in capsys.readouterr().err
 
 
-def test_a_board_without_reference_moves_only_gently(library: Path) -> None:
+def test_a_board_without_reference_moves_only_gently(library):
     board = FirmwareBoard(SimulatedBench(), BoardStart(simulated=False), library)
     host = RawHost(board, gains=np.array([20.0, 0.2, 4.0, 0.3, 600.0]))
     host.command(Kind.START)

@@ -1,7 +1,5 @@
 """A small share of `make soak` and `make fuzz`, and that the two go on where they stopped."""
 
-from pathlib import Path
-
 import pytest
 
 from benchmarks.reliability import fuzz
@@ -15,7 +13,7 @@ pytestmark = pytest.mark.integration
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
-def test_a_decoder_refuses_or_reads_right_whatever_comes(target: fuzz.Target) -> None:
+def test_a_decoder_refuses_or_reads_right_whatever_comes(target):
     tally = fuzz.Tally()
     fuzz.run_block(target, 10**6, tally, size=150)
     assert tally.failures == []
@@ -24,7 +22,7 @@ def test_a_decoder_refuses_or_reads_right_whatever_comes(target: fuzz.Target) ->
     assert all(good), "an unharmed input is not accepted"
 
 
-def test_faults_of_every_kind_are_detected_and_end_safe_in_time(library: Path) -> None:
+def test_faults_of_every_kind_are_detected_and_end_safe_in_time(library):
     kinds = len(SENSOR_FAULTS) + len(FAULTS) + 2 + len(Fault) * len(fakes())
     outcomes = list(inject(kinds, seed=5))
     assert len({outcome.kind for outcome in outcomes}) == kinds

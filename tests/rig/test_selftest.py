@@ -4,13 +4,10 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from numpy.typing import NDArray
 
 from drivers.teensy.profile import Profile
-from drivers.teensy.reference import Limits
 from drivers.transport.simulated import SimulatedTransport
 from rig.cli.main import main
 from rig.configuration.check import refuse_problems
@@ -23,7 +20,7 @@ pytestmark = pytest.mark.integration
 
 
 @pytest.mark.bench
-def test_the_bench_passes_its_acceptance_test() -> None:
+def test_the_bench_passes_its_acceptance_test():
     named = os.environ.get("RIG_BENCH")
     if named is None:
         pytest.skip("no bench: set RIG_BENCH to a configuration, as for `rig selftest -c`")
@@ -35,9 +32,7 @@ def test_the_bench_passes_its_acceptance_test() -> None:
 
 
 @pytest.mark.parametrize("names", [("usb520", "ati-can", "amt21"), ("qia128", "ati-net", "epos4")])
-def test_the_simulated_rig_passes_with_every_kind_of_device(
-    names: tuple[str, ...], library: Path
-) -> None:
+def test_the_simulated_rig_passes_with_every_kind_of_device(names, library):
     devices = {name.replace("-", "_"): {"driver": name, "url": "sim://"} for name in names}
     config = simulated(firmware=True).changed(devices=devices)
     checks = list(selftest(config))
@@ -50,19 +45,17 @@ def failing(config: Config, monkeypatch: pytest.MonkeyPatch, change: object) -> 
 
     def opened(config: Config, step_s: float | None = None) -> SimulatedTransport:
         link = transport(config)
-        return SimulatedTransport(Wrapped(link.board, lambda data: change(link.board, data)))  # type: ignore[operator]
+        return SimulatedTransport(Wrapped(link.board, lambda data: change(link.board, data)))
 
     monkeypatch.setattr("rig.bench.logger.open_logger", opened)
     monkeypatch.setattr("rig.bench.devices.open_logger", opened)
     return [check.name for check in selftest(config) if not check.passed]
 
 
-def test_a_board_whose_watchdog_sleeps_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_board_whose_watchdog_sleeps_fails(monkeypatch):
     encode = Profile.encode_arm
 
-    def patient(
-        profile: Profile, sequence: int, gains: NDArray[Any], limits: Limits, session: int
-    ) -> bytes:
+    def patient(profile, sequence, gains, limits, session):
         return encode(profile, sequence, gains, replace(limits, watchdog_us=1_000_000), session)
 
     monkeypatch.setattr(Profile, "encode_arm", patient)
@@ -70,18 +63,18 @@ def test_a_board_whose_watchdog_sleeps_fails(monkeypatch: pytest.MonkeyPatch) ->
     assert "the board goes to its safe state when the host is silent" in failed
 
 
-def test_a_silent_board_fails_everything(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_silent_board_fails_everything(monkeypatch):
     assert len(failing(simulated(), monkeypatch, lambda board, data: b"")) == 6
 
 
-def test_selftest_speaks_to_machines(capsys: pytest.CaptureFixture[str]) -> None:
+def test_selftest_speaks_to_machines(capsys):
     assert main(["selftest", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["passed"]
     assert {"name", "passed", "detail"} == set(told["checks"][0])
 
 
-def test_the_tests_for_a_person_are_named_and_are_those_of_the_page(capsys) -> None:
+def test_the_tests_for_a_person_are_named_and_are_those_of_the_page(capsys):
     assert main(["selftest", "--sim", "--bench", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     tests = bench_tests()

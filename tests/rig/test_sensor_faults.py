@@ -38,12 +38,12 @@ pytestmark = pytest.mark.integration
 BEYOND_RAD = math.radians(5.0)
 
 
-def test_a_sound_rig_trips_over_nothing(library: Path) -> None:
+def test_a_sound_rig_trips_over_nothing(library):
     assert ride(sound, library=library)[2] is Trip.NONE
 
 
 @pytest.mark.parametrize("name", list(FAULTS))
-def test_a_sensor_that_fails_ends_the_motion(library: Path, name: str) -> None:
+def test_a_sensor_that_fails_ends_the_motion(library, name):
     fault, codes = FAULTS[name]
     rig, samples, trip = ride(fault, library=library)
     tripped = (samples["status"] & STATUS_LIMIT_TRIPPED) != 0
@@ -56,15 +56,15 @@ def test_a_sensor_that_fails_ends_the_motion(library: Path, name: str) -> None:
 @pytest.mark.parametrize("fault_tick", [100, 300])
 @pytest.mark.parametrize("columns", [(SPINDLE,), (SPINDLE, JAW), (MOTOR, SPINDLE, JAW)])
 def test_a_dead_encoder_near_the_end_of_travel_lets_the_spindle_hardly_beyond(
-    library: Path, columns: tuple[int, ...], fault_tick: int
-) -> None:
+    library, columns, fault_tick
+):
     fault = frozen(*columns, since=fault_tick)
     rig, _, trip = ride(fault, start_rad=2.9, stop_rad=2.99, library=library)
     assert trip is not Trip.NONE
     assert np.abs(rig.angles).max() < 3.0 + BEYOND_RAD
 
 
-def test_two_encoders_that_lose_counts_alike_let_the_spindle_hardly_beyond(library: Path) -> None:
+def test_two_encoders_that_lose_counts_alike_let_the_spindle_hardly_beyond(library):
     for start_rad in (1.7, 2.0, 2.3):
         fault = losing(MOTOR, SPINDLE)
         rig, _, _ = ride(fault, 8000, start_rad=start_rad, stop_rad=2.99, library=library)
@@ -83,9 +83,7 @@ def counts_of(seed: int, plan: RunPlan) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", [13, 17, 24, 26, 36])
-def test_a_rig_that_is_sound_but_not_as_declared_has_no_dead_encoder(
-    library: Path, seed: int
-) -> None:
+def test_a_rig_that_is_sound_but_not_as_declared_has_no_dead_encoder(library, seed):
     """A winding that warms, viscous gears and a slow torque sensor."""
     config = load_config(Path("reference"))
     machine = machine_of(config)
@@ -100,8 +98,8 @@ def test_a_rig_that_is_sound_but_not_as_declared_has_no_dead_encoder(
 @pytest.mark.parametrize("speed_rad_s", [0.05, 0.6])
 @pytest.mark.parametrize("sense", [-1, 1])
 def test_a_rig_at_rest_whose_encoders_are_dead_trips_before_it_breaks_away(
-    library: Path, speed_rad_s: float, sense: int
-) -> None:
+    library, speed_rad_s, sense
+):
     """The gearhead is elastic: what the sensor finds has turned the motor."""
     config = load_config(Path("reference"))
     machine = machine_of(config)
@@ -121,9 +119,7 @@ def test_a_rig_at_rest_whose_encoders_are_dead_trips_before_it_breaks_away(
 
 # of 320 drawn motions: the farthest beyond before the board asked its encoders, and a coasting one
 @pytest.mark.parametrize(("seed", "slow"), [(9, True), (65, True), (102, True), (1089, False)])
-def test_encoders_that_all_die_on_the_way_let_the_spindle_hardly_beyond(
-    library: Path, seed: int, slow: bool
-) -> None:
+def test_encoders_that_all_die_on_the_way_let_the_spindle_hardly_beyond(library, seed, slow):
     dead = dead_encoders.ride(seed, slow, library=library)
     assert dead.trip is Trip.ENCODER_FROZEN
     assert dead.beyond_rad < BEYOND_RAD
@@ -140,9 +136,7 @@ class SmallGrasper:
         self._noise = np.random.default_rng(0)
         self._phases, self._count = 0, 0
 
-    def advance_with_board(
-        self, ticks: int, tick_address: int, board_address: int, tick_us: int
-    ) -> None:
+    def advance_with_board(self, ticks, tick_address, board_address, tick_us):
         tick = TICK_FUNCTION(tick_address)
         outputs = (ctypes.c_int32 * 3)()
         for k in range(ticks):
@@ -169,7 +163,7 @@ class SmallGrasper:
 
 
 @pytest.mark.parametrize("shares_an_input", [False, True])
-def test_a_grasper_with_a_wrong_decoder_input_stops(library: Path, shares_an_input: bool) -> None:
+def test_a_grasper_with_a_wrong_decoder_input_stops(library, shares_an_input):
     config = load_config(Path("grasper"))
     machine = machine_of(config)
     profile = machine.profile

@@ -29,7 +29,7 @@ LOAD = np.full(TICKS, 400, np.int32)
 
 def run(seed: int, cuts: tuple[int, ...] = (), **options: object) -> tuple[np.ndarray, np.ndarray]:
     """Counts and final state of one run, advanced in pieces."""
-    bench = SimulatedBench(seed=seed, **options)  # type: ignore[arg-type]
+    bench = SimulatedBench(seed=seed, **options)
     drive = Drive.armed(GAINS)
     edges = [0, *sorted(cuts), TICKS]
     parts = [
@@ -38,14 +38,14 @@ def run(seed: int, cuts: tuple[int, ...] = (), **options: object) -> tuple[np.nd
     return np.concatenate(parts), bench.state
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_does_not() -> None:
+def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
     assert run(5)[0].tobytes() == run(5)[0].tobytes()
     assert run(5)[0].tobytes() != run(6)[0].tobytes()
 
 
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.integers(0, TICKS), max_size=8))
-def test_cutting_the_run_changes_nothing(cuts: list[int]) -> None:
+def test_cutting_the_run_changes_nothing(cuts):
     effects = [HiddenEffect(name) for name in NAMES]  # every state there is
     whole, whole_state = run(1, effects=effects)
     pieces, pieces_state = run(1, tuple(cuts), effects=effects)
@@ -53,7 +53,7 @@ def test_cutting_the_run_changes_nothing(cuts: list[int]) -> None:
     assert pieces_state.tobytes() == whole_state.tobytes()
 
 
-def test_sensors_are_sampled_before_the_command_acts() -> None:
+def test_sensors_are_sampled_before_the_command_acts():
     bench = SimulatedBench(seed=0)
     away = np.full(2, 0, np.int32)
     rows = bench.advance(2, away, np.zeros(2, np.int32), Drive.armed(GAINS))
@@ -63,7 +63,7 @@ def test_sensors_are_sampled_before_the_command_acts() -> None:
     assert rows[1, 5] > rows[0, 5] + 100  # the current has answered one tick later
 
 
-def test_shapes_that_do_not_fit_are_refused() -> None:
+def test_shapes_that_do_not_fit_are_refused():
     with pytest.raises(BenchInputError, match="target has shape"):
         SimulatedBench().advance(5, TARGET, LOAD[:5], Drive.idle())
     with pytest.raises(BenchInputError, match="address 0x0"):
@@ -78,7 +78,7 @@ def test_shapes_that_do_not_fit_are_refused() -> None:
         types.CPointer(types.int32),
     )
 )
-def controlling_board(board, tick_us, inputs, outputs):  # type: ignore[no-untyped-def]
+def controlling_board(board, tick_us, inputs, outputs):
     """A board that plays a cosine of its own clock through the shared controller."""
     memory = numba.carray(board, 9)
     counts = numba.carray(inputs, 7)
@@ -88,7 +88,7 @@ def controlling_board(board, tick_us, inputs, outputs):  # type: ignore[no-untyp
     answer[1] = 400
 
 
-def test_a_board_called_by_pointer_closes_the_same_loop() -> None:
+def test_a_board_called_by_pointer_closes_the_same_loop():
     _, expected = run(2)
     bench = SimulatedBench(seed=2)
     memory = np.concatenate([np.zeros(4), GAINS])
@@ -139,13 +139,13 @@ def energies_after_a_pluck(parameters: PlantParameters, ticks: int) -> NDArray[n
     return np.array(energies)
 
 
-def test_energy_is_kept_when_nothing_dissipates() -> None:
+def test_energy_is_kept_when_nothing_dissipates():
     energies = energies_after_a_pluck(FREE, 2000)
     assert energies[0] == pytest.approx(0.5 * 0.751 * 0.1**2)
     np.testing.assert_allclose(energies, energies[0], rtol=0.03)
 
 
-def test_the_proximal_sensor_sees_the_drive_unit_from_outside() -> None:
+def test_the_proximal_sensor_sees_the_drive_unit_from_outside():
     """With the spindle clamped a swinging rotor gives T / N of the gear's torque T back."""
     clamped = replace(FREE, spindle_friction_n_m=10.0)
     bench = SimulatedBench(clamped, start_count=683)
@@ -162,13 +162,13 @@ def test_the_proximal_sensor_sees_the_drive_unit_from_outside() -> None:
     assert np.std(seen) / np.std(gear) == pytest.approx(1.0 - 1.0 / 35.0, abs=0.004)
 
 
-def test_energy_only_falls_with_the_motor_off() -> None:
+def test_energy_only_falls_with_the_motor_off():
     energies = energies_after_a_pluck(PlantParameters(), 500)
     assert np.all(np.diff(energies) <= 1e-12)
     assert energies[-1] < 0.2 * energies[0]
 
 
-def test_closing_torque_balances_load_ratio_and_friction() -> None:
+def test_closing_torque_balances_load_ratio_and_friction():
     bench = SimulatedBench(start_count=1000)
     p = bench.parameters
     start_rad, speed_rad_s, load_a = -1000 * 2 * np.pi / 8192, 0.2, 0.5
@@ -188,7 +188,7 @@ def test_closing_torque_balances_load_ratio_and_friction() -> None:
     assert state[places.CURRENT] * p.torque_constant_n_m_a == pytest.approx(at_motor, rel=0.04)
 
 
-def test_friction_holds_without_creep_or_chatter() -> None:
+def test_friction_holds_without_creep_or_chatter():
     bench = SimulatedBench(start_count=1000)
     rest_rad = -1000 * 2 * np.pi / 8192
     closing = trajectory.minimum_jerk(rest_rad, rest_rad + 0.4, 1.0)
@@ -207,7 +207,7 @@ def test_friction_holds_without_creep_or_chatter() -> None:
 
 @pytest.mark.parametrize("load_a", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("frequency_hz", [0.1, 0.5])
-def test_the_controller_follows_the_reference_sinusoid(frequency_hz: float, load_a: float) -> None:
+def test_the_controller_follows_the_reference_sinusoid(frequency_hz, load_a):
     target = trajectory.sine(10.0, -np.pi / 3, np.pi / 6, frequency_hz)
     columns = SimulatedBench().play(target, np.full(target.size, load_a))
     error_rad = (columns["target_angle_rad"] - columns["spindle_angle_rad"])[1000:]
@@ -217,7 +217,7 @@ def test_the_controller_follows_the_reference_sinusoid(frequency_hz: float, load
     assert np.std(np.diff(columns["motor_command_ratio"][1000:])) < 20e-4
 
 
-def test_the_drive_limits_its_current() -> None:
+def test_the_drive_limits_its_current():
     bench = SimulatedBench(start_count=0)
     far = np.full(200, -20000, np.int32)
     gains = np.array([20.0, 0.0, 0.0, 1.0, 10000.0])
@@ -225,7 +225,7 @@ def test_the_drive_limits_its_current() -> None:
     assert bench.state[places.CURRENT] == pytest.approx(0.56)
 
 
-def test_vary_is_seeded_and_keeps_scales() -> None:
+def test_vary_is_seeded_and_keeps_scales():
     base = PlantParameters()
     assert vary(base, 3) == vary(base, 3)
     assert vary(base, 3) != vary(base, 4)
@@ -241,7 +241,7 @@ def test_vary_is_seeded_and_keeps_scales() -> None:
     assert vary(SensorParameters(), 3).torque_n_m_per_count == 0.000039811
 
 
-def test_a_finer_step_gives_the_same_motion() -> None:
+def test_a_finer_step_gives_the_same_motion():
     target = trajectory.sine(4.0, -np.pi / 3, np.pi / 6, 0.5)
     load = np.full(target.size, 0.5)
     runs = [
@@ -277,7 +277,7 @@ def closing(parameters: SensorParameters) -> np.ndarray:
     return bench.advance(1000, target, np.full(1000, 500, np.int32), Drive.armed(GAINS))
 
 
-def test_channels_are_closing_positive_and_agree() -> None:
+def test_channels_are_closing_positive_and_agree():
     target = trajectory.sine(4.0, -np.pi / 3, np.pi / 6, 0.25)
     columns = SimulatedBench(sensors_parameters=QUIET).play(target, np.full(4000, 0.5))
     close = slice(600, 1500)
@@ -294,7 +294,7 @@ def test_channels_are_closing_positive_and_agree() -> None:
     assert np.corrcoef(measured, commanded)[0, 1] > 0.999
 
 
-def test_noise_has_the_stated_size_and_channels_are_unrelated() -> None:
+def test_noise_has_the_stated_size_and_channels_are_unrelated():
     rows = rest(SensorParameters(torque_walk_n_m_s=0.0), 50_000).astype(float)
     scale = 0.000039811
     assert np.std(rows[:, sensors.PROXIMAL]) * scale == pytest.approx(0.29e-3, rel=0.05)
@@ -308,7 +308,7 @@ def test_noise_has_the_stated_size_and_channels_are_unrelated() -> None:
     assert np.abs(follows).max() < 0.03
 
 
-def test_zero_offset_and_drift_show_at_rest() -> None:
+def test_zero_offset_and_drift_show_at_rest():
     drifting = SensorParameters(
         proximal_offset_n_m=0.01,
         proximal_ramp_n_m_s=1e-3,
@@ -320,7 +320,7 @@ def test_zero_offset_and_drift_show_at_rest() -> None:
     assert torque[-200:].mean() == pytest.approx(0.0199, abs=1e-4)
 
 
-def test_converters_saturate_at_their_limits() -> None:
+def test_converters_saturate_at_their_limits():
     narrow = SensorParameters(torque_limit_count=400.0, current_limit_count=50.0)
     rows = closing(narrow)
     assert rows[:, sensors.PROXIMAL].max() == 400

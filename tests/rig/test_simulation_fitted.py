@@ -50,7 +50,7 @@ def played(recorded: list[Recording], fitted: list[Model]) -> list[Recording]:
     return [rig.play(plan, 5_000_015 + k) for k, plan in enumerate(PLANS)]
 
 
-def test_fitted_balances_give_back_the_plant_they_came_from(fitted: list[Model]) -> None:
+def test_fitted_balances_give_back_the_plant_they_came_from(fitted):
     found = plant_of(fitted)
     for name in (
         "torque_constant_n_m_a",
@@ -63,7 +63,7 @@ def test_fitted_balances_give_back_the_plant_they_came_from(fitted: list[Model])
         assert getattr(found, name) == pytest.approx(getattr(PLANT, name), rel=0.05), name
 
 
-def test_the_declared_balances_leave_what_the_sensors_leave(fitted: list[Model]) -> None:
+def test_the_declared_balances_leave_what_the_sensors_leave(fitted):
     left = {model.balance: model.evidence.rmse for model in fitted if model.evidence}
     assert left.keys() == NOISE.keys()
     for balance, rmse in left.items():
@@ -71,9 +71,7 @@ def test_the_declared_balances_leave_what_the_sensors_leave(fitted: list[Model])
 
 
 @pytest.mark.parametrize("channel", ["proximal_torque_n_m", "distal_torque_n_m", "motor_current_a"])
-def test_the_fitted_rigs_noise_floor_is_the_recordings(
-    recorded: list[Recording], played: list[Recording], channel: str
-) -> None:
+def test_the_fitted_rigs_noise_floor_is_the_recordings(recorded, played, channel):
     ratios = [
         noise_std(made[channel], 1000.0) / noise_std(measured[channel], 1000.0)
         for measured, made in zip(recorded, played, strict=True)
@@ -82,25 +80,17 @@ def test_the_fitted_rigs_noise_floor_is_the_recordings(
 
 
 @pytest.mark.parametrize("place", range(4), ids=["motor", "gearbox", "cable", "stretch"])
-def test_the_fitted_rigs_residual_has_the_recordings_size(
-    fitted: list[Model], played: list[Recording], place: int
-) -> None:
+def test_the_fitted_rigs_residual_has_the_recordings_size(fitted, played, place):
     again = fit(fitted[place], Campaign.of(played), bootstrap=0)
     before = fitted[place].evidence
-    assert again.evidence is not None
-    assert before is not None
     assert again.evidence.rmse == pytest.approx(before.rmse, rel=0.25)
 
 
-def test_a_diagnosis_of_the_fitted_rig_finds_nothing_in_the_motor(
-    fitted: list[Model], played: list[Recording]
-) -> None:
+def test_a_diagnosis_of_the_fitted_rig_finds_nothing_in_the_motor(fitted, played):
     assert diagnose(played, fitted[:1], split(played)).findings == ()
 
 
-def test_runs_without_trajectory_or_channels_and_an_unfitted_model_are_refused(
-    recorded: list[Recording], fitted: list[Model]
-) -> None:
+def test_runs_without_trajectory_or_channels_and_an_unfitted_model_are_refused(recorded, fitted):
     run = recorded[0]
     with pytest.raises(DataError, match="without its trajectory"):
         fitted_rig(fitted, [run.with_columns(target_angle_rad=np.zeros(len(run)))])

@@ -15,7 +15,6 @@ from rig.simulation.hidden import (
     NAMES,
     WEAKEST,
     HiddenEffect,
-    Kind,
     UnknownHiddenEffectError,
     draw,
     table,
@@ -28,9 +27,7 @@ OPEN_RAD = -1366 * 2 * np.pi / 8192
 Columns = dict[str, NDArray[np.float64]]
 
 
-def sweep(
-    effects: Sequence[HiddenEffect], speed_rad_s: float = 0.5, load_a: float = 0.5
-) -> Columns:
+def sweep(effects, speed_rad_s=0.5, load_a=0.5):
     """Close by 1 rad at constant speed, rest 0.2 s, open again, while the wrist swings."""
     close = OPEN_RAD + speed_rad_s * trajectory.times(1.0 / speed_rad_s)
     target = np.concatenate([close, np.full(200, close[-1]), close[::-1]])
@@ -61,13 +58,13 @@ def mean(columns: Columns, name: str, low_rad: float = -0.7, high_rad: float = -
     return float(columns[name][closing(columns, low_rad, high_rad)].mean())
 
 
-def test_strength_zero_is_the_plain_plant_to_the_bit(plain: Columns) -> None:
+def test_strength_zero_is_the_plain_plant_to_the_bit(plain):
     off = sweep([HiddenEffect(name, 0.0) for name in NAMES])
     for name, values in plain.items():
         assert off[name].tobytes() == values.tobytes()
 
 
-def test_motor_ripple_shows_in_current_at_its_order(plain: Columns) -> None:
+def test_motor_ripple_shows_in_current_at_its_order(plain):
     loud = sweep([HiddenEffect("motor_ripple", 2.0, (3.0, 0.5))], speed_rad_s=0.25)
     quiet = sweep([], speed_rad_s=0.25)
     amplitudes = []
@@ -80,7 +77,7 @@ def test_motor_ripple_shows_in_current_at_its_order(plain: Columns) -> None:
     assert amplitudes[1] < 0.1 * amplitudes[0]
 
 
-def test_backlash_adds_its_gap_to_the_twist_when_torque_reverses() -> None:
+def test_backlash_adds_its_gap_to_the_twist_when_torque_reverses():
     gap = 8e-3
 
     def jump(effects: Sequence[HiddenEffect]) -> float:
@@ -93,7 +90,7 @@ def test_backlash_adds_its_gap_to_the_twist_when_torque_reverses() -> None:
     )
 
 
-def test_the_bent_current_sensor_changes_only_what_is_measured(plain: Columns) -> None:
+def test_the_bent_current_sensor_changes_only_what_is_measured(plain):
     bent = sweep([HiddenEffect("current_sensor_bend", 1.0, (0.1,))])
     for name, values in plain.items():
         if name != "motor_current_a":
@@ -102,9 +99,7 @@ def test_the_bent_current_sensor_changes_only_what_is_measured(plain: Columns) -
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
-def test_every_effect_is_visible_and_the_rig_stays_under_control(
-    kind: Kind, plain: Columns
-) -> None:
+def test_every_effect_is_visible_and_the_rig_stays_under_control(kind, plain):
     shape = (1.0,) if kind.name == "friction_step" else ()
     columns = sweep([HiddenEffect(kind.name, kind.strongest, shape)])
     error = columns["target_angle_rad"] - columns["spindle_angle_rad"]
@@ -112,7 +107,7 @@ def test_every_effect_is_visible_and_the_rig_stays_under_control(
     assert any(columns[name].tobytes() != values.tobytes() for name, values in plain.items())
 
 
-def test_the_late_jaw_encoder_answers_its_delay_later(plain: Columns) -> None:
+def test_the_late_jaw_encoder_answers_its_delay_later(plain):
     late = sweep([HiddenEffect("jaw_delay", 1.0, (20.0,))])
     inside = closing(plain)
     behind = plain["jaw_angle_rad"][inside] - late["jaw_angle_rad"][inside]
@@ -120,7 +115,7 @@ def test_the_late_jaw_encoder_answers_its_delay_later(plain: Columns) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_effect_drives_the_rig_by_itself(name: str) -> None:
+def test_no_effect_drives_the_rig_by_itself(name):
     bench = SimulatedBench(effects=[HiddenEffect(name, 2.0)], start_count=683)
     idle = np.zeros(2000, np.int32)
     bench._state[places.JAW_ANGLE] -= 0.1
@@ -129,7 +124,7 @@ def test_no_effect_drives_the_rig_by_itself(name: str) -> None:
     np.testing.assert_allclose(speeds, 0.0, atol=1e-3)
 
 
-def test_draw_is_seeded_covers_every_kind_and_stays_in_range() -> None:
+def test_draw_is_seeded_covers_every_kind_and_stays_in_range():
     drawn = [draw(seed) for seed in range(300)]
     assert drawn == [draw(seed) for seed in range(300)]
     assert {effect.name for effect in drawn} == {kind.name for kind in KINDS if kind.alone}
@@ -152,6 +147,6 @@ def test_draw_is_seeded_covers_every_kind_and_stays_in_range() -> None:
         ([HiddenEffect("cable_creep", 1.0, (1.0, 2.0))], "shaped by 2 numbers"),
     ],
 )
-def test_a_wrong_effect_is_refused(effects: list[HiddenEffect], message: str) -> None:
+def test_a_wrong_effect_is_refused(effects, message):
     with pytest.raises(UnknownHiddenEffectError, match=message):
         table(effects)

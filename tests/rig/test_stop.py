@@ -53,7 +53,6 @@ def board(library: Path, tmp_path: Path) -> Iterator[Path]:
     if not PROGRAM.is_file():
         pytest.skip("the firmware process is built on Linux only")
     with subprocess.Popen([str(PROGRAM)], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         port = process.stdout.readline().strip()
         path = tmp_path / "held.toml"
         named = (
@@ -72,7 +71,6 @@ def started(script: str, config: Path) -> subprocess.Popen[str]:
         stderr=subprocess.PIPE,
         text=True,
     )
-    assert process.stdout is not None
     assert process.stdout.readline()
     return process
 
@@ -92,8 +90,8 @@ def is_armed(config: Path) -> bool:
 
 @pytest.mark.parametrize("hangs", [False, True])
 def test_a_session_that_has_the_rig_is_asked_to_end_and_killed_if_it_hangs(
-    board: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, hangs: bool
-) -> None:
+    board, capsys, monkeypatch, hangs
+):
     with started(SESSION, board) as session:
         if hangs:
             monkeypatch.setattr("rig.bench.holding.ENDS_S", 0.2)
@@ -106,9 +104,7 @@ def test_a_session_that_has_the_rig_is_asked_to_end_and_killed_if_it_hangs(
     assert not is_armed(board)
 
 
-def test_a_program_of_another_maker_is_named_and_left_alone(
-    board: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_program_of_another_maker_is_named_and_left_alone(board, capsys):
     with started(FOREIGN, board) as other:
         assert main(["stop", "-c", str(board)]) == ExitCode.SAFETY
         told = capsys.readouterr().err
@@ -120,7 +116,7 @@ def test_a_program_of_another_maker_is_named_and_left_alone(
     assert (code, result["state"], result["holder"]) == (0, "disarmed", None)
 
 
-def test_a_rig_is_held_once_under_any_of_its_names(tmp_path: Path) -> None:
+def test_a_rig_is_held_once_under_any_of_its_names(tmp_path):
     port = tmp_path / "ttyACM0"
     port.touch()
     link = tmp_path / "by-id"

@@ -32,7 +32,7 @@ def run(state: Path, seeds: int, schema: str = "squares/1") -> tuple[list[int], 
     return [each.value for each in found], len(made)
 
 
-def test_a_stopped_study_goes_on_and_a_damaged_outcome_is_made_again(tmp_path: Path) -> None:
+def test_a_stopped_study_goes_on_and_a_damaged_outcome_is_made_again(tmp_path):
     assert run(tmp_path, 2) == ([0, 1], 2)
     assert run(tmp_path, 4) == ([0, 1, 4, 9], 2)
     assert run(tmp_path, 4) == ([0, 1, 4, 9], 0)

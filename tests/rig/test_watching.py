@@ -44,7 +44,7 @@ def model(tmp_path_factory) -> Path:
     return path
 
 
-def test_an_effect_that_begins_at_a_run_is_dated_to_it(model, tmp_path) -> None:
+def test_an_effect_that_begins_at_a_run_is_dated_to_it(model, tmp_path):
     watch = watch_runs(model)
     said = [watch.after(path) for path in record(tmp_path / "before", seed=2)]
     assert all(model["fits"] for model in watch.to_json())
@@ -58,7 +58,7 @@ def test_an_effect_that_begins_at_a_run_is_dated_to_it(model, tmp_path) -> None:
     assert told["since"].startswith("000")
 
 
-def test_record_reports_the_result_of_the_monitor(model, tmp_path, capsys) -> None:
+def test_record_reports_the_result_of_the_monitor(model, tmp_path, capsys):
     out = tmp_path / "logs"
     protocol = tmp_path / "one.toml"
     table = 'kind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2, 0.3]\nduration_s = 2.0\n'
@@ -71,9 +71,7 @@ def test_record_reports_the_result_of_the_monitor(model, tmp_path, capsys) -> No
     assert len(watched["runs"]) == 2
 
 
-def test_a_file_of_several_balances_is_watched_whole_and_its_first_runs_live(
-    model, tmp_path
-) -> None:
+def test_a_file_of_several_balances_is_watched_whole_and_its_first_runs_live(model, tmp_path):
     logs = open_campaign(model.parent / "logs")
     gearbox = fit(model_file.read(Path("gearbox")), logs, bootstrap=0)
     path = tmp_path / "both.model.toml"
@@ -84,7 +82,7 @@ def test_a_file_of_several_balances_is_watched_whole_and_its_first_runs_live(
     assert [m.balance for m in declared_models(path, "gearbox")] == ["gearbox"]
 
 
-def test_a_stream_reports_since_when_its_model_no_longer_fits() -> None:
+def test_a_stream_reports_since_when_its_model_no_longer_fits():
     campaign = synthetic.campaign()
     fitted = fit(model_file.read(Path("motor")), campaign, bootstrap=0)
 
@@ -103,7 +101,7 @@ def test_a_stream_reports_since_when_its_model_no_longer_fits() -> None:
     assert states[-1][1].detail.endswith(("since 25 s", "since 30 s"))
 
 
-def test_a_stream_without_the_models_channels_is_not_watched() -> None:
+def test_a_stream_without_the_models_channels_is_not_watched():
     fitted = fit(model_file.read(Path("motor")), synthetic.campaign(), bootstrap=0)
     time_s = np.arange(7000) * 1e-3
     bare = Recording("bare", time_s, {"distal_torque_n_m": np.zeros(7000)})

@@ -42,7 +42,7 @@ def run(place: Path, folder: Path, *words: str) -> str:
     return done.stdout
 
 
-def test_the_library_is_the_installed_one(installed: Path, tmp_path: Path) -> None:
+def test_the_library_is_the_installed_one(installed, tmp_path):
     code = "import rig, rig.library, estimation; print(rig.__file__, estimation.__file__)"
     said = run(installed, tmp_path, "python", "-c", code)
     assert said.count(str(installed)) == 2
@@ -51,6 +51,6 @@ def test_the_library_is_the_installed_one(installed: Path, tmp_path: Path) -> No
     assert run(installed, tmp_path, "python", "-c", code).split() == ["1", "1"]
 
 
-def test_the_demo_runs_from_the_wheel(installed: Path, tmp_path: Path) -> None:
+def test_the_demo_runs_from_the_wheel(installed, tmp_path):
     run(installed, tmp_path, "rig", "demo", "--seed", "1", "--out", "demo")
     assert [*(tmp_path / "demo").rglob("diagnosis.html")]
