@@ -18,9 +18,9 @@ from drivers.transport import open_transport
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.canopen.process import CanopenProcess
-from rig.configuration.config import SHIPPED, load_config
+from rig.configuration.config import load_config
 from rig.errors import SafetyTripError
-from rig.simulation.firmware_process import PROGRAM, FirmwareProcess
+from rig.simulation.firmware_process import FirmwareProcess
 
 pytestmark = pytest.mark.integration
 
@@ -40,51 +40,35 @@ with Session(config, open_transport(sys.argv[1])) as session:
 """
 
 
-@pytest.fixture
-def program(library: Path) -> Path:
-    if not PROGRAM.is_file():
-        pytest.skip("the firmware process is built on Linux only")
-    return PROGRAM
-
-
 @pytest.mark.parametrize("safe_state", ["release", "hold"])
-def test_a_host_that_is_killed_leaves_a_board_that_makes_itself_safe(program, safe_state):
-    with subprocess.Popen([str(program)], stdout=subprocess.PIPE, text=True) as board:
-        path = board.stdout.readline().strip()
-        with subprocess.Popen(
-            [sys.executable, "-c", HOST, path, safe_state], stdout=subprocess.PIPE, text=True
-        ) as host:
-            assert host.stdout.readline().strip() == "playing"
-            host.kill()
-        with TeensyLogger(open_transport(path)) as logger:
-            logger.identify()
-            logger.start()
-            while True:  # until the watchdog's patience is over
-                status = int(logger.read(1.0).samples["status"][-1])
-                if not status & STATUS_ARMED:
-                    break
-            report = logger.trip()
-        board.terminate()
+def test_a_host_that_is_killed_leaves_a_board_that_makes_itself_safe(port, safe_state):
+    words = [sys.executable, "-c", HOST, port, safe_state]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as host:
+        assert host.stdout.readline().strip() == "playing"
+        host.kill()
+    with TeensyLogger(open_transport(port)) as logger:
+        logger.identify()
+        logger.start()
+        while True:  # until the watchdog's patience is over
+            status = int(logger.read(1.0).samples["status"][-1])
+            if not status & STATUS_ARMED:
+                break
+        report = logger.trip()
     assert report.code is Trip.HOST_SILENT
     assert 50_000 < report.late_us <= 52_000
 
 
-def test_a_second_program_on_the_port_is_refused_and_the_first_goes_on(program, tmp_path):
+def test_a_second_program_on_the_port_is_refused_and_the_first_goes_on(port, board, tmp_path):
     rig = [sys.executable, "-m", "rig"]
-    with subprocess.Popen([str(program)], stdout=subprocess.PIPE, text=True) as board:
-        path = board.stdout.readline().strip()
-        config = tmp_path / "rig.toml"
-        config.write_text((SHIPPED / "pty.toml").read_text().replace("sim://pty", path))
-        first = [*rig, "live", "-c", str(config), "--json"]
-        with subprocess.Popen(first, stdout=subprocess.PIPE, text=True) as live:
-            live.stdout.readline()
-            second = [*rig, "record", "-c", str(config), "-p", "quick", "-o", str(tmp_path / "a")]
-            refused = subprocess.run(second, capture_output=True, text=True, check=False)
-            later = [json.loads(live.stdout.readline()) for _ in range(5)]
-            live.send_signal(signal.SIGINT)
-        board.terminate()
+    first = [*rig, "live", "-c", str(board), "--json"]
+    with subprocess.Popen(first, stdout=subprocess.PIPE, text=True) as live:
+        live.stdout.readline()
+        second = [*rig, "record", "-c", str(board), "-p", "quick", "-o", str(tmp_path / "a")]
+        refused = subprocess.run(second, capture_output=True, text=True, check=False)
+        later = [json.loads(live.stdout.readline()) for _ in range(5)]
+        live.send_signal(signal.SIGINT)
     assert refused.returncode == 3
-    assert f"{path} is in use" in refused.stderr
+    assert f"{port} is in use" in refused.stderr
     assert f"PID {live.pid}" in refused.stderr
     assert [one["lost"] for one in later] == [0] * 5
 

@@ -1,7 +1,5 @@
 """`rig firmware flash`: the one board that is plugged in, by its serial number, and not armed."""
 
-import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,21 +15,10 @@ from rig.bench.flashing import board_to_flash
 from rig.configuration.config import load_config
 from rig.errors import SafetyTripError, UsageError
 from rig.machines.choose import machine_of
-from rig.simulation.firmware_process import PROGRAM
 
 pytestmark = pytest.mark.integration
 
 TEENSY = {"vid": 0x16C0, "pid": 0x0483}
-
-
-@pytest.fixture
-def board(library: Path) -> Iterator[str]:
-    """The port of a board: the firmware's process."""
-    if not PROGRAM.is_file():
-        pytest.skip("the firmware process is built on Linux only")
-    with subprocess.Popen([str(PROGRAM)], stdout=subprocess.PIPE, text=True) as process:
-        yield process.stdout.readline().strip()
-        process.kill()
 
 
 def plug_in(monkeypatch: pytest.MonkeyPatch, **boards: str) -> None:
@@ -41,10 +28,19 @@ def plug_in(monkeypatch: pytest.MonkeyPatch, **boards: str) -> None:
     monkeypatch.setattr(list_ports, "comports", lambda: [other, *ports])
 
 
-def test_the_one_board_is_named_with_its_state(board, monkeypatch):
-    plug_in(monkeypatch, A1=board)
+@pytest.fixture
+def run(monkeypatch):
+    """The commands of PlatformIO that would have been run."""
+    commands: list[list[str]] = []
+    monkeypatch.setattr(firmware, "_require_platformio", lambda _: None)
+    monkeypatch.setattr(firmware, "_run", commands.append)
+    return commands
+
+
+def test_the_one_board_is_named_with_its_state(port, monkeypatch):
+    plug_in(monkeypatch, A1=port)
     found = board_to_flash("", REFERENCE)
-    assert (found.serial, found.port, found.state) == ("A1", board, "it is disarmed")
+    assert (found.serial, found.port, found.state) == ("A1", port, "it is disarmed")
     assert board_to_flash("A1", REFERENCE) == found
     with pytest.raises(UsageError, match="A1, not B2"):
         board_to_flash("B2", REFERENCE)
@@ -59,37 +55,31 @@ def test_several_boards_and_none_are_refused(monkeypatch):
         board_to_flash("", REFERENCE)
 
 
-def test_a_board_that_another_program_has_is_refused(board, monkeypatch):
-    plug_in(monkeypatch, A1=board)
-    link = open_transport(board)
+def test_a_board_that_another_program_has_is_refused(port, monkeypatch):
+    plug_in(monkeypatch, A1=port)
+    link = open_transport(port)
     with pytest.raises(PortBusyError, match="may be armed"):
         board_to_flash("", REFERENCE)
     link.close()
 
 
-def test_an_armed_board_is_refused_and_nothing_is_written(board, monkeypatch):
-    plug_in(monkeypatch, A1=board)
+def test_an_armed_board_is_refused_and_nothing_is_written(port, monkeypatch, run):
+    plug_in(monkeypatch, A1=port)
     settings = load_config(Path("pty")).changed(
         safety={"watchdog_s": 1.0, "safe_state": "hold"}  # a slow computer finds it holding
     )
     machine = machine_of(settings)
     limits = machine.untroubled(machine.board_limits(settings, settings.calibration_set()))
-    logger = TeensyLogger(open_transport(board), machine.profile)
+    logger = TeensyLogger(open_transport(port), machine.profile)
     logger.arm(machine.gains(settings), limits)
     logger._link.transport.close()
-    run: list[list[str]] = []
-    monkeypatch.setattr(firmware, "_require_platformio", lambda _: None)
-    monkeypatch.setattr(firmware, "_run", run.append)
     with pytest.raises(SafetyTripError, match="armed"):
         firmware.flash("teensy41")
     assert run == []
 
 
-def test_a_disarmed_board_is_flashed(board, monkeypatch):
-    plug_in(monkeypatch, A1=board)
-    run: list[list[str]] = []
-    monkeypatch.setattr(firmware, "_require_platformio", lambda _: None)
-    monkeypatch.setattr(firmware, "_run", run.append)
+def test_a_disarmed_board_is_flashed(port, monkeypatch, run):
+    plug_in(monkeypatch, A1=port)
     assert firmware.flash("teensy41", "A1").serial == "A1"
     (command,) = run
     assert command[-2:] == ["--target", "upload"]

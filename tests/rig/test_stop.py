@@ -1,11 +1,9 @@
 """`rig stop` while another program has the rig: it must let go, and the board is read back."""
 
-import json
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,10 +12,8 @@ from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import STATUS_ARMED
 from drivers.transport import open_transport
 from rig.bench.holding import holder, holding
-from rig.cli.main import main
 from rig.configuration.config import load_config
 from rig.errors import ExitCode
-from rig.simulation.firmware_process import PROGRAM
 
 pytestmark = pytest.mark.integration
 
@@ -47,38 +43,11 @@ sys.stdin.read()
 """
 
 
-@pytest.fixture
-def board(library: Path, tmp_path: Path) -> Iterator[Path]:
-    """The configuration of a rig whose board is the firmware's process."""
-    if not PROGRAM.is_file():
-        pytest.skip("the firmware process is built on Linux only")
-    with subprocess.Popen([str(PROGRAM)], stdout=subprocess.PIPE, text=True) as process:
-        port = process.stdout.readline().strip()
-        path = tmp_path / "held.toml"
-        named = (
-            Path(__file__).parents[2] / "rig" / "configuration" / "shipped" / "pty.toml"
-        ).read_text()
-        path.write_text(named.replace("sim://pty", port))
-        yield path
-        process.kill()
-
-
 def started(script: str, config: Path) -> subprocess.Popen[str]:
-    process = subprocess.Popen(
-        [sys.executable, "-c", script, str(config)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    process = subprocess.Popen([sys.executable, "-c", script, str(config)], text=True, **pipes)
     assert process.stdout.readline()
     return process
-
-
-def stopped(config: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, dict]:
-    code = main(["stop", "-c", str(config), "--json"])
-    (rig,) = json.loads(capsys.readouterr().out)["rigs"]
-    return code, rig
 
 
 def is_armed(config: Path) -> bool:
@@ -90,30 +59,29 @@ def is_armed(config: Path) -> bool:
 
 @pytest.mark.parametrize("hangs", [False, True])
 def test_a_session_that_has_the_rig_is_asked_to_end_and_killed_if_it_hangs(
-    board, capsys, monkeypatch, hangs
+    board, answered, monkeypatch, hangs
 ):
     with started(SESSION, board) as session:
         if hangs:
             monkeypatch.setattr("rig.bench.holding.ENDS_S", 0.2)
             os.kill(session.pid, signal.SIGSTOP)
-        code, told = stopped(board, capsys)
+        (told,) = answered("stop -c", board)["rigs"]
         session.communicate()
-    assert (code, told["state"]) == (0, "disarmed")
+    assert told["state"] == "disarmed"
     assert told["holder"] == {"pid": session.pid, "was_killed": hangs}
     assert (session.returncode == -signal.SIGKILL) == hangs
     assert not is_armed(board)
 
 
-def test_a_program_of_another_maker_is_named_and_left_alone(board, capsys):
+def test_a_program_of_another_maker_is_named_and_left_alone(board, said, answered):
     with started(FOREIGN, board) as other:
-        assert main(["stop", "-c", str(board)]) == ExitCode.SAFETY
-        told = capsys.readouterr().err
+        told = said("stop -c", board, code=ExitCode.SAFETY).err
         assert other.poll() is None
         other.communicate("")
     assert f"PID {other.pid}" in told
     assert "Cut the motor supply by hand." in told
-    code, result = stopped(board, capsys)
-    assert (code, result["state"], result["holder"]) == (0, "disarmed", None)
+    (result,) = answered("stop -c", board)["rigs"]
+    assert (result["state"], result["holder"]) == ("disarmed", None)
 
 
 def test_a_rig_is_held_once_under_any_of_its_names(tmp_path):
