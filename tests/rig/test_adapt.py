@@ -47,41 +47,32 @@ def states(folders, tmp_path_factory):
     return path
 
 
-def test_replay_refuses_another_instrument_unless_allowed(folders, states, capsys):
-    words = ["replay", str(folders[1] / "00.mcap"), "--model", str(states), "--speed", "0"]
-    assert main([*words, "--plain"]) != 0
-    assert "fitted on Maryland 1" in capsys.readouterr().err
-    assert main([*words, "--plain", "--any-instrument"]) == 0
+def test_replay_refuses_another_instrument_unless_allowed(folders, states, said):
+    words = ("replay", folders[1] / "00.mcap", "--speed 0 --plain --model", states)
+    assert "fitted on Maryland 1" in said(*words, code=5).err
+    said(*words, "--any-instrument")
 
 
-def test_replay_states_why_a_run_at_another_level_has_no_interval(folders, tmp_path, capsys):
-    slow, fast = (read_first(folders[0], f"{k:02}") for k in (0, 8))
-    level = slow.conditions["frequency_hz"]
-    assert level != fast.conditions["frequency_hz"]
-    same = [run for run in open_campaign(folders[0]) if run.conditions["frequency_hz"] == level]
+def test_replay_states_why_a_run_at_another_level_has_no_interval(folders, tmp_path, said):
+    runs = {run.name: run for run in open_campaign(folders[0])}
+    level = runs["00"].conditions["frequency_hz"]
+    assert level != runs["08"].conditions["frequency_hz"]
     (tmp_path / "slow").mkdir()
-    for run in same:
-        write_recording(tmp_path / "slow" / f"{run.name}.mcap", run)
+    for run in runs.values():
+        if run.conditions["frequency_hz"] == level:
+            write_recording(tmp_path / "slow" / f"{run.name}.mcap", run)
     path = tmp_path / "slow.npz"
-    assert main(["fit", str(tmp_path / "slow"), "--model", "states", "--out", str(path)]) == 0
+    said("fit", tmp_path / "slow", "--model states --out", path)
     for name, states_why in (("00", False), ("08", True)):
-        words = ["replay", str(folders[0] / f"{name}.mcap"), "--model", str(path), "--speed", "0"]
-        capsys.readouterr()
-        assert main([*words, "--plain"]) == 0
-        assert ("was fitted at one level of frequency_hz" in capsys.readouterr().err) is states_why
+        words = ("replay", folders[0] / f"{name}.mcap", "--speed 0 --plain --model", path)
+        assert ("was fitted at one level of frequency_hz" in said(*words).err) is states_why
 
 
-def read_first(folder, name: str) -> Recording:
-    """Return a recording of a folder."""
-    (found,) = open_campaign(folder / f"{name}.mcap")
-    return found
-
-
-def test_adapt_reports_the_runs_not_used_and_keeps_the_estimator(folders, states, tmp_path):
-    found, new = tmp_path / "a.json", tmp_path / "new.npz"
-    words = ["adapt", str(states), str(folders[1]), "--runs", "01,05"]
-    assert main([*words, "--json-out", str(found), "--out", str(new)]) == 0
-    result = json.loads(found.read_text())
+def test_adapt_reports_the_runs_not_used_and_keeps_the_estimator(
+    folders, states, tmp_path, answered
+):
+    new = tmp_path / "new.npz"
+    result = answered("adapt", states, folders[1], "--runs 01,05 --out", new)
     assert len(result["used"]) == 2
     assert len(result["unused"]) == 7
     assert set(result["rmse_by_run"]) == set(result["unused"])
@@ -94,7 +85,7 @@ def test_adapt_reports_the_runs_not_used_and_keeps_the_estimator(folders, states
     assert kept.instrument == "Maryland 2"
 
 
-def test_runs_to_adapt_with_are_chosen_by_their_conditions_alone(folders, states, tmp_path):
+def test_runs_to_adapt_with_are_chosen_by_their_conditions_alone(folders, states, tmp_path, said):
     estimator, campaign = load(states), open_campaign(folders[1])
     chosen = runs_by_rule(estimator, campaign, 3)
     assert len(set(chosen)) == 3
@@ -102,26 +93,24 @@ def test_runs_to_adapt_with_are_chosen_by_their_conditions_alone(folders, states
     other_truth = Campaign.of([run.with_columns(**{TARGET: -run[TARGET]}) for run in campaign])
     assert runs_by_rule(estimator, other_truth, 3) == chosen
     found = tmp_path / "a.json"
-    words = ["adapt", str(states), str(folders[1]), "--choose", "3", "--no-scratch"]
-    assert main([*words, "--json-out", str(found)]) == 0
+    said("adapt", states, folders[1], "--choose 3 --no-scratch --json-out", found)
     assert set(json.loads(found.read_text())["used"]) == set(chosen)
     with pytest.raises(UsageError, match="too few to choose 9"):
         runs_by_rule(estimator, campaign, 9)
 
 
-def test_a_fit_and_an_adaptation_refuse_to_write_over_a_file(folders, states, capsys):
+def test_a_fit_and_an_adaptation_refuse_to_write_over_a_file(folders, states, said):
     before = states.read_bytes()
     for words in (
-        ["fit", str(folders[0]), "--model", "states"],
-        ["fit", str(folders[0]), "--model", "linear"],
-        ["adapt", str(states), str(folders[1]), "--runs", "01"],
+        ("fit", folders[0], "--model states"),
+        ("fit", folders[0], "--model linear"),
+        ("adapt", states, folders[1], "--runs 01"),
     ):
-        assert main([*words, "--out", str(states)]) == 2
-        assert "is there already" in capsys.readouterr().err
+        assert "is there already" in said(*words, "--out", states, code=2).err
     assert states.read_bytes() == before
 
 
-def test_a_network_s_output_layer_moves_to_another_instrument(folders, tmp_path, capsys):
+def test_a_network_s_output_layer_moves_to_another_instrument(folders, tmp_path, answered):
     draw = np.random.default_rng(0)
     inputs = ("spindle_angle_rad", "motor_current_a")
     network = Network(
@@ -130,9 +119,8 @@ def test_a_network_s_output_layer_moves_to_another_instrument(folders, tmp_path,
     )  # fmt: skip
     path, new = tmp_path / "network.npz", tmp_path / "new.npz"
     NetworkEstimator(network).save(path)
-    words = ["adapt", str(path), str(folders[1]), "--runs", "01,05", "--no-scratch"]
-    assert main([*words, "--json", "--out", str(new)]) == 0
-    result = json.loads(capsys.readouterr().out)
+    words = ("adapt", path, folders[1], "--runs 01,05 --no-scratch --out", new)
+    result = answered(*words)
     assert result["kind"] == "network"
     assert result["scratch"] is None
     assert result["adapted"]["rmse"] < 0.5 * result["as_it_is"]["rmse"]
@@ -141,18 +129,14 @@ def test_a_network_s_output_layer_moves_to_another_instrument(folders, tmp_path,
     np.testing.assert_array_equal(moved.network.hidden, network.hidden)
 
 
-def test_what_adapt_cannot_do_is_reported(folders, states, tmp_path, capsys):
-    assert main(["adapt", str(states), str(folders[1]), "--runs", "77"]) == 2
-    assert "names 0 runs" in capsys.readouterr().err
+def test_what_adapt_cannot_do_is_reported(folders, states, tmp_path, said):
+    assert "names 0 runs" in said("adapt", states, folders[1], "--runs 77", code=2).err
     line = tmp_path / "line.toml"
-    assert main(["fit", str(folders[0]), "--model", "linear", "--out", str(line)]) == 0
-    assert main(["adapt", str(line), str(folders[1]), "--runs", "01"]) == 2
-    assert "cannot be adapted" in capsys.readouterr().err
-    words = ["fit", str(folders[0]), "--model", "states", "--surrogate", "jaw_angle_rad"]
-    assert main(words) == 2
+    said("fit", folders[0], "--model linear --out", line)
+    assert "cannot be adapted" in said("adapt", line, folders[1], "--runs 01", code=2).err
+    said("fit", folders[0], "--model states --surrogate jaw_angle_rad", code=2)
 
 
-def test_export_writes_a_header(states, tmp_path):
-    out = tmp_path / "grip.h"
-    assert main(["export", str(states), "--out", str(out)]) == 0
-    assert "static inline grip_estimate grip_step" in out.read_text()
+def test_export_writes_a_header(states, tmp_path, said):
+    said("export", states, "--out", tmp_path / "grip.h")
+    assert "static inline grip_estimate grip_step" in (tmp_path / "grip.h").read_text()

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from rig.campaigns.index import campaigns
-from rig.cli.main import main
 from tests.rig.log.conftest import write_log
 
 DIAGNOSIS = {
@@ -31,12 +30,8 @@ def root(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def rig(root, capsys):
-    def run(*words: str) -> dict:
-        assert main(["campaigns", *words, "--root", str(root), "--json"]) == 0
-        return json.loads(capsys.readouterr().out)
-
-    return run
+def rig(root, answered):
+    return lambda *words: answered("campaigns", *words, "--root", root)
 
 
 def names(found: dict) -> list[str]:
@@ -48,7 +43,7 @@ def diagnosed(folder: Path, **other) -> None:
     (folder / "diagnosis" / "diagnosis.json").write_text(json.dumps(DIAGNOSIS | other))
 
 
-def test_folders_are_compared_and_opened_by_their_names(root, capsys, monkeypatch):
+def test_folders_are_compared_and_opened_by_their_names(root, said, monkeypatch):
     """`monday` is a word of `monday-2`, too."""
     monkeypatch.setattr("webbrowser.open", lambda url: True)
     (root / "monday-2").mkdir()
@@ -56,22 +51,18 @@ def test_folders_are_compared_and_opened_by_their_names(root, capsys, monkeypatc
     for name in ("monday", "monday-2"):
         diagnosed(root / name)
         (root / name / "diagnosis" / "diagnosis.html").write_text("<!DOCTYPE html>")
-    words = ["--root", str(root)]
-    assert main(["campaigns", "tuesday", "monday", "--compare", *words]) == 0
-    head = capsys.readouterr().out.splitlines()[1]
+    head = said("campaigns tuesday monday --compare --root", root).out.splitlines()[1]
     assert head.index("tuesday") < head.index("monday")
     assert "monday-2" not in head
-    assert main(["campaigns", "monday", "--open", *words]) == 0
-    assert str(root / "monday" / "diagnosis") in capsys.readouterr().out
-    assert main(["campaigns", "friday", "--compare", *words]) == 0
-    assert "0 of 3 campaigns" in capsys.readouterr().out
+    out = said("campaigns monday --open --root", root).out
+    assert str(root / "monday" / "diagnosis") in out
+    assert "0 of 3 campaigns" in said("campaigns friday --compare --root", root).out
 
 
-def test_a_narrow_terminal_has_a_paragraph_for_each_campaign(root, capsys, monkeypatch):
+def test_a_narrow_terminal_has_a_paragraph_for_each_campaign(root, said, monkeypatch):
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "60")
-    assert main(["campaigns", "--root", str(root)]) == 0
-    out = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out)
+    out = re.sub(r"\x1b\[[0-9;]*m", "", said("campaigns --root", root).out)
     assert "…" not in out
     assert all(len(line) <= 60 for line in out.splitlines())
     paragraph = " ".join(out.split())
@@ -160,9 +151,8 @@ def test_words_and_values_are_searched(rig, root, terms, found):
     assert names(rig(*terms)) == found
 
 
-def test_a_condition_that_no_run_has_is_an_error_with_the_nearest_name(root, capsys):
-    assert main(["campaigns", "load_comand_a=1", "--root", str(root)]) == 2
-    assert "'load_command_a'" in capsys.readouterr().err
+def test_a_condition_that_no_run_has_is_an_error_with_the_nearest_name(root, said):
+    assert "'load_command_a'" in said("campaigns load_comand_a=1 --root", root, code=2).err
 
 
 def test_a_diagnosis_appears_when_it_is_written(rig, root):
@@ -173,28 +163,25 @@ def test_a_diagnosis_appears_when_it_is_written(rig, root):
     assert rig("verdict=identified")["campaigns"] == []
 
 
-def test_tables_for_people(root, capsys):
+def test_tables_for_people(root, said):
     diagnosed(root / "tuesday")
     for words, parts in (
-        ([], ("monday", "identified: ripple.motor", "first try", "2 of 2 campaigns")),
-        (["--runs"], ("monday/a.mcap", "complete")),
-        (["--compare"], ("error of motor", "0.002 to 0.001 N m", "tuesday")),
+        ("", ("monday", "identified: ripple.motor", "first try", "2 of 2 campaigns")),
+        ("--runs", ("monday/a.mcap", "complete")),
+        ("--compare", ("error of motor", "0.002 to 0.001 N m", "tuesday")),
     ):
-        assert main(["campaigns", "--root", str(root), *words]) == 0
-        out = capsys.readouterr().out
-        for part in parts:
-            assert part in out
+        out = said("campaigns", words, "--root", root).out
+        assert [part for part in parts if part not in out] == []
 
 
-def test_the_page_of_one_campaign_is_opened(root, capsys, monkeypatch):
+def test_the_page_of_one_campaign_is_opened(root, said, monkeypatch):
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or True)
-    assert main(["campaigns", "--open", "--root", str(root)]) == 2
-    assert "2 campaigns match" in capsys.readouterr().err
-    assert main(["campaigns", "tuesday", "--open", "--root", str(root)]) == 2
-    assert f"rig diagnose {root / 'tuesday'}" in capsys.readouterr().err
+    assert "2 campaigns match" in said("campaigns --open --root", root, code=2).err
+    told = said("campaigns tuesday --open --root", root, code=2).err
+    assert f"rig diagnose {root / 'tuesday'}" in told
     diagnosed(root / "tuesday")
     page = root / "tuesday" / "diagnosis" / "diagnosis.html"
     page.write_text("<!doctype html>")
-    assert main(["campaigns", "tuesday", "--open", "--root", str(root)]) == 0
+    said("campaigns tuesday --open --root", root)
     assert opened == [page.resolve().as_uri()]

@@ -1,6 +1,5 @@
 """`rig campaigns --refit`: one model on every campaign, kept, and when its parameters changed."""
 
-import json
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,7 +10,6 @@ import pytest
 
 from estimation.model_file import read, to_toml
 from rig.campaigns.drift import changes
-from rig.cli.main import main
 from rig.diagnosis.refit import refit_all
 from rig.log.convert import write_recording
 from tests.estimation.synthetic import TRUE
@@ -33,36 +31,31 @@ def root(tmp_path, monkeypatch):
     return tmp_path / "logs"
 
 
-def test_each_campaign_is_fitted_once_until_its_logs_change(root, capsys):
-    words = ["campaigns", "--root", str(root), "--refit", "motor", "--json"]
-    assert main(words) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert [row["folder"].rsplit("/")[-1] for row in found["campaigns"]] == [
-        "day-0", "day-1", "day-2"
-    ]  # fmt: skip
-    for row in found["campaigns"]:
+def test_each_campaign_is_fitted_once_until_its_logs_change(root, answered):
+    words = ("campaigns --refit motor --root", root)
+    found = answered(*words)["campaigns"]
+    assert [Path(row["folder"]).name for row in found] == ["day-0", "day-1", "day-2"]
+    for row in found:
         gain = row["fit"]["values"]["motor.torque_constant.gain"]
         assert gain == pytest.approx(TRUE["gain"], rel=0.05)
         assert row["fit"]["runs"] == 2
     kept = {path: path.stat().st_mtime_ns for path in root.glob("*/fit/*.json")}
     assert len(kept) == 3
     (root / "day-1" / "1.mcap").unlink()
-    assert main(words) == 0
+    answered(*words)
     again = {path.parent.parent.name for path in kept if path.stat().st_mtime_ns != kept[path]}
     assert again == {"day-1"}
 
 
-def test_a_campaign_that_cannot_be_fitted_is_named_and_the_others_are_fitted(root, capsys):
+def test_a_campaign_that_cannot_be_fitted_is_named_and_the_others_are_fitted(root, said):
     for path in (root / "day-1").glob("*.mcap"):
         path.unlink()
         run = synthetic_run(path.stem, 0.3, 0.05, seed=1, seconds=1.0)
         rest = {name: run[name] for name in run.columns if name != "motor_current_a"}
         write_recording(path, replace(run, columns=rest))
-    assert main(["campaigns", "--root", str(root), "--refit", "motor"]) == 0
-    said = capsys.readouterr().out
-    assert "day-1: " in said
-    assert "motor_current_a" in said
-    assert "2 of 3 campaigns fitted" in said
+    out = said("campaigns --refit motor --root", root).out
+    for part in ("day-1: ", "motor_current_a", "2 of 3 campaigns fitted"):
+        assert part in out
 
 
 class Dying(Executor):

@@ -1,6 +1,5 @@
 """`rig calibrate add, use, ...`: from a certificate to the calibration of a session."""
 
-import json
 import re
 from dataclasses import replace
 
@@ -9,8 +8,9 @@ import pytest
 
 from calibration.record import Validity
 from calibration.store import CalibrationStore
-from rig.cli.main import main
 from rig.configuration.config import SIMULATED, load_config
+from rig.protocols.protocol import protocol_toml
+from tests.rig.simulated import short_protocol
 
 pytestmark = pytest.mark.integration
 
@@ -26,30 +26,29 @@ source = "certificate 4711"
 
 
 @pytest.fixture
-def rig(tmp_path, monkeypatch, capsys):
+def rig(tmp_path, monkeypatch, answered):
     monkeypatch.setenv("RIG_CALIBRATIONS", str(tmp_path / "store"))
-
-    def run(*words):
-        code = main([*words, "--json"])
-        return code, json.loads(capsys.readouterr().out)
-
-    return run
+    return answered
 
 
-def certificate(tmp_path, slope="4.0e-5"):
-    path = tmp_path / f"certificate{slope}.toml"
-    path.write_text(CERTIFICATE.replace("4.0e-5", slope))
-    return str(path)
+@pytest.fixture
+def added(rig, tmp_path):
+    """Add a certificate with a slope; return the hash of its record."""
+
+    def add(slope="4.0e-5", more=""):
+        path = tmp_path / f"certificate{slope}.toml"
+        path.write_text(CERTIFICATE.replace("4.0e-5", slope))
+        said = rig("calibrate add", path, "--operator Ada", more)
+        return said["added"]["proximal_torque_n_m"]
+
+    return add
 
 
-def recorded(rig, tmp_path):
-    """Record one short run; return its log."""
-    short = tmp_path / "short.toml"
-    short.write_text(
-        'name = "short"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2]\n'
-        "duration_s = 1.0\n"
-    )
-    rig("record", "-p", str(short), "--out", str(tmp_path / "runs"))
+@pytest.fixture
+def log(rig, tmp_path):
+    """The log of one short run."""
+    (tmp_path / "short.toml").write_text(protocol_toml(short_protocol(1)))
+    rig("record -p", tmp_path / "short.toml", "--out", tmp_path / "runs")
     (log,) = (tmp_path / "runs").glob("*.mcap")
     return log
 
@@ -61,113 +60,85 @@ def configuration(tmp_path, serial):
     return path
 
 
-def test_from_a_certificate_to_a_session(rig, tmp_path):
-    code, added = rig("calibrate", "add", certificate(tmp_path), "--operator", "Ada",
-                      "--serial", "proximal_sensor=F7")  # fmt: skip
-    digest = added["added"]["proximal_torque_n_m"]
-    assert code == 0
+def test_from_a_certificate_to_a_session(rig, added, tmp_path):
+    digest = added(more="--serial proximal_sensor=F7")
     assert load_config(configuration(tmp_path, "F7")).calibration_set().name == "reference"
-
-    assert rig("calibrate", "use", digest[:8], "--by", "Ada")[1]["replaced"] is None
+    assert rig("calibrate use", digest[:8], "--by Ada")["replaced"] is None
     calibrations = load_config(configuration(tmp_path, "F7")).calibration_set()
     assert calibrations.channels["proximal_torque_n_m"].slope == 4.0e-5
-    listed = rig("calibrate", "list")[1]["records"]
+    listed = rig("calibrate list")["records"]
     assert [(r["hash"], r["active"]) for r in listed] == [(digest, True)]
-    assert rig("calibrate", "show", digest)[1]["record"]["operator"] == "Ada"
+    assert rig("calibrate show", digest)["record"]["operator"] == "Ada"
 
 
-def test_a_foreign_sensor_is_refused_by_check_and_by_the_session(rig, tmp_path):
-    _, added = rig("calibrate", "add", certificate(tmp_path), "--operator", "Ada",
-                   "--serial", "proximal_sensor=F7")  # fmt: skip
-    rig("calibrate", "use", *added["added"].values(), "--by", "Ada")
+def test_a_foreign_sensor_is_refused_by_check_and_by_the_session(rig, added, tmp_path):
+    rig("calibrate use", added(more="--serial proximal_sensor=F7"), "--by Ada")
     path = configuration(tmp_path, "F8")
-    code, said = rig(
-        "calibrate", "check", "--config", str(path), "--store", str(tmp_path / "store")
-    )
-    assert code == 1
-    assert [v["rule"] for v in said["verdicts"]] == ["foreign_serial"]
-    code, said = rig("record", "--config", str(path), "--out", str(tmp_path / "runs"))
-    assert code == 5
-    assert "must not be used" in said["error"]["what"]
+    told = rig("calibrate check --config", path, "--store", tmp_path / "store", code=1)
+    assert [v["rule"] for v in told["verdicts"]] == ["foreign_serial"]
+    told = rig("record --config", path, "--out", tmp_path / "runs", code=5)
+    assert "must not be used" in told["error"]["what"]
     assert not (tmp_path / "runs").exists()
 
 
-def test_diff_names_what_changed(rig, tmp_path, capsys):
-    hashes = []
-    for slope in ("4.0e-5", "4.1e-5"):
-        words = (certificate(tmp_path, slope), "--operator", "Ada", "--made-at")
-        _, added = rig("calibrate", "add", *words, "2026-03-01T12:00:00+00:00")
-        hashes += added["added"].values()
-    _, told = rig("calibrate", "diff", *hashes)
+def test_diff_names_what_changed(rig, added, said):
+    hashes = [added(slope, "--made-at 2026-03-01T12:00:00+00:00") for slope in ("4.0e-5", "4.1e-5")]
+    told = rig("calibrate diff", *hashes)
     assert told["changes"]["fit.parameters.slope"] == {"first": 4.0e-5, "second": 4.1e-5}
     assert set(told["changes"]) == {"hash", "fit.parameters.slope", "raw"}
-    assert main(["calibrate", "diff", *hashes]) == 0
-    assert "slope: 40 uN m a count -> 41 uN m a count" in capsys.readouterr().out
-    assert main(["cal", "list"]) == 0  # the name it had
-    assert "slope 40 uN m a count" in capsys.readouterr().out
+    out = said("calibrate diff", *hashes).out
+    assert "slope: 40 uN m a count -> 41 uN m a count" in out
+    assert "slope 40 uN m a count" in said("cal list").out  # the name it had
 
 
-def test_a_record_is_shown_with_units_and_spread(rig, tmp_path, capsys):
-    folders = ["--out", str(tmp_path / "raw"), "--store", str(tmp_path / "store")]
-    assert main(["calibrate", "current", "--sim", "--yes", "--operator", "Ada", *folders]) == 0
+def test_a_record_is_shown_with_units_and_spread(rig, tmp_path, said):
+    folders = ("--out", tmp_path / "raw", "--store", tmp_path / "store")
+    said("calibrate current --sim --yes --operator Ada", *folders)
     (digest,) = (r.content_hash for r in CalibrationStore(tmp_path / "store").records()
                  if r.channel == "spindle_torque_n_m")  # fmt: skip
-    capsys.readouterr()
-    assert main(["calibrate", "show", digest]) == 0
-    said = capsys.readouterr().out
-    assert re.search(r"torque_constant_n_m_a: 8\d\d\.\d mN m/A \+- ", said)
-    assert "covariance" not in said
+    shown = said("calibrate show", digest).out
+    assert re.search(r"torque_constant_n_m_a: 8\d\d\.\d mN m/A \+- ", shown)
+    assert "covariance" not in shown
 
 
 def test_records_of_the_simulated_rig_are_listed_by_their_gains_and_found(
-    monkeypatch, tmp_path, capsys
+    rig, monkeypatch, tmp_path, said
 ):
-    monkeypatch.setenv("RIG_CALIBRATIONS", str(tmp_path / "store"))
     monkeypatch.chdir(tmp_path)
-    assert main(["calibrate", "current", "--sim", "--yes", "--operator", "Ada"]) == 0
-    out = capsys.readouterr().out
+    out = said("calibrate current --sim --yes --operator Ada").out
     hints = [line for line in out.splitlines() if line.startswith("Use it:")]
-    assert [main(hint.partition("rig ")[2].split()) for hint in hints] == [0, 0]
-    said = " ".join(out.split())
-    capsys.readouterr()
-    assert f'calibration_store = "{tmp_path / "store-simulated"}"' in said
-    assert main(["calibrate", "list"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    assert len(hints) == 2
+    for hint in hints:
+        said(hint.partition("rig ")[2])
+    assert f'calibration_store = "{tmp_path / "store-simulated"}"' in " ".join(out.split())
+    lines = said("calibrate list").out.splitlines()
     assert lines[0].endswith("store-simulated")
     constant, gain = sorted(lines[1:3], key=lambda line: "motor_current_a" in line)
     assert re.search(r"SIM-TOOL-1: torque_constant_n_m_a 8\d\d\.\d mN m/A", constant)
     assert re.search(r": gain_a 2\.\d+ A", gain)
-    assert main(["calibrate", "show", constant.split()[1]]) == 0
-    assert main(["calibrate", "use", constant.split()[1], "--by", "Ada"]) == 0
+    said("calibrate show", constant.split()[1])
+    said("calibrate use", constant.split()[1], "--by Ada")
     assert not (tmp_path / "store").exists()
 
 
-def test_a_log_beyond_the_calibrated_range_is_reported(rig, tmp_path):
-    log = recorded(rig, tmp_path)
-    _, added = rig("calibrate", "add", certificate(tmp_path), "--operator", "Ada")
+def test_a_log_beyond_the_calibrated_range_is_reported(rig, added, log, tmp_path):
     store = CalibrationStore(tmp_path / "store")
-    narrow = replace(store.get(*added["added"].values()), validity=Validity(-1.0, 1.0))
+    narrow = replace(store.get(added()), validity=Validity(-1.0, 1.0))
     store.use(store.add(narrow), narrow.made_at, "Ada")
-    code, said = rig("calibrate", "check", "--log", str(log), "--store", str(tmp_path / "store"))
-    assert code == 0
-    assert [v["rule"] for v in said["verdicts"]] == ["out_of_range"]
-    assert rig("calibrate", "check", "--store", str(tmp_path / "store"))[1]["verdicts"] == []
+    checked = rig("calibrate check --store", store.folder, "--log", log)
+    assert [v["rule"] for v in checked["verdicts"]] == ["out_of_range"]
+    assert rig("calibrate check --store", store.folder)["verdicts"] == []
 
 
-def test_a_log_is_exported_with_another_record(rig, tmp_path):
+def test_a_log_is_exported_with_another_record(rig, added, log, tmp_path):
     """Twice the slope is twice the torque; the zero that was measured before the run stays."""
-    log = recorded(rig, tmp_path)
-    _, added = rig("calibrate", "add", certificate(tmp_path, "7.9622e-05"), "--operator", "Ada")
-    digest = added["added"]["proximal_torque_n_m"]
+    digest = added("7.9622e-05")
     torques = []
-    for words in ([], ["--record", digest], ["--calibration", "reference"]):
+    for words in ("", f"--record {digest}", "--calibration reference"):
         target = tmp_path / f"sample{len(torques)}.npz"
-        code, said = rig("log", "export", str(log), "--topic", "/rig/sample", "--format", "npz",
-                         "--out", str(target), *words)  # fmt: skip
-        assert code == 0
+        told = rig("log export", log, "--topic /rig/sample --format npz", words, "--out", target)
         torques.append(np.load(target)["proximal_torque_n_m"])
-    assert said["calibrations"]["reference"]
+    assert told["calibrations"]["reference"]
     np.testing.assert_allclose(torques[1], 2 * torques[0], rtol=1e-12)
     np.testing.assert_array_equal(torques[2], torques[0])
-    code, said = rig("log", "export", str(log), "--record", "ffff")
-    assert code == 2
+    rig("log export", log, "--record ffff", code=2)
