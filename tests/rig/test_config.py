@@ -1,11 +1,9 @@
 """The configuration: every key checked, the nearest one named."""
 
-import json
 from pathlib import Path
 
 import pytest
 
-from rig.cli.main import main
 from rig.configuration.check import problems, refuse_problems
 from rig.configuration.config import SIMULATED, load_config, shipped_configs
 from rig.configuration.text import to_toml
@@ -115,27 +113,22 @@ def test_two_devices_on_one_adapter_are_refused():
     assert "one adapter" in problem.what
 
 
-def test_config_check_speaks_to_machines(tmp_path, capsys):
-    assert main(["config", "check", "canopen", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["sound"]
+def test_config_check_speaks_to_machines(tmp_path, answered):
+    assert answered("config check canopen")["sound"]
     bad = tmp_path / "bad.toml"
     bad.write_text(to_toml(on_one_bus({}, {})))
-    assert main(["config", "check", str(bad), "--json"]) == ExitCode.USAGE
-    assert len(json.loads(capsys.readouterr().out)["problems"]) == 2
+    assert len(answered("config check", bad, code=ExitCode.USAGE)["problems"]) == 2
 
 
-def test_each_problem_names_its_line(tmp_path, capsys):
+def test_each_problem_names_its_line(tmp_path, said):
     text = SIMULATED.read_text()
     text = text.replace("kp = 20.0", "kpp = 20.0").replace("motor_current_a = 0.6", "")
     path = tmp_path / "bad.toml"
     path.write_text(text)
-    assert main(["config", "check", str(path)]) == ExitCode.USAGE
-    said = capsys.readouterr().err.splitlines()
+    printed = said("config check", path, code=ExitCode.USAGE).err
     lines = text.splitlines()
-    slip = next(line for line in said if "kpp" in line)
-    assert f"line {lines.index('kpp = 20.0') + 1}, controller.kpp" in slip
-    missing = next(line for line in said if "motor_current_a" in line)
-    assert f"line {lines.index('[limits]') + 1}, limits.motor_current_a" in missing
+    assert f"line {lines.index('kpp = 20.0') + 1}, controller.kpp" in printed
+    assert f"line {lines.index('[limits]') + 1}, limits.motor_current_a" in printed
 
 
 @pytest.mark.parametrize(
@@ -145,21 +138,19 @@ def test_each_problem_names_its_line(tmp_path, capsys):
         ('calibration = "reference"', 'calibration = "refrence"', "reference"),
     ],
 )
-def test_a_model_or_calibration_that_is_not_there_is_a_problem(tmp_path, capsys, old, new, meant):
+def test_a_model_or_calibration_that_is_not_there_is_a_problem(tmp_path, said, old, new, meant):
     path = tmp_path / "bad.toml"
     path.write_text(SIMULATED.read_text().replace(old, new))
-    assert main(["config", "check", str(path)]) == ExitCode.USAGE
-    assert f"Did you mean {meant!r}" in capsys.readouterr().out
+    assert f"Did you mean {meant!r}" in said("config check", path, code=ExitCode.USAGE).out
 
 
-def test_a_configuration_is_begun_for_the_board_that_is_plugged_in(tmp_path, monkeypatch, capsys):
+def test_a_configuration_is_begun_for_the_board_that_is_plugged_in(tmp_path, monkeypatch, said):
     from rig.doctor.ports import Port
 
     board = Port("/dev/ttyACM0", "16c0:0483:1234567", "USB Serial")
     monkeypatch.setattr("rig.doctor.ports.serial_ports", lambda: [board])
     path = tmp_path / "rig.toml"
-    assert main(["config", "init", str(path)]) == 0
+    said("config init", path)
     assert load_config(path).logger.url == "usb:16c0:0483:1234567"
-    assert main(["config", "check", str(path)]) == 0
-    assert main(["config", "init", str(path)]) == ExitCode.USAGE
-    assert "already" in capsys.readouterr().err
+    said("config check", path)
+    assert "already" in said("config init", path, code=ExitCode.USAGE).err

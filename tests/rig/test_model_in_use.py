@@ -10,7 +10,6 @@ import pytest
 
 from estimation import model_file
 from estimation.fitting import fit
-from rig.cli.main import main
 from rig.configuration.config import SHIPPED, load_config
 from rig.importers.registry import open_campaign
 from rig.live.block import through
@@ -38,33 +37,26 @@ def model(path: Path) -> Path:
     return Path(path.write_text(SHIPPED_MODEL.read_text()) and path)
 
 
-def answered(capsys, *words):
-    assert main([*words, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def test_a_model_is_used_by_every_session_of_its_rig_until_taken_back(home, capsys):
+def test_a_model_is_used_by_every_session_of_its_rig_until_taken_back(home, answered):
     assert load_config().model_path == SHIPPED_MODEL
-    used = answered(capsys, "model", "use", str(model(home / "mine.toml")))
+    used = answered("model use", model(home / "mine.toml"))
     assert used["replaced"] == str(SHIPPED_MODEL)
     assert used["estimates"] == [GRIP]
     (home / "mine.toml").unlink()  # a copy is in use
     assert load_config().model_path.read_text() == SHIPPED_MODEL.read_text()
     assert load_config(Path("grasper")).model_path.stem.startswith("simulated_grasper")
-    again = answered(capsys, "model", "use", str(model(home / "other.toml")))
+    again = answered("model use", model(home / "other.toml"))
     assert again["replaced"] == str(used["model"])
-    assert answered(capsys, "model")["model"] == again["model"]
-    assert answered(capsys, "model", "use", Path(used["model"]).stem)["model"] == used["model"]
-    assert answered(capsys, "model", "reset")["replaced"] == used["model"]
+    assert answered("model")["model"] == again["model"]
+    assert answered("model use", Path(used["model"]).stem)["model"] == used["model"]
+    assert answered("model reset")["replaced"] == used["model"]
     assert load_config().model_path == SHIPPED_MODEL
 
 
-def test_only_a_fitted_model_is_used(home, capsys):
-    assert main(["model", "use", "gripp"]) == 2
-    assert "simulated_grip" in capsys.readouterr().err
+def test_only_a_fitted_model_is_used(home, said):
+    assert "simulated_grip" in said("model use gripp", code=2).err
     model_file.write(model_file.read(Path("motor")), home / "declared.toml")
-    assert main(["model", "use", "declared.toml"]) != 0
-    assert "not fitted" in capsys.readouterr().err
+    assert "not fitted" in said("model use declared.toml", code=5).err
     assert load_config().model_path == SHIPPED_MODEL
 
 
@@ -89,11 +81,11 @@ def recorded(home):
     return folder, fitted
 
 
-def test_exports_have_the_estimate_beside_what_was_measured(recorded, home):
+def test_exports_have_the_estimate_beside_what_was_measured(recorded, home, said):
     folder, fitted = recorded
     named = f"estimated_{fitted.target}"
-    words = ["--model", str(home / "motor.toml"), "--out"]
-    assert main(["log", "export", str(folder), *words, str(home / "all.csv")]) == 0
+    words = ("log export", folder, "--model motor.toml")
+    said(*words, "--out all.csv")
     with (home / "all.csv").open() as file:
         rows = list(csv.DictReader(file))
     first = open_campaign(folder).runs[0].recording()
@@ -101,58 +93,46 @@ def test_exports_have_the_estimate_beside_what_was_measured(recorded, home):
     expected = estimator.push(first.columns, first.time_s)
     mine = [float(row[named]) for row in rows if row["run"] == first.name]
     np.testing.assert_allclose(mine, expected)
-    assert main(["log", "export", str(folder), "--format", "mcap", *words, str(home / "new")]) == 0
+    said(*words, "--format mcap --out new")
     again = open_campaign(home / "new")
     assert again.names == ("000-a", "001-b")
     np.testing.assert_array_equal(again.runs[0].recording().columns[named], expected)
 
 
-def test_a_page_and_a_replay_take_the_model_in_use_for_the_recordings_rig(recorded, home, capsys):
+def test_a_page_and_a_replay_take_the_model_in_use_for_the_recordings_rig(recorded, home, said):
     folder, fitted = recorded
     text = (SHIPPED / "simulated.toml").read_text()
     (home / "rig.toml").write_text(text.replace('"simulated rig"', '"bench 7"'))
     page = home / "p.html"
-    assert main(["view", str(folder), "--no-open", "-o", str(page)]) == 0
+    said("view --no-open", folder, "-o", page)
     assert "estimated" not in page.read_text().split('id="charts">')[1]
-    assert main(["model", "use", "motor.toml", "-c", "rig.toml"]) == 0
-    assert main(["view", str(folder), "--no-open", "-o", str(page)]) == 0
+    said("model use motor.toml -c rig.toml")
+    said("view --no-open", folder, "-o", page)
     assert '"estimated ' in page.read_text().split('id="charts">')[1]
-    capsys.readouterr()
-    assert main(["replay", str(folder), "--speed", "0", "--json"]) == 0
-    frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert frames[10]["channels"][fitted.target]["estimate"] is not None
+    frame = json.loads(said("replay --speed 0 --json", folder).out.splitlines()[10])
+    assert frame["channels"][fitted.target]["estimate"] is not None
 
 
 def test_what_the_live_display_records_has_the_estimate_that_was_shown(tmp_path):
-    config = simulated()
-    script = iter(["r", "", "", "r"])
-    blocks = list(
-        through(
-            session_blocks(
-                config,
-                lambda: transport(config),
-                [],
-                estimators_of(SHIPPED_MODEL, 1000.0),
-                lambda: next(script, ""),
-                tmp_path,
-            ),
-            duration_s=0.5,
-        )
+    config, keys = simulated(), iter(["r", "", "", "r"])
+    estimators = estimators_of(SHIPPED_MODEL, 1000.0)
+    stream = session_blocks(
+        config, lambda: transport(config), [], estimators, lambda: next(keys, ""), tmp_path
     )
+    blocks = list(through(stream, duration_s=0.5))
     (path,) = tmp_path.glob("*.mcap")
     rows = read_log(path).topics["/rig/sample"].rows
     shown = np.concatenate([block.estimates[GRIP] for block in blocks[:3]])
     np.testing.assert_array_equal(rows[f"estimated_{GRIP}"], shown)
 
 
-def test_an_estimate_outside_its_range_is_a_gap(recorded, home, monkeypatch):
+def test_an_estimate_outside_its_range_is_a_gap(recorded, home, monkeypatch, said):
     folder, fitted = recorded
     outside = property(lambda self: np.arange(3000) >= 1000)
     monkeypatch.setattr("rig.live.estimator.ModelEstimator.inside", outside)
-    words = ["--model", str(home / "motor.toml"), "--format", "mcap", "--out", str(home / "gaps")]
-    assert main(["log", "export", str(folder), *words]) == 0
+    said("log export", folder, "--model motor.toml --format mcap --out gaps")
     made = open_campaign(home / "gaps").runs[0].recording()
     found = made.columns[f"estimated_{fitted.target}"]
     assert np.isnan(found[:1000]).all()
     assert np.isfinite(found[1000:]).all()
-    assert main(["view", str(home / "gaps"), "--no-open", "-o", str(home / "g.html")]) == 0
+    said("view gaps --no-open -o g.html")

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from estimation.recording import Flag, Mark, Recording
-from rig.cli.main import main
 from rig.log.convert import write_recording
 from tests.rig.browser import Opened, chromium
 from tests.rig.test_reports import Page
@@ -37,14 +36,17 @@ def folder(tmp_path):
     return tmp_path
 
 
-def written(folder, *words):
-    page = folder / "page.html"
-    assert main(["view", str(folder), "--out", str(page), "--no-open", *words]) == 0
-    return page
+@pytest.fixture
+def written(folder, said):
+    def write(*words):
+        said("view --no-open", folder, "--out", folder / "page.html", *words)
+        return folder / "page.html"
+
+    return write
 
 
-def test_each_run_has_all_channels_the_estimate_on_its_sensor_and_the_residual(folder):
-    text = written(folder).read_text()
+def test_each_run_has_all_channels_the_estimate_on_its_sensor_and_the_residual(written):
+    text = written().read_text()
     found = Page(text)
     assert (found.open, found.references) == ([], ["#evidence"])
     (chart,) = json.loads(re.search(r'id="charts">(.*?)</script>', text, re.DOTALL)[1])
@@ -58,25 +60,24 @@ def test_each_run_has_all_channels_the_estimate_on_its_sensor_and_the_residual(f
     assert "bang at 1 s" in text
 
 
-def test_one_run_alone(folder):
-    text = written(folder, "--run", "000-a").read_text()
+def test_one_run_alone(written):
+    text = written("--run 000-a").read_text()
     assert "000-a" in text
     assert "001-b" not in text
 
 
-def test_the_page_is_named_and_opened_unless_unwanted(folder, capsys, monkeypatch):
+def test_the_page_is_named_and_opened_unless_unwanted(folder, said, monkeypatch):
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     page = folder / "page.html"
-    assert main(["view", str(folder), "--out", str(page)]) == 0
-    assert str(page) in capsys.readouterr().out
+    assert str(page) in said("view", folder, "--out", page).out
     assert opened == [page.as_uri()]
-    assert main(["view", str(folder), "--run", "002"]) == 2
+    said("view --run 002", folder, code=2)
 
 
-def test_the_page_draws_and_changes_run_in_a_browser(folder):
+def test_the_page_draws_and_changes_run_in_a_browser(written):
     with chromium() as browser:
-        opened = Opened(browser, written(folder))
+        opened = Opened(browser, written())
         assert opened.messages == []
         assert [r for r in opened.requests if not r.startswith(("file:", "data:", "blob:"))] == []
         panels = opened.page.locator("#chart-time-recordings .ylines-above").count()
@@ -86,11 +87,11 @@ def test_the_page_draws_and_changes_run_in_a_browser(folder):
         opened.close()
 
 
-def test_a_run_that_cannot_be_read_may_be_skipped(folder, capsys):
+def test_a_run_that_cannot_be_read_may_be_skipped(folder, said):
     damaged = bytearray(write_recording(folder / "002-c.mcap", recorded("002-c")).read_bytes())
     damaged[len(damaged) // 2] ^= 0xFF
     (folder / "002-c.mcap").write_bytes(damaged)
-    assert main(["view", str(folder), "--no-open", "-o", str(folder / "p.html")]) != 0
-    text = written(folder, "--skip-bad").read_text()
-    assert "001-b" in text
-    assert "002-c" in capsys.readouterr().err
+    words = ("view --no-open", folder, "-o", folder / "p.html")
+    said(*words, code=5)
+    assert "002-c" in said(*words, "--skip-bad").err
+    assert "001-b" in (folder / "p.html").read_text()
