@@ -4,15 +4,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.diagnosis.own import (
-    CHAINS,
-    CLEAN,
-    Answer,
-    draw,
-    plans_of,
-    record,
-    truth_of,
-)
+from benchmarks.diagnosis.own import CHAINS, CLEAN, Answer, draw, plans_of, record, truth_of
 from benchmarks.diagnosis.scoring import judge, judge_next, outcome
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 from estimation.derived import zero_phase_channels

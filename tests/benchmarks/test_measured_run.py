@@ -21,12 +21,7 @@ def test_a_simulated_run_looks_like_the_measured_one(measured_data):
     recording = campaign.select(["24"]).runs[0].recording()
     assert recording.conditions["frequency_hz"] == pytest.approx(0.3, abs=0.01)
     measured, simulated = compare(recording)
-    spread = (
-        "motor_current_a",
-        "proximal_torque_n_m",
-        "spindle_angle_rad",
-        "jaw_angle_rad",
-    )
+    spread = ("motor_current_a", "proximal_torque_n_m", "spindle_angle_rad", "jaw_angle_rad")
     for name in spread:
         assert simulated[name].span == pytest.approx(measured[name].span, rel=0.3), name
     for name in ("motor_current_a", "proximal_torque_n_m", "distal_torque_n_m", "jaw_angle_rad"):

@@ -13,13 +13,7 @@ from calibration.history import changes, deviation, earlier_ones
 from calibration.linear import LinearCalibration, shipped_calibration_set
 from calibration.record import CalibrationRecord, Fit, RawFile, Validity, record_of_line
 from calibration.rules import UnfitCalibrationError, judge, judge_range, judge_raw, refuse_errors
-from calibration.store import (
-    CalibrationStore,
-    StoreError,
-    active_lines,
-    compose,
-    default_folder,
-)
+from calibration.store import CalibrationStore, StoreError, active_lines, compose, default_folder
 
 MADE = datetime(2026, 3, 1, 12, tzinfo=UTC)
 LINE = LinearCalibration("proximal_torque_n_m", "proximal", 4e-5, 12.0, "certificate 1", True)

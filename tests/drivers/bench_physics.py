@@ -58,11 +58,7 @@ class PlainBench:
         self.state = np.zeros(5)
 
     def advance(
-        self,
-        ticks: int,
-        target: NDArray[np.int32],
-        load_ma: NDArray[np.int32],
-        drive: Drive,
+        self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
     ) -> NDArray[np.int32]:
         rows = np.empty((ticks, COLUMNS), np.int32)
         run(self.state, rows, target, load_ma, *drive.arrays)
@@ -76,10 +72,7 @@ class PlainBench:
         for k in range(ticks):
             sample(self.state, inputs)
             tick(
-                board_address,
-                (tick_us + 1000 * k) % 2**32,
-                inputs.ctypes.data,
-                outputs.ctypes.data,
+                board_address, (tick_us + 1000 * k) % 2**32, inputs.ctypes.data, outputs.ctypes.data
             )
             step(self.state, outputs[0], outputs[1])
 

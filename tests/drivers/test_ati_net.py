@@ -144,10 +144,7 @@ def test_lost_late_repeated_and_restarted_records_are_distinguished():
     assert (kept, numbers, counters.restarts) == ([True] * 3, [0, 1, 2], 1)
 
 
-@given(
-    kept=st.lists(st.booleans(), min_size=2, max_size=200),
-    first=st.integers(0, 2**32 - 1),
-)
+@given(kept=st.lists(st.booleans(), min_size=2, max_size=200), first=st.integers(0, 2**32 - 1))
 def test_what_is_missing_is_counted_exactly(kept, first):
     kept[0] = kept[-1] = True
     places = [place for place, keep in enumerate(kept) if keep]

@@ -11,13 +11,7 @@ from drivers.dynamixel import protocol
 from drivers.dynamixel.driver import Dynamixel, open_dynamixel
 from drivers.dynamixel.fake import DynamixelFake
 from drivers.dynamixel.line import InstructionRefusedError
-from drivers.errors import (
-    DisarmUnconfirmedError,
-    DriverError,
-    FrameError,
-    LinkError,
-    LinkLostError,
-)
+from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError, LinkError, LinkLostError
 from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 from tests.drivers.taps import once
@@ -70,10 +64,11 @@ def test_the_registers_are_those_of_the_manual():
     assert all((r.address, r.size) == told for r, told in registers.items())
     instructions = (protocol.PING, protocol.READ, protocol.WRITE, protocol.REBOOT, protocol.STATUS)
     assert instructions == (0x01, 0x02, 0x03, 0x08, 0x55)
-    assert (
-        *(0, 20),
-        0xFF,
-    ) == (protocol.CURRENT_MODE, protocol.WATCHDOG_UNIT_MS, protocol.WATCHDOG_TRIPPED)
+    assert (*(0, 20), 0xFF) == (
+        protocol.CURRENT_MODE,
+        protocol.WATCHDOG_UNIT_MS,
+        protocol.WATCHDOG_TRIPPED,
+    )
     assert (protocol.ALERT, protocol.RANGE_ERROR, protocol.ACCESS_ERROR) == (0x80, 4, 7)
     data = bytes.fromhex("feff 0a000000 a6000000 00000000 00000000 3200 1f")
     assert protocol.decode_present(data) == protocol.Present(-2, 10, 166, 50, 31)

@@ -8,13 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.device import SampleFlag
-from drivers.errors import (
-    DisarmUnconfirmedError,
-    DriverError,
-    FrameError,
-    LinkError,
-    LinkLostError,
-)
+from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError, LinkError, LinkLostError
 from drivers.moteus import protocol
 from drivers.moteus.driver import Moteus, open_moteus
 from drivers.moteus.fake import MoteusFake

@@ -66,11 +66,7 @@ def test_the_index_gives_the_reference_once_wherever_the_shaft_stands_then(libra
         at_rest(logger)
         logger.reference([0, 1000, 500], at_index=True)
         sample = newest(logger)
-        assert [int(sample[name]) for name in ("motor", "spindle", "jaw")] == [
-            350,
-            1020,
-            510,
-        ]
+        assert [int(sample[name]) for name in ("motor", "spindle", "jaw")] == [350, 1020, 510]
         assert sample["status"] & STATUS_REFERENCED
         with pytest.raises(CommandRefusedError, match="through its index") as refused:
             logger.reference([0, 1000, 500], at_index=True)

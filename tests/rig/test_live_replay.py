@@ -154,8 +154,7 @@ def logs(monkeypatch, tmp_path):
 
     def use(*recordings):
         monkeypatch.setattr(
-            "rig.machines.recordings.open_campaign",
-            lambda *_: Campaign.of(recordings),
+            "rig.machines.recordings.open_campaign", lambda *_: Campaign.of(recordings)
         )
         return str(tmp_path)
 

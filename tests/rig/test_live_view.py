@@ -103,10 +103,7 @@ def test_newtons_are_only_claimed_for_the_jaw():
 
 
 def test_limits_say_in_words_when_they_are_near_or_unknown():
-    limits = (
-        LimitStatus("reached", 0.6, 0.6, "A"),
-        LimitStatus("unknown", float("nan"), 0.6, "A"),
-    )
+    limits = (LimitStatus("reached", 0.6, 0.6, "A"), LimitStatus("unknown", float("nan"), 0.6, "A"))
     text = render(snapshot_of(stream(limits=limits)))
     assert "AT LIMIT" in text
     assert "no value, limit 0.600 A" in text

@@ -79,11 +79,7 @@ def test_a_name_without_a_likely_alternative_needs_no_experiment(doubtful, rippl
 
 def test_repeats_are_found_by_what_was_asked(rippled):
     names = [r.name for r in rippled]
-    assert repeats(rippled) == [
-        (names[6], names[7]),
-        (names[6], names[8]),
-        (names[7], names[8]),
-    ]
+    assert repeats(rippled) == [(names[6], names[7]), (names[6], names[8]), (names[7], names[8])]
 
 
 def test_the_noise_floor_is_below_the_error_that_remains(answered, rippled):

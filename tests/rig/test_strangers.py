@@ -6,15 +6,7 @@ import math
 import pytest
 
 from rig.diagnosis.schema import DiagnosisSchema
-from tests.rig.strangers import (
-    ARM,
-    AXIS,
-    DRIVE,
-    arm_table,
-    axis_table,
-    drive_table,
-    warming_table,
-)
+from tests.rig.strangers import ARM, AXIS, DRIVE, arm_table, axis_table, drive_table, warming_table
 
 pytestmark = pytest.mark.integration
 

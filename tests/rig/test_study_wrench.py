@@ -16,14 +16,7 @@ from estimation.arm.tables import PSM
 from estimation.arm.wrench import body_jacobians, in_tip_frame, spatial_jacobians
 from rig.arm.hidden import FAMILIES
 from rig.arm.simulated import contact_motion
-from rig.studies.wrench.study import (
-    BODY,
-    HAND,
-    OURS,
-    SERIES,
-    THESIS,
-    one_arm,
-)
+from rig.studies.wrench.study import BODY, HAND, OURS, SERIES, THESIS, one_arm
 
 pytestmark = pytest.mark.long
 
