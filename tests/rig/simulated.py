@@ -1,5 +1,7 @@
 """Small protocols and sessions on the simulated rig that several tests share."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,8 +10,9 @@ from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import STATUS_ARMED
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import Board, SimulatedTransport
+from rig.bench.session import Session
 from rig.configuration.config import Config, load_config
-from rig.protocols.protocol import Protocol
+from rig.protocols.protocol import Protocol, protocol_toml
 from rig.simulation.logger import open_simulated_logger
 
 
@@ -28,6 +31,19 @@ def simulated(**simulation: object) -> Config:
 def transport(config: Config) -> SimulatedTransport:
     """A transport to the configured simulated rig."""
     return open_simulated_logger(config.simulation, watchdog_s=config.safety.watchdog_s)
+
+
+def session(config: Config | None = None) -> Session:
+    """A session on the simulated rig, by default on the plain board."""
+    config = config or simulated()
+    return Session(config, transport(config))
+
+
+def protocol_file(folder: Path, *, runs: int = 1, duration_s: float = 1.0) -> Path:
+    """Write a protocol of a few short runs; return its path."""
+    path = folder / "short.toml"
+    path.write_text(protocol_toml(short_protocol(runs, duration_s)))
+    return path
 
 
 class Wrapped:

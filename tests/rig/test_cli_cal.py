@@ -9,8 +9,7 @@ import pytest
 from calibration.record import Validity
 from calibration.store import CalibrationStore
 from rig.configuration.config import SIMULATED, load_config
-from rig.protocols.protocol import protocol_toml
-from tests.rig.simulated import short_protocol
+from tests.rig.simulated import protocol_file
 
 pytestmark = pytest.mark.integration
 
@@ -47,8 +46,7 @@ def added(rig, tmp_path):
 @pytest.fixture
 def log(rig, tmp_path):
     """The log of one short run."""
-    (tmp_path / "short.toml").write_text(protocol_toml(short_protocol(1)))
-    rig("record -p", tmp_path / "short.toml", "--out", tmp_path / "runs")
+    rig("record -p", protocol_file(tmp_path), "--out", tmp_path / "runs")
     (log,) = (tmp_path / "runs").glob("*.mcap")
     return log
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rig.bench.session import Session
-from rig.cli.main import main
 from rig.errors import SafetyTripError
 from rig.live.estimator import ModelEstimator
 from rig.live.grip import hold_grip
@@ -15,23 +14,20 @@ from tests.rig.simulated import is_armed, simulated, transport
 pytestmark = pytest.mark.integration
 
 
-def test_a_torque_is_held_by_the_estimate_and_the_sensor_agrees(capsys):
-    assert main(["grip", "--torque", "0.06", "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
+def test_a_torque_is_held_by_the_estimate_and_the_sensor_agrees(answered):
+    said = answered("grip --torque 0.06")
     assert said["estimate_n_m"] == pytest.approx(0.06, abs=0.003)
     assert abs(said["sensor_n_m"] - 0.06) < said["half_width95_n_m"]
     assert [p["time_s"] for p in said["periods"]] == sorted(p["time_s"] for p in said["periods"])
 
 
 @pytest.mark.parametrize("torque", ["1.0", "0", "-0.1", "nan"])
-def test_a_torque_beyond_the_limits_is_refused(torque, capsys):
-    assert main(["grip", "--torque", torque, "--duration", "8"]) == 2
-    assert "cannot be held" in capsys.readouterr().err
+def test_a_torque_beyond_the_limits_is_refused(torque, said):
+    assert "cannot be held" in said("grip --duration 8 --torque", torque, code=2).err
 
 
-def test_a_torque_the_load_cannot_give_is_reported(capsys):
-    assert main(["grip", "--torque", "0.3", "--duration", "12"]) == 1
-    assert "not reached" in capsys.readouterr().out
+def test_a_torque_the_load_cannot_give_is_reported(said):
+    assert "not reached" in said("grip --torque 0.3 --duration 12", code=1).out
 
 
 class Constant:
@@ -65,9 +61,8 @@ def test_the_load_stays_within_its_share_and_is_off_at_the_end():
     assert last.columns["load_command_a"][-1] == 0.0
 
 
-def test_a_torque_there_was_no_time_for_is_not_called_held(capsys):
-    assert main(["grip", "--torque", "0.06", "--duration", "8", "--json"]) == 1
-    out, err = capsys.readouterr()
+def test_a_torque_there_was_no_time_for_is_not_called_held(said):
+    out, err = said("grip --torque 0.06 --duration 8 --json", code=1)
     assert not json.loads(out)["is_reached"]
     assert "longer --duration" in err
 
@@ -93,12 +88,11 @@ def test_the_load_follows_samples_within_the_estimators_range_alone():
     assert held[-1].estimate_n_m == pytest.approx(0.05, abs=0.005)
 
 
-def test_an_estimator_that_is_never_within_its_range_moves_no_load(capsys, monkeypatch):
+def test_an_estimator_that_is_never_within_its_range_moves_no_load(said, monkeypatch):
     never = property(lambda self: np.zeros(len(self.last), bool))
     monkeypatch.setattr(ModelEstimator, "inside", never)
     push = ModelEstimator.push
     monkeypatch.setattr(
         ModelEstimator, "push", lambda self, c, t: setattr(self, "last", t) or push(self, c, t)
     )
-    assert main(["grip", "--torque", "0.05", "--duration", "8"]) == 1
-    assert "never within" in capsys.readouterr().out
+    assert "never within" in said("grip --torque 0.05 --duration 8", code=1).out

@@ -2,15 +2,20 @@
 
 import io
 import json
+import os
 import re
+import signal
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from rig.bench.interrupts import leaving_safely
 from rig.errors import SafetyTripError
-from rig.live.block import DeviceStatus
+from rig.live.block import DeviceStatus, SampleBlock
 from rig.live.keys import DisplayKeys
 from rig.live.options import ShowOptions
 from rig.live.show import show
@@ -167,3 +172,19 @@ def test_keys_of_the_display_do_not_reach_the_rig():
     keys = DisplayKeys(iter(["tc?m"]).__next__)
     assert keys() == "tm"
     assert (keys.chosen, keys.helps) == (1, True)
+
+
+def swallowed() -> Iterator[SampleBlock]:
+    """Yield blocks for ever; the signal's exception is lost once, as in a compiled callback."""
+    with leaving_safely():
+        yield block(0, 1)
+        with suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGTERM)
+        for k in range(1, 1000):
+            yield block(10 * k, 1)
+
+
+def test_a_request_that_was_lost_in_a_callback_ends_the_display():
+    console = Console(file=io.StringIO(), width=100)
+    summary = show(swallowed(), ShowOptions("x", plain=True), console)
+    assert summary.ended == "interrupted"

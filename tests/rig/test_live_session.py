@@ -7,7 +7,6 @@ import pytest
 
 from estimation import model_file
 from estimation.rest import in_motion
-from rig.cli.main import main
 from rig.configuration.config import load_config
 from rig.live.block import through
 from rig.live.estimator import ModelEstimator
@@ -64,9 +63,9 @@ def test_the_shipped_model_is_live_as_good_as_its_file_states():
     assert np.sqrt(np.mean(error[moving] ** 2)) < 1.5 * stated.rmse_with_means
 
 
-def test_the_command_shows_an_estimate_in_every_frame(capsys):
-    assert main(["live", "--json", "--pace", "0", "--duration", "4"]) == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    frames = [line for line in lines if line["kind"] == "frame"]
+def test_the_command_shows_an_estimate_in_every_frame(said):
+    printed = said("live --json --pace 0 --duration 4").out
+    *frames, last = (json.loads(line) for line in printed.splitlines())
+    assert {frame["kind"] for frame in frames} == {"frame"}
     assert all(f["channels"]["distal_torque_n_m"]["estimate"] is not None for f in frames[10:])
-    assert lines[-1]["summary"]["lost"] == 0
+    assert last["summary"]["lost"] == 0

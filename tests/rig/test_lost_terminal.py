@@ -8,17 +8,9 @@ from collections.abc import Callable
 import pytest
 
 from rig.log.reader import read_log
+from tests.rig.simulated import protocol_file
 
 pytestmark = [pytest.mark.integration, pytest.mark.usefixtures("hang_up_is_heard")]
-
-PROTOCOL = """
-name = "long"
-[[runs]]
-kind = "sine"
-frequencies_hz = [0.1]
-loads_a = [0.1]
-duration_s = 2000.0
-"""
 
 
 class Typed:
@@ -41,13 +33,12 @@ class Typed:
 
 
 def test_recording_closes_its_log_and_the_rig_is_safe(tmp_path):
-    (tmp_path / "long.toml").write_text(PROTOCOL)
     out = tmp_path / "campaign"
-    command = Typed("record", "-p", str(tmp_path / "long.toml"), "-o", str(out))
+    protocol = protocol_file(tmp_path, duration_s=2000.0)
+    command = Typed("record", "-p", str(protocol), "-o", str(out))
     assert command.close_terminal(lambda _: bool(list(out.glob("*.part")))) == 130
     (path,) = out.glob("*.mcap*")
-    end = read_log(path).end
-    assert not end.clean
+    assert not read_log(path).end.clean
 
 
 def test_the_display_ends_as_ctrl_c_ends_it():

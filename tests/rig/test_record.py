@@ -8,14 +8,13 @@ import pytest
 
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.session import Session
-from rig.cli.main import main
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 from rig.log.check import Verdict, check_log
 from rig.log.reader import read_log
 from rig.log.streams import COUNTS, SAMPLE
 from rig.recording.campaign import open_campaign_folder, record_campaign
-from tests.rig.simulated import Wrapped, short_protocol, simulated, transport
+from tests.rig.simulated import Wrapped, protocol_file, short_protocol, simulated, transport
 
 pytestmark = pytest.mark.integration
 
@@ -36,14 +35,8 @@ def folder(tmp_path_factory):
 
 def test_a_campaign_is_one_whole_log_a_run(folder):
     logs = sorted(folder.glob("*.mcap"))
-    assert [log.stem for log in logs] == [
-        "000-sine-1Hz-0.1A",
-        "001-sine-1Hz-0.2A",
-        "002-sine-1Hz-0.3A",
-    ]
-    for log in logs:
-        report = check_log(log)
-        assert report.verdict is Verdict.COMPLETE
+    assert [log.stem for log in logs] == [f"00{k}-sine-1Hz-0.{k + 1}A" for k in range(3)]
+    assert {check_log(log).verdict for log in logs} == {Verdict.COMPLETE}
     assert not list(folder.glob("*.part"))
 
 
@@ -106,18 +99,14 @@ def test_an_aborted_campaign_resumes_and_loses_nothing(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         record(tmp_path, on_progress=abort)
     first = (tmp_path / "000-sine-1Hz-0.1A.mcap").read_bytes()
-    aborted = [p for p in tmp_path.iterdir() if p.name.startswith("001")]
-    assert len(aborted) == 1
-    kept = read_log(aborted[0], tolerant=True).topics[COUNTS]
+    (aborted,) = tmp_path.glob("001*")
+    kept = read_log(aborted, tolerant=True).topics[COUNTS]
     results = record(tmp_path, resume=True)
     assert [r.name[:3] for r in results] == ["001", "002"]
     assert (tmp_path / "000-sine-1Hz-0.1A.mcap").read_bytes() == first
     assert len(kept) >= 400
-    assert any(
-        read_log(p, tolerant=True).topics[COUNTS].rows.size == kept.rows.size
-        for p in tmp_path.iterdir()
-        if p.name.startswith("001") and "aborted" in p.name
-    )
+    (aborted,) = tmp_path.glob("001*aborted*")
+    assert len(read_log(aborted, tolerant=True).topics[COUNTS]) == len(kept)
     assert len(open_campaign(tmp_path).evidence) == 3
     assert all(run.started_at_ns for run in open_campaign(tmp_path))
 
@@ -172,26 +161,18 @@ def test_a_drifting_sensor_is_reported(tmp_path):
     assert "drifted" in read_log(result.path).end.drift_verdict
 
 
-def test_the_command_records_and_reports_what_next(tmp_path, capsys):
-    protocol = tmp_path / "p.toml"
-    protocol.write_text(
-        'name = "tiny"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2]\n'
-        "duration_s = 0.5\n"
-    )
+def test_the_command_records_and_reports_what_next(tmp_path, said, answered):
     out = tmp_path / "out"
-    words = ["record", "-p", str(protocol), "-o", str(out), "--json"]
-    assert main(words) == 0
-    captured = capsys.readouterr()
+    words = ("record --json -p", protocol_file(tmp_path, duration_s=0.5), "-o", out)
+    captured = said(*words)
     told = json.loads(captured.out)
     assert told["runs"][0]["samples"] == 500
     assert told["look_at"] == []
     assert "rig log check" in captured.err
-    assert main(words) == 2
-    assert "rig record --resume" in capsys.readouterr().err
-    assert main(["record", "--resume", str(out), "--seed", "3"]) == 2
-    assert "goes on as the campaign was begun" in capsys.readouterr().err
-    (out / "000-sine-1Hz-0.2A.mcap").unlink()
-    assert main(["record", "--resume", str(out), "--json"]) == 0
-    assert [run["samples"] for run in json.loads(capsys.readouterr().out)["runs"]] == [500]
-    assert main(["record", "--resume", str(tmp_path)]) == 2
-    assert "holds no campaign" in capsys.readouterr().err
+    assert "rig record --resume" in said(*words, code=2).err
+    printed = said("record --seed 3 --resume", out, code=2).err
+    assert "goes on as the campaign was begun" in printed
+    (out / "000-sine-1Hz-0.1A.mcap").unlink()
+    again = answered("record --resume", out)
+    assert [run["samples"] for run in again["runs"]] == [500]
+    assert "holds no campaign" in said("record --resume", tmp_path, code=2).err

@@ -1,4 +1,4 @@
-"""`rig reference` on the firmware core: a restarted board arms only after it."""
+"""`rig reference` on the firmware core: a restarted board arms only after it and ends a session."""
 
 import dataclasses
 from io import StringIO
@@ -13,7 +13,7 @@ from drivers.teensy.protocol import STATUS_REFERENCED, Kind, Result
 from drivers.teensy.reference import Limits
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.session import Session
-from rig.cli.main import main
+from rig.bench.trips import BoardResetError
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.places import JAW_ANGLE, SPINDLE_ANGLE
 from tests.drivers.raw_host import RawHost
@@ -37,17 +37,16 @@ def played(board: FirmwareBoard) -> float:
         return max(abs(session.spindle_angle_rad - 0.3) for _ in session.play(*STILL))
 
 
-def test_a_restarted_board_moves_only_after_the_command(restarted, capsys):
+def test_a_restarted_board_moves_only_after_the_command(restarted, answered):
     with pytest.raises(CommandRefusedError, match="Run: rig reference"):
         played(restarted)
-    assert main(["reference", "--sim", "--yes", "--at", "0.3", "--json"]) == 0
-    assert '"boot": 9' in capsys.readouterr().out
+    assert answered("reference --sim --yes --at 0.3")["boot"] == 9
     assert played(restarted) < 0.02
 
 
-def test_without_a_confirmation_nothing_is_referenced(restarted, monkeypatch):
+def test_without_a_confirmation_nothing_is_referenced(restarted, monkeypatch, said):
     monkeypatch.setattr("sys.stdin", StringIO("n\n"))
-    assert main(["reference", "--sim"]) == 130
+    said("reference --sim", code=130)
     with pytest.raises(CommandRefusedError, match="Run: rig reference"):
         played(restarted)
 
@@ -55,38 +54,31 @@ def test_without_a_confirmation_nothing_is_referenced(restarted, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["-c", "canopen"], "no board to reference"),
-        (["--sim", "--at", "0", "--at", "1"], "spindle_angle_rad"),
-        (["-c", "grasper", "--at", "0"], "yaw_angle_rad, jaw_1_angle_rad, jaw_2_angle_rad"),
+        ("-c canopen", "no board to reference"),
+        ("--sim --at 0 --at 1", "spindle_angle_rad"),
+        ("-c grasper --at 0", "yaw_angle_rad, jaw_1_angle_rad, jaw_2_angle_rad"),
     ],
 )
-def test_a_place_that_does_not_fit_the_rig_is_refused(words, message, capsys):
-    assert main(["reference", "--yes", *words]) == 2
-    assert message in capsys.readouterr().err
+def test_a_place_that_does_not_fit_the_rig_is_refused(words, message, said):
+    assert message in said("reference --yes", words, code=2).err
 
 
-def test_the_index_stands_for_the_mark(restarted, capsys):
-    words = ["reference", "--sim", "--index", "--at", "0.3"]
-    assert main(words) != 0
-    assert "through its index" in capsys.readouterr().err
+def test_the_index_stands_for_the_mark(restarted, said):
+    words = "reference --sim --index --at 0.3"
+    assert "through its index" in said(words, code=3).err
     restarted.index()
-    assert main(words) == 0
+    said(words)
     assert played(restarted) < 0.02
 
 
-def driven(*words: str) -> int:
-    """Run the command with a hard stop against the board."""
-    return main(["reference", "--sim", "--yes", *words])
-
-
 @pytest.mark.parametrize("stop", ["closed", "open"])
-def test_a_gentle_drive_finds_the_same_stop_from_two_places(library, monkeypatch, stop):
+def test_a_gentle_drive_finds_the_same_stop_from_two_places(library, monkeypatch, stop, said):
     found_rad = []
     for start_count in (900, 300):
         bench = SimulatedBench(start_count=start_count)
         board = FirmwareBoard(bench, BoardStart(boot=9, simulated=False), library)
         monkeypatch.setattr(OPENS, lambda config, b=board: SimulatedTransport(b, "sim://"))
-        assert driven("--hard-stop", stop, "--at", "0") == 0
+        said("reference --sim --yes --at 0 --hard-stop", stop)
         found_rad.append(bench.state[SPINDLE_ANGLE])
         assert not board.in_force
     assert abs(found_rad[0] - found_rad[1]) < 0.02
@@ -94,10 +86,10 @@ def test_a_gentle_drive_finds_the_same_stop_from_two_places(library, monkeypatch
     assert abs(bench.state[JAW_ANGLE] - stands) < 0.05
 
 
-def test_a_shaft_that_does_not_turn_is_no_stop(restarted, capsys):
-    assert driven("--hard-stop", "closed") == 0
-    assert driven("--hard-stop", "closed") == 2
-    assert "did not turn" in capsys.readouterr().err
+def test_a_shaft_that_does_not_turn_is_no_stop(restarted, said):
+    words = "reference --sim --yes --hard-stop closed"
+    said(words)
+    assert "did not turn" in said(words, code=2).err
 
 
 def test_a_board_without_reference_moves_only_gently(library):
@@ -111,3 +103,36 @@ def test_a_board_without_reference_moves_only_gently(library):
     assert host.arm(dataclasses.replace(gentle, seek=1)) is Result.OK
     host.run(5)
     assert not host.samples()["status"][-1] & STATUS_REFERENCED
+
+
+class BoardThatIsReset:
+    """Implements `drivers.transport.simulated.Board`: a board, and another start of it later."""
+
+    def __init__(self, library: Path, reset_at_tick: int) -> None:
+        self._bench, self._library = SimulatedBench(), library
+        self._board = FirmwareBoard(self._bench, BoardStart(boot=4), library)
+        self._left = reset_at_tick
+
+    def receive(self, data: bytes) -> None:
+        self._board.receive(data)
+
+    def transmit(self) -> bytes:
+        return self._board.transmit()
+
+    def advance(self, ticks: int) -> None:
+        if 0 < self._left <= ticks:
+            self._board = FirmwareBoard(
+                self._bench, BoardStart(boot=5, simulated=False), self._library
+            )
+        self._left -= ticks
+        self._board.advance(ticks)
+
+
+def test_a_session_detects_that_its_board_was_reset_and_reports_what_to_do(library):
+    link = SimulatedTransport(BoardThatIsReset(library, 800), "sim://")
+    with Session(simulated(), link) as session:
+        assert session.board["board_start"] == "4"
+        readings = session.rest(5.0)
+        with pytest.raises(BoardResetError, match="rig reference") as caught:
+            list(readings)
+    assert "is 5 and was 4" in caught.value.why

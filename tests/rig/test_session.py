@@ -16,9 +16,9 @@ from drivers.teensy.protocol import (
 from drivers.transport.simulated import SimulatedTransport
 from estimation.recording import Flag
 from rig.bench.session import LoggerStalledError, Session
-from rig.errors import ExitCode, SafetyTripError, exit_code_of
+from rig.errors import SafetyTripError
 from rig.machines.reading import reading_of, with_setpoints
-from tests.rig.simulated import Wrapped, is_armed, simulated, transport
+from tests.rig.simulated import Wrapped, is_armed, session, simulated, transport
 
 pytestmark = pytest.mark.integration
 
@@ -27,30 +27,27 @@ LOAD = np.full(600, 0.3)
 
 
 def test_rest_reads_a_disarmed_rig_in_si_units():
-    config = simulated()
-    with Session(config, transport(config)) as session:
-        reading = next(session.rest(0.2))
+    with session() as rig:
+        reading = next(rig.rest(0.2))
     assert not reading.armed
-    assert set(reading.columns) == set(config.calibration_set().channels)
+    assert set(reading.columns) == set(simulated().calibration_set().channels)
     np.testing.assert_allclose(np.diff(reading.time_s), 1e-3)
     assert (reading.setpoint == -1).all()
 
 
 def test_zeros_are_taken_from_what_is_read_after():
-    config = simulated()
-    with Session(config, transport(config)) as session:
-        offset = np.mean([r.columns["proximal_torque_n_m"].mean() for r in session.rest(0.5)])
-        session.take_zeros(0.5)
-        zeroed = np.mean([r.columns["proximal_torque_n_m"].mean() for r in session.rest(0.5)])
+    with session() as rig:
+        offset = np.mean([r.columns["proximal_torque_n_m"].mean() for r in rig.rest(0.5)])
+        rig.take_zeros(0.5)
+        zeroed = np.mean([r.columns["proximal_torque_n_m"].mean() for r in rig.rest(0.5)])
     assert abs(offset) > 5e-3  # the simulated sensor has an offset
     assert abs(zeroed) < 5e-4
 
 
 def test_every_setpoint_is_played_once_and_in_order():
-    config = simulated()
     angle = np.linspace(-1.0, -0.6, 1000)
-    with Session(config, transport(config)) as session:
-        readings = list(session.play(angle, np.zeros(1000)))
+    with session() as rig:
+        readings = list(rig.play(angle, np.zeros(1000)))
     setpoint = np.concatenate([r.setpoint for r in readings])
     target = np.concatenate([r.columns["target_angle_rad"] for r in readings])
     played = setpoint[setpoint >= 0]
@@ -84,26 +81,15 @@ def test_sigterm_and_a_lost_terminal_take_the_way_out_of_ctrl_c(number):
     assert signal.getsignal(number) is before
 
 
-def test_a_crossed_limit_disarms_and_reports_which(library):
-    config = simulated(firmware=True).changed(limits={"proximal_torque_n_m": 0.05})
-    link = transport(config)
-    with Session(config, link) as session:
-        with pytest.raises(SafetyTripError, match=r"limit|proximal_torque_n_m") as trip:
-            list(session.play(np.linspace(-1.0, 0.0, 1500), np.full(1500, 0.9)))
-        assert not next(session.watch()).armed
-    assert exit_code_of(trip.value) == ExitCode.SAFETY
-
-
 @pytest.mark.parametrize(
     ("angle", "load", "name"),
     [(9.0, 0.0, "spindle_angle_rad"), (-1.0, 5.0, "load_command_a"), (np.nan, 0.0, "spindle")],
 )
 def test_a_trajectory_beyond_the_limits_is_refused_before_anything_moves(angle, load, name):
-    config = simulated()
-    with Session(config, transport(config)) as session:
+    with session() as rig:
         with pytest.raises(SafetyTripError, match=name):
-            next(session.play(np.full(10, angle), np.full(10, load)))
-        assert not next(session.watch()).armed
+            next(rig.play(np.full(10, angle), np.full(10, load)))
+        assert not next(rig.watch()).armed
 
 
 def test_a_silent_logger_is_named_within_a_second():
@@ -164,24 +150,22 @@ def test_a_late_host_causes_flagged_samples_not_wrong_ones():
 
 
 def test_what_the_board_complains_of_becomes_a_flag():
-    config = simulated()
-    with Session(config, transport(config)) as session:
-        counts = next(session.rest(0.1)).counts
+    with session() as rig:
+        counts = next(rig.rest(0.1)).counts
     counts["status"][:3] |= STATUS_SATURATED
     counts["status"][3] |= STATUS_LIMIT_TRIPPED
     batch = SampleBatch(counts, np.arange(len(counts)) * 1000, 0)
-    reading = reading_of(batch, config.calibration_set(), {}, 0)
+    reading = reading_of(batch, simulated().calibration_set(), {}, 0)
     assert reading.flags[:5].tolist() == [Flag.SATURATED] * 3 + [Flag.SUSPECT, 0]
 
 
 def test_setpoints_are_numbered_past_samples_lost_between_two_readings():
-    config = simulated()
-    with Session(config, transport(config)) as session:
-        counts = next(session.rest(0.1)).counts[:6]
+    with session() as rig:
+        counts = next(rig.rest(0.1)).counts[:6]
     counts["status"] = [0, STATUS_ARMED, STATUS_ARMED, STATUS_ARMED, STATUS_ARMED, STATUS_QUEUE_DRY]
     counts["sequence"] = [10, 11, 12, 15, 16, 17]
     batch = SampleBatch(counts, np.arange(6) * 1000, 0)
-    reading = reading_of(batch, config.calibration_set(), {}, 0)
+    reading = reading_of(batch, simulated().calibration_set(), {}, 0)
     first = with_setpoints(reading, 0, 100, None)
     assert first.setpoint.tolist() == [-1, 0, 1, 4, 5, -1]
     assert first.flags.tolist() == [0, 0, 0, 0, 0, Flag.STALE]

@@ -1,6 +1,5 @@
 """The residual watch where it is used: while recording, and on a live or replayed stream."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +8,6 @@ import pytest
 from estimation import model_file
 from estimation.fitting import fit
 from estimation.recording import Recording
-from rig.bench.session import Session
-from rig.cli.main import main
 from rig.diagnosis.subject import declared_models
 from rig.importers.registry import open_campaign
 from rig.live.block import through
@@ -20,7 +17,7 @@ from rig.live.status import FitStatus
 from rig.recording.campaign import open_campaign_folder, record_campaign
 from rig.recording.watch import watch_runs
 from tests.estimation import synthetic
-from tests.rig.simulated import short_protocol, simulated, transport
+from tests.rig.simulated import protocol_file, session, short_protocol, simulated
 
 pytestmark = pytest.mark.integration
 
@@ -30,8 +27,8 @@ SHORT = short_protocol(5, duration_s=3.0)
 def record(folder: Path, **simulation) -> list[Path]:
     config = simulated(**simulation)
     plans = open_campaign_folder(folder, SHORT, config, resume=False)
-    with Session(config, transport(config)) as session:
-        return [result.path for result in record_campaign(session, plans, folder)]
+    with session(config) as rig:
+        return [result.path for result in record_campaign(rig, plans, folder)]
 
 
 @pytest.fixture(scope="module")
@@ -58,15 +55,11 @@ def test_an_effect_that_begins_at_a_run_is_dated_to_it(model, tmp_path):
     assert told["since"].startswith("000")
 
 
-def test_record_reports_the_result_of_the_monitor(model, tmp_path, capsys):
-    out = tmp_path / "logs"
-    protocol = tmp_path / "one.toml"
-    table = 'kind = "sine"\nfrequencies_hz = [1.0]\nloads_a = [0.2, 0.3]\nduration_s = 2.0\n'
-    protocol.write_text(f'name = "one"\n[[runs]]\n{table}')
-    words = ["record", "-p", str(protocol), "-o", str(out), "--model", str(model), "--json"]
-    assert main(words) == 0
-    said = json.loads(capsys.readouterr().out)
-    (watched,) = said["models"]
+def test_record_reports_the_result_of_the_monitor(model, tmp_path, answered):
+    protocol = protocol_file(tmp_path, runs=2, duration_s=2.0)
+    (watched,) = answered("record -p", protocol, "-o", tmp_path / "logs", "--model", model)[
+        "models"
+    ]
     assert watched["fits"] is True
     assert len(watched["runs"]) == 2
 
