@@ -8,18 +8,12 @@ from estimation.recording import FloatArray
 
 AXIS = """
 schema = "rig.machine/1"
+axis = [{ name = "gantry", unit = "m" }]
+actuator = [{ name = "pwm_ratio", axis = "gantry" }]
 
 [machine]
 name = "plotter"
 run_offsets = false
-
-[[axis]]
-name = "gantry"
-unit = "m"
-
-[[actuator]]
-name = "pwm_ratio"
-axis = "gantry"
 
 [[sensor]]
 name = "gantry_position_m"
@@ -28,28 +22,23 @@ reads = "position"
 counts = 20000
 
 [data]
+runs = { lap_s = 4.0 }
 [data.columns]
 time_s = "t:ms"
 pwm_ratio = "pwm:1/255"
 gantry_position_m = "x:mm"
-
-[data.runs]
-lap_s = 4.0
 """
 
 DRIVE = """
 schema = "rig.machine/1"
-
-[machine]
-name = "bench drive"
-
-[[axis]]
-name = "input"
-unit = "rad"
-
-[[axis]]
-name = "output"
-unit = "rad"
+machine = { name = "bench drive" }
+axis = [{ name = "input", unit = "rad" }, { name = "output", unit = "rad" }]
+actuator = [{ name = "drive_current_a", axis = "input" }]
+sensor = [
+  { name = "input_angle_rad", axis = "input", reads = "position", counts = 1304 },
+  { name = "output_angle_rad", axis = "output", reads = "position", counts = 2608 },
+  { name = "cell_torque_n_m", axis = "output", reads = "effort", noise = 0.01 },
+]
 
 [[transmission]]
 name = "belt"
@@ -58,87 +47,40 @@ output = "output"
 ratio = RATIO
 compliant = true
 
-[[actuator]]
-name = "drive_current_a"
-axis = "input"
-
-[[sensor]]
-name = "input_angle_rad"
-axis = "input"
-reads = "position"
-counts = 1304
-
-[[sensor]]
-name = "output_angle_rad"
-axis = "output"
-reads = "position"
-counts = 2608
-
-[[sensor]]
-name = "cell_torque_n_m"
-axis = "output"
-reads = "effort"
-noise = 0.01
-
 [data]
 files = "*.csv"
-
+runs = { changes = ["trial"] }
 [data.columns]
 time_s = "t"
 input_angle_rad = "q_in:deg"
 output_angle_rad = "q_out:deg"
 drive_current_a = "i:mA"
 cell_torque_n_m = "cell:N m"
-
-[data.runs]
-changes = ["trial"]
 """
 """`RATIO` stands for the ratio."""
 
 
 ARM = """
 schema = "rig.machine/1"
+machine = { name = "two link arm", run_offsets = false, cutoff_hz = 10.0 }
+axis = [{ name = "shoulder", unit = "rad" }, { name = "elbow", unit = "rad" }]
+actuator = [
+  { name = "shoulder_torque_n_m", axis = "shoulder" },
+  { name = "elbow_torque_n_m", axis = "elbow" },
+]
+sensor = [
+  { name = "shoulder_angle_rad", axis = "shoulder", reads = "position" },
+  { name = "elbow_angle_rad", axis = "elbow", reads = "position" },
+]
 
-[machine]
-name = "two link arm"
-run_offsets = false
-cutoff_hz = 10.0
-
-[[axis]]
-name = "shoulder"
-unit = "rad"
-
-[[axis]]
-name = "elbow"
-unit = "rad"
-
-[[actuator]]
-name = "shoulder_torque_n_m"
-axis = "shoulder"
-
-[[actuator]]
-name = "elbow_torque_n_m"
-axis = "elbow"
-
-[[sensor]]
-name = "shoulder_angle_rad"
-axis = "shoulder"
-reads = "position"
-
-[[sensor]]
-name = "elbow_angle_rad"
-axis = "elbow"
-reads = "position"
-
+[data]
+runs = { changes = ["run"] }
 [data.columns]
 time_s = "t"
 shoulder_torque_n_m = "tau1"
 elbow_torque_n_m = "tau2"
 shoulder_angle_rad = "q1"
 elbow_angle_rad = "q2"
-
-[data.runs]
-changes = ["run"]
 """
 
 

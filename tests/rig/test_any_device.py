@@ -21,7 +21,6 @@ from drivers.transport.faulty import Faults
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
-from rig.cli.main import main
 from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError, UsageError
 from rig.log.reader import read_log
@@ -42,8 +41,7 @@ class Rig:
     def __init__(self, name: str, **changes: object) -> None:
         make_fake, make_device = DRIVES[name]
         self.fake = make_fake()
-        self.link = SimulatedTransport(self.fake)
-        self.device = make_device(self.link)
+        self.device = make_device(SimulatedTransport(self.fake))
         self.config: Config = load_config(Path(f"{name}_simulated")).changed(**changes)
 
     @property
@@ -51,6 +49,9 @@ class Rig:
         if isinstance(self.fake, DynamixelFake):
             return self.fake.in_force
         return bool(self.fake.mode)  # 0 is stopped
+
+    def session(self) -> Session:
+        return Session(self.config, open_logger(self.config))
 
 
 @pytest.fixture
@@ -69,7 +70,7 @@ def moving(session: Session, seconds: float = 2.0, travel_rad: float = 0.4):
 
 
 @pytest.mark.parametrize("name", sorted(fakes()))
-def test_every_driver_is_recorded_and_shown(name, tmp_path, capsys):
+def test_every_driver_is_recorded_and_shown(name, tmp_path, said, answered):
     lines = ""
     if name in COUNTED:
         lines = f'[channels.shaft_rad]\ncounts = "{COUNTED[name]}"\nslope = 1e-3\n'
@@ -81,10 +82,8 @@ def test_every_driver_is_recorded_and_shown(name, tmp_path, capsys):
     (tmp_path / "short.toml").write_text(
         'name = "short"\n[[runs]]\nkind = "rest"\nduration_s = 1.0\n'
     )
-    rig = ("-c", str(tmp_path / "rig.toml"))
-    protocol = ("-p", str(tmp_path / "short.toml"))
-    assert main(["record", *rig, *protocol, "-o", str(tmp_path / "runs"), "--json"]) == 0
-    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    rig, protocol = ("-c", tmp_path / "rig.toml"), ("-p", tmp_path / "short.toml")
+    (run,) = answered("record", *rig, *protocol, "-o", tmp_path / "runs")["runs"]
     assert run["samples"] == run["expected"]
     log = read_log(Path(run["path"]))
     columns = log.topics[SAMPLE].rows
@@ -97,16 +96,16 @@ def test_every_driver_is_recorded_and_shown(name, tmp_path, capsys):
     assert (columns["flags"] == 0).all()
     time_s = columns["time_s"]
     assert time_s[-1] - time_s[0] == pytest.approx(1.0, abs=1.5 * np.diff(time_s).max())
-    assert main(["live", *rig, "--duration", "0.3", "--pace", "0", "--json"]) == 0
-    said = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert said[-1]["summary"]["lost"] == 0
-    assert set(said[0]["channels"]) <= set(named)
+    printed = said("live --duration 0.3 --pace 0 --json", *rig).out
+    first, *_, last = (json.loads(line) for line in printed.splitlines())
+    assert last["summary"]["lost"] == 0
+    assert set(first["channels"]) <= set(named)
 
 
 @pytest.mark.parametrize("name", sorted(DRIVES))
 def test_a_drive_follows_its_target_and_gives_all_that_it_measures(rig_of, name):
     rig = rig_of(name)
-    with Session(rig.config, open_logger(rig.config)) as session:
+    with rig.session() as session:
         next(session.rest(0.1))
         readings = list(moving(session))
         assert rig.in_force
@@ -120,43 +119,30 @@ def test_a_drive_follows_its_target_and_gives_all_that_it_measures(rig_of, name)
     assert not rig.in_force
 
 
-def broken(session: Session, rig: Rig) -> None:
-    raise RuntimeError("a mistake in the program")
-
-
-def interrupted(session: Session, rig: Rig) -> None:
-    raise KeyboardInterrupt
-
-
-def terminated(session: Session, rig: Rig) -> None:
-    os.kill(os.getpid(), signal.SIGTERM)
-
-
-def left_alone(session: Session, rig: Rig) -> None:
-    """Nothing goes wrong; the caller has seen enough."""
+def raised(error: BaseException) -> None:
+    raise error
 
 
 WAYS_OUT = {
-    broken: RuntimeError,
-    interrupted: KeyboardInterrupt,
-    terminated: (KeyboardInterrupt, SystemExit),
-    left_alone: StopIteration,
+    "a mistake in the program": (lambda: raised(RuntimeError()), RuntimeError),
+    "ctrl-c": (lambda: raised(KeyboardInterrupt()), KeyboardInterrupt),
+    "sigterm": (lambda: os.kill(os.getpid(), signal.SIGTERM), (KeyboardInterrupt, SystemExit)),
+    "enough seen": (lambda: raised(StopIteration()), StopIteration),
 }
 
 
 @pytest.mark.parametrize("name", sorted(DRIVES))
-@pytest.mark.parametrize("way_out", WAYS_OUT, ids=lambda way: way.__name__)
+@pytest.mark.parametrize("way_out", WAYS_OUT)
 def test_no_way_out_leaves_a_motor_in_force(rig_of, name, way_out):
     rig = rig_of(name)
-    with pytest.raises(WAYS_OUT[way_out]), Session(rig.config, open_logger(rig.config)) as session:  # noqa: PT012
+    leave, error = WAYS_OUT[way_out]
+    with pytest.raises(error), rig.session() as session:  # noqa: PT012
         next(session.rest(0.1))
         readings = moving(session)
         next(readings)
         assert rig.in_force
-        way_out(session, rig)
-        for _ in readings:
-            if way_out is left_alone:
-                raise StopIteration
+        leave()
+        list(readings)
     assert not rig.in_force
 
 
@@ -173,7 +159,7 @@ def test_no_way_out_leaves_a_motor_in_force(rig_of, name, way_out):
 def test_the_limits_hold_on_a_drive(rig_of, name, change, message):
     rig = rig_of(name, **change)
     unsafe = pytest.raises((SafetyTripError, DriverError), match=message)
-    with unsafe, Session(rig.config, open_logger(rig.config)) as session:
+    with unsafe, rig.session() as session:
         next(session.rest(0.1))
         list(moving(session, 1.0, 2.0))
     assert not rig.in_force
@@ -183,7 +169,7 @@ def test_the_limits_hold_on_a_drive(rig_of, name, change, message):
 def test_a_drive_that_falls_silent_is_reported_as_unknown(rig_of, name, monkeypatch):
     rig = rig_of(name)
     unsafe = pytest.raises((SafetyTripError, DisarmUnconfirmedError), match="not confirm")
-    with unsafe, Session(rig.config, open_logger(rig.config)) as session:
+    with unsafe, rig.session() as session:
         next(session.rest(0.1))
         for _ in moving(session):
             monkeypatch.setattr(rig.fake, "transmit", lambda: b"")
@@ -192,11 +178,9 @@ def test_a_drive_that_falls_silent_is_reported_as_unknown(rig_of, name, monkeypa
     assert current == 0
 
 
-def test_the_current_of_a_drive_is_calibrated_without_a_torque_sensor(tmp_path, capsys):
-    words = ("--yes", "--operator", "a", "--store", str(tmp_path / "s"), "--json")
-    rig = ("-c", "dynamixel_simulated", "-o", str(tmp_path / "raw"))
-    assert main(["calibrate", "current", *rig, *words]) == 0
-    said = json.loads(capsys.readouterr().out)
+def test_the_current_of_a_drive_is_calibrated_without_a_torque_sensor(tmp_path, answered):
+    words = ("-c dynamixel_simulated --yes --operator a -o", tmp_path / "raw")
+    said = answered("calibrate current", *words, "--store", tmp_path / "s")
     (record,) = said["records"].values()
     assert record["fit"]["parameters"]["gain_a"] == pytest.approx(1.75, rel=0.02)
     # the fake's rotor: 4 units of speed lost for 40 gained a milliampere, 0.229 rpm a unit
@@ -205,22 +189,21 @@ def test_the_current_of_a_drive_is_calibrated_without_a_torque_sensor(tmp_path, 
     assert abs(said["found"]["friction_current_a"]) < 1e-3
 
 
-def test_what_needs_a_motor_is_refused_in_words(tmp_path, capsys):
-    text = 'name = "cell"\ncalibration = "sensor"\n[logger]\ndriver = "{}"\nprofile = "{}"\n'
-    sensor = tmp_path / "sensor.toml"
-    sensor.write_text(text.format("amt21", "sensor") + 'url = "sim://"\n')
-    for command in (["selftest"], ["clear"]):
-        assert main([*command, "-c", str(sensor)]) == 2
-        assert "no motors to arm, stop or test" in capsys.readouterr().err
-    drive = tmp_path / "drive.toml"
+def test_what_needs_a_motor_is_refused_in_words(tmp_path, said):
+    text = 'name = "cell"\ncalibration = "sensor"\n[logger]\nurl = "sim://"\n'
+    text += 'driver = "{}"\nprofile = "{}"\n'
+    path = tmp_path / "rig.toml"
+    path.write_text(text.format("amt21", "sensor"))
+    for command in ("selftest", "clear"):
+        assert "no motors to arm, stop or test" in said(command, "-c", path, code=2).err
     gains = "[controller]\nkp = 1\nki = 0\nkd = 0\nvelocity_filter = 1\n"
     limits = "[limits]\nmotor_current_a = 1\nspindle_angle_rad = 1\n"
-    drive.write_text(text.format("amt21", "drive") + 'url = "sim://"\n' + gains + limits)
+    path.write_text(text.format("amt21", "drive") + gains + limits)
     with pytest.raises(UsageError, match="has no motor"):
-        open_logger(load_config(drive))
-    drive.write_text(text.format("dynamixel", "drive") + 'url = "sim://"\n' + limits)
+        open_logger(load_config(path))
+    path.write_text(text.format("dynamixel", "drive") + limits)
     with pytest.raises(UsageError, match="controller"):
-        load_config(drive)
+        load_config(path)
 
 
 @pytest.mark.parametrize("name", sorted(DRIVES))

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from rig.protocols.protocol import Protocol, protocol_toml
+
 pytest.importorskip("ophyd_async", reason="the extra bluesky is not installed")
 
 from bluesky import plan_stubs, plans, preprocessors
@@ -18,19 +20,14 @@ from rig.recording.bluesky_device import RecordedRuns
 
 pytestmark = pytest.mark.integration
 
-PROTOCOL = """
-name = "short"
-[[runs]]
-kind = "sine"
-frequencies_hz = [1.0]
-loads_a = [0.1, 0.2, 0.3]
-duration_s = 1.0
-[[runs]]
-kind = "sine"
-frequencies_hz = [1.0]
-loads_a = [0.1]
-duration_s = 300.0
-"""
+RUN = {"kind": "sine", "frequencies_hz": [1.0]}
+PROTOCOL = {
+    "name": "short",
+    "runs": [
+        RUN | {"loads_a": [0.1, 0.2, 0.3], "duration_s": 1.0},
+        RUN | {"loads_a": [0.1], "duration_s": 300.0},
+    ],
+}
 
 
 @pytest.fixture
@@ -45,7 +42,7 @@ def engine():
 @pytest.fixture
 def rig(engine, tmp_path):
     protocol = tmp_path / "short.toml"
-    protocol.write_text(PROTOCOL)
+    protocol.write_text(protocol_toml(Protocol.model_validate(PROTOCOL)))
     with init_devices():
         rig = RecordedRuns("simulated", str(protocol), tmp_path / "logs")
     return rig

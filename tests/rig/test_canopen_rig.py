@@ -1,6 +1,5 @@
 """A rig whose motor is an EPOS4: the session and the recorder run on it unchanged."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ from rig.bench.companions import topic
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.canopen.simulated import open_simulated_bus, open_simulated_canopen
-from rig.cli.main import main
 from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError
 from rig.log.check import check_log
@@ -45,9 +43,15 @@ def drive_of(link: LogicLink) -> Epos4Fake:
     return drive
 
 
-def test_the_spindle_follows_its_target_and_the_drive_ends_without_power():
+@pytest.fixture
+def alone() -> tuple[Config, LogicLink]:
+    """A rig without further devices, and the link to it."""
     settings = config(devices={})
-    link = open_simulated_canopen(settings)
+    return settings, open_simulated_canopen(settings)
+
+
+def test_the_spindle_follows_its_target_and_the_drive_ends_without_power(alone):
+    settings, link = alone
     with Session(settings, link) as session:
         next(session.rest(0.1))
         session.settle()
@@ -71,9 +75,8 @@ def test_a_drive_that_was_left_in_force_is_disarmed_by_opening_it():
     assert drive.state is State.SWITCH_ON_DISABLED
 
 
-def test_a_fault_of_the_drive_ends_the_session_in_its_own_words():
-    settings = config(devices={})
-    link = open_simulated_canopen(settings)
+def test_a_fault_of_the_drive_ends_the_session_in_its_own_words(alone):
+    settings, link = alone
     with pytest.raises(DriveFaultError, match=r"2310"), Session(settings, link) as rig:  # noqa: PT012
         for k, _ in enumerate(rig.play(np.full(3000, -1.04), np.zeros(3000))):
             if k == 5:
@@ -99,20 +102,14 @@ def test_the_guards_of_the_board_hold_here_too(change, message):
     assert drive_of(link).state is State.SWITCH_ON_DISABLED
 
 
-def test_load_is_refused_before_anything_moves():
-    settings = config(devices={})
-    with Session(settings, open_simulated_canopen(settings)) as session:  # noqa: SIM117
+def test_load_is_refused_before_anything_moves(alone):
+    with Session(*alone) as session:  # noqa: SIM117
         with pytest.raises(SafetyTripError, match="load_command_a"):
             next(session.play(ANGLE, np.full(600, 0.1)))
 
 
-def silent(receive: Callable[[object], None]) -> Callable[[object], None]:
-    return lambda frame: None
-
-
-def test_a_drive_that_falls_silent_is_missing_and_its_state_unknown(monkeypatch):
-    settings = config(devices={})
-    link = open_simulated_canopen(settings)
+def test_a_drive_that_falls_silent_is_missing_and_its_state_unknown(monkeypatch, alone):
+    settings, link = alone
     unsafe = pytest.raises((SafetyTripError, DriverError), match=r"not confirm")
     with unsafe, Session(settings, link) as session:
         for k, _ in enumerate(session.play(np.full(3000, -1.04), np.zeros(3000))):
@@ -141,20 +138,18 @@ def test_a_campaign_is_recorded_with_the_further_devices_on_the_loggers_time(tmp
         assert (rows["flags"] == 0).all()
 
 
-def test_rig_clear_clears_the_fault_of_the_configured_drive(monkeypatch, capsys):
+def test_rig_clear_clears_the_fault_of_the_configured_drive(monkeypatch, said):
     drive = Epos4Fake()
     drive.fail(0x8130, 0x10)
     monkeypatch.setattr("rig.bench.clearing.open_can", lambda url: SimulatedCanBus([drive], url))
-    assert main(["clear", "-c", "canopen", "--json"]) == 0
-    told = capsys.readouterr()
+    told = said("clear -c canopen --json")
     assert '"code": 33072' in told.out
     assert "heartbeat of the host" in told.err
     assert drive.state is State.SWITCH_ON_DISABLED
-    assert main(["clear", "-c", "canopen"]) == 0
-    assert "nothing is latched" in capsys.readouterr().out
+    assert "nothing is latched" in said("clear -c canopen").out
 
 
-def test_rig_clear_clears_the_trip_of_a_board_by_its_code(monkeypatch, capsys):
+def test_rig_clear_clears_the_trip_of_a_board_by_its_code(monkeypatch, said):
     settings = load_config(Path("simulated"))
     link = open_logger(settings)
     machine = machine_of(settings)
@@ -164,8 +159,7 @@ def test_rig_clear_clears_the_trip_of_a_board_by_its_code(monkeypatch, capsys):
     for _ in range(100):
         logger.read(0.05)  # nobody beats: the watchdog trips
     monkeypatch.setattr("rig.bench.clearing.open_logger", lambda _: link)
-    assert main(["clear", "-c", "simulated"]) == 0
-    told = capsys.readouterr().out
+    told = said("clear -c simulated").out
     assert "received nothing from this computer" in told
     assert "cleared" in told
     assert TeensyLogger(SimulatedTransport(link.board)).trip().code == 0

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from estimation.recording import Recording
-from rig.cli.main import main
 from rig.log.convert import write_recording
 from tests.rig.test_library import MODEL
 
@@ -26,15 +25,17 @@ def campaign(folder, seed, damping):
     return str(folder)
 
 
+@pytest.fixture
+def model(tmp_path):
+    (tmp_path / "axis.toml").write_text(MODEL)
+    return tmp_path / "axis.toml"
+
+
 @pytest.mark.integration
-def test_a_change_is_stated_in_words_and_as_json(tmp_path, capsys):
-    model = tmp_path / "axis.toml"
-    model.write_text(MODEL)
+def test_a_change_is_stated_in_words_and_as_json(tmp_path, model, said):
     before, after = campaign(tmp_path / "a", 1, 5.0), campaign(tmp_path / "b", 2, 6.5)
     third = campaign(tmp_path / "c", 3, 6.5)
-    words = ["diff", before, after, "--model", str(model), "--on", third, "--json"]
-    assert main(words) == 0
-    printed = capsys.readouterr()
+    printed = said("diff", before, after, "--on", third, "--json --model", model)
     answer = json.loads(printed.out)
     assert answer["schema"] == "rig.diff/2"
     (change,) = answer["changes"]
@@ -45,17 +46,13 @@ def test_a_change_is_stated_in_words_and_as_json(tmp_path, capsys):
 
 
 @pytest.mark.integration
-def test_too_few_runs_are_refused(tmp_path, capsys):
-    model = tmp_path / "axis.toml"
-    model.write_text(MODEL)
-    before, after = campaign(tmp_path / "a", 1, 5.0), campaign(tmp_path / "b", 2, 6.5)
-    (tmp_path / "b" / "0.mcap").unlink()
-    (tmp_path / "b" / "1.mcap").unlink()
-    assert main(["diff", before, after, "--model", str(model)]) == 5
-    assert "3 runs, too few to compare" in capsys.readouterr().err
+def test_too_few_runs_are_refused(tmp_path, model, said):
+    words = ("diff", campaign(tmp_path / "a", 1, 5.0), campaign(tmp_path / "b", 2, 6.5), "--model")
+    for name in ("0", "1"):
+        (tmp_path / "b" / f"{name}.mcap").unlink()
+    assert "3 runs, too few to compare" in said(*words, model, code=5).err
     for name in ("2", "3"):
         (tmp_path / "b" / f"{name}.mcap").unlink()
-    assert main(["diff", before, after, "--model", str(model)]) == 5
-    said = capsys.readouterr().err
-    assert "The second campaign has 1 run, too few to compare" in said
-    assert "lap_s under [data.runs]" in said
+    printed = said(*words, model, code=5).err
+    assert "The second campaign has 1 run, too few to compare" in printed
+    assert "lap_s under [data.runs]" in printed

@@ -1,7 +1,7 @@
 """`rig doctor`, `devices`, `udev`, `stop`, `firmware`: what is found, and what to type."""
 
-import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,6 @@ from drivers.teensy.fake_device import HandMovedBench
 from drivers.transport.faulty import Fault, Faults
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench import firmware
-from rig.cli.main import main
 from rig.configuration.config import SHIPPED, load_config
 from rig.doctor.examine import examine
 from rig.doctor.finding import Finding, Level, worst
@@ -82,18 +81,15 @@ class Changed:
 
 
 def stuck(batch: Batch) -> Batch:
-    columns = {**batch.columns, "proximal_count": np.full(len(batch), 5.0)}
-    return Batch(columns, batch.time_s, batch.clock, batch.sequence, batch.flags, batch.lost)
+    return replace(batch, columns={**batch.columns, "proximal_count": np.full(len(batch), 5.0)})
 
 
 def saturated(batch: Batch) -> Batch:
-    flags = batch.flags | np.uint8(SampleFlag.SATURATED)
-    return Batch(batch.columns, batch.time_s, batch.clock, batch.sequence, flags, batch.lost)
+    return replace(batch, flags=batch.flags | np.uint8(SampleFlag.SATURATED))
 
 
 def slow(batch: Batch) -> Batch:
-    time_s = batch.time_s * 1.1
-    return Batch(batch.columns, time_s, batch.clock, batch.sequence, batch.flags, batch.lost)
+    return replace(batch, time_s=batch.time_s * 1.1)
 
 
 @pytest.mark.parametrize(
@@ -114,9 +110,9 @@ def test_what_a_stream_may_have(change, check, level, words):
 
 def test_a_device_that_sends_nothing_is_an_error():
     def nothing(batch: Batch) -> Batch:
+        names = ("time_s", "sequence", "flags")
         empty = {name: values[:0] for name, values in batch.columns.items()}
-        few = (batch.time_s[:0], batch.clock, batch.sequence[:0], batch.flags[:0], batch.lost)
-        return Batch(empty, *few)
+        return replace(batch, columns=empty, **{name: getattr(batch, name)[:0] for name in names})
 
     device = Changed(fakes()["usb520"](Faults()), nothing)
     finding = by_check(device_findings("torque", lambda: device))["sample rate"]
@@ -192,36 +188,22 @@ def test_can_interfaces_are_known_by_their_kind(tmp_path):
     assert can_interfaces(tmp_path) == ["can0"]
 
 
-def told(capsys: pytest.CaptureFixture[str], words: list[str]) -> tuple[int, dict]:
-    code = main([*words, "--json"])
-    return code, json.loads(capsys.readouterr().out)
+def test_the_verbs_speak_to_machines(answered):
+    findings = answered("doctor")["findings"]
+    assert {f["level"] for f in findings if f["subject"] == "logger"} == {"ok"}
+    assert answered("devices --config canopen")["configured"]["jaw_force"]["driver"] == "ati-can"
+    assert answered("stop")["state"] == "disarmed"
 
 
-def test_the_verbs_speak_to_machines(capsys):
-    code, result = told(capsys, ["doctor"])
-    assert code == 0
-    assert all(f["level"] == "ok" for f in result["findings"] if f["subject"] == "logger")
-    code, result = told(capsys, ["devices", "--config", "canopen"])
-    assert code == 0
-    assert result["configured"]["jaw_force"]["driver"] == "ati-can"
-    code, result = told(capsys, ["stop"])
-    assert (code, result["state"]) == (0, "disarmed")
-
-
-def test_a_rig_that_is_not_there_is_named_and_its_state_unknown(tmp_path, capsys):
+def test_a_rig_that_is_not_there_is_named_and_its_state_unknown(tmp_path, answered):
     path = tmp_path / "rig.toml"
-    path.write_text(
-        (SHIPPED / "reference.toml").read_text().replace("usb:16c0:0483", "/dev/nonesuch")
-    )
-    code, result = told(capsys, ["doctor", "-c", str(path)])
-    assert code == ExitCode.FAILED
+    text = (SHIPPED / "reference.toml").read_text()
+    path.write_text(text.replace("usb:16c0:0483", "/dev/nonesuch"))
+    result = answered("doctor -c", path, code=ExitCode.FAILED)
     assert result["level"] == "error"
     assert "no port /dev/nonesuch" in result["findings"][-1]["what"]
-    code, result = told(capsys, ["stop", "-c", str(path)])
-    assert (code, result["state"]) == (ExitCode.SAFETY, "unknown")
-    code, result = told(capsys, ["firmware", "version", "-c", str(path)])
-    assert code == ExitCode.FAILED
-    assert not result["fits"]
+    assert answered("stop -c", path, code=ExitCode.SAFETY)["state"] == "unknown"
+    assert not answered("firmware version -c", path, code=ExitCode.FAILED)["fits"]
 
 
 def test_the_hash_of_the_sources_is_that_of_posix_cksum(library):

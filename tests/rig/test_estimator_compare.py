@@ -46,7 +46,7 @@ def worse(fitted, tmp_path_factory):
     return path
 
 
-def test_a_fit_states_its_data_by_hash_the_code_and_its_error(fitted, logs, capsys):
+def test_a_fit_states_its_data_by_hash_the_code_and_its_error(fitted, logs):
     origin = load(fitted).origin
     assert len(origin.data) == len(list(logs.iterdir()))
     assert len(set(origin.data.values())) == len(origin.data)
@@ -63,10 +63,9 @@ def test_a_hash_is_of_the_samples_alone():
     assert data_hash(second) != data_hash(first)
 
 
-def test_an_adapted_estimator_states_its_own_runs_and_its_source(fitted, logs, tmp_path):
+def test_an_adapted_estimator_states_its_own_runs_and_its_source(fitted, logs, tmp_path, said):
     out = tmp_path / "adapted.npz"
-    words = ["adapt", str(fitted), str(logs), "--runs", "01,05", "--no-scratch"]
-    assert main([*words, "--out", str(out)]) == 0
+    said("adapt", fitted, logs, "--runs 01,05 --no-scratch --out", out)
     origin = load(out).origin
     assert set(origin.data) == {"01", "05"}
     assert origin.data.items() <= load(fitted).origin.data.items()
@@ -75,15 +74,12 @@ def test_an_adapted_estimator_states_its_own_runs_and_its_source(fitted, logs, t
 
 
 @pytest.mark.parametrize("swapped", [False, True])
-def test_the_better_one_is_found_whichever_comes_first(fitted, worse, logs, capsys, swapped):
+def test_the_better_one_is_found_whichever_comes_first(fitted, worse, logs, said, swapped):
     files = (worse, fitted) if swapped else (fitted, worse)
-    capsys.readouterr()
-    assert main(["estimator", "compare", *map(str, files), "--on", str(logs), "--json"]) == 0
-    said = capsys.readouterr()
-    found = json.loads(said.out)
-    assert "good.npz is better" in said.err
-    assert "worse.npz" in said.err
-    assert "does not state what it was made from" in said.err
+    printed = said("estimator compare --json", *files, "--on", logs)
+    found = json.loads(printed.out)
+    for part in ("good.npz is better", "worse.npz", "does not state what it was made from"):
+        assert part in printed.err
     place = int(swapped)
     assert found["rmse"][place] < found["rmse"][1 - place]
     assert len(found["sides"][place]["seen"]) == len(found["runs"])
@@ -92,14 +88,13 @@ def test_the_better_one_is_found_whichever_comes_first(fitted, worse, logs, caps
         assert run["covered"][place] > run["covered"][1 - place]
 
 
-def test_an_estimator_is_not_better_than_itself(fitted, logs, capsys):
-    words = ["estimator", "compare", str(fitted), str(fitted), "--on", str(logs)]
-    assert main(words) == 0
-    assert "do not show which is better" in capsys.readouterr().out
+def test_an_estimator_is_not_better_than_itself(fitted, logs, said):
+    printed = said("estimator compare", fitted, fitted, "--on", logs)
+    assert "do not show which is better" in printed.out
 
 
-def test_estimators_of_different_channels_are_refused(fitted, logs, tmp_path, capsys):
+def test_estimators_of_different_channels_are_refused(fitted, logs, tmp_path, said):
     other = tmp_path / "other.npz"
     replace(load(fitted), target="distal_torque_n_m").save(other)
-    assert main(["estimator", "compare", str(fitted), str(other), "--on", str(logs)]) == 2
-    assert "different channels" in capsys.readouterr().err
+    printed = said("estimator compare", fitted, other, "--on", logs, code=2)
+    assert "different channels" in printed.err

@@ -6,7 +6,6 @@ import pytest
 
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
-from rig.cli.main import main
 from rig.configuration.config import Config, load_config
 from rig.errors import DataError, SafetyTripError, UsageError
 from rig.log.reader import read_log
@@ -28,15 +27,14 @@ def recorded(folder: Path, config: Config, runs: dict = SHORT) -> list[Path]:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_every_run_is_made_again_bit_for_bit(tmp_path, seed, capsys):
+def test_every_run_is_made_again_bit_for_bit(tmp_path, seed, said):
     config = load_config(Path("simulated")).changed(simulation={"seed": seed, "spread": 0.1})
     for path in recorded(tmp_path, config):
         found = replay_core(path)
         assert found.passed, found.first_difference
         assert found.samples == 1000
         assert found.is_same_core
-        assert main(["replay", "--core", str(path)]) == 0
-        assert "1000 of 1000 samples are the same" in capsys.readouterr().out
+        assert "1000 of 1000 samples are the same" in said("replay --core", path).out
 
 
 def test_a_run_that_tripped_is_made_again_with_its_trip(tmp_path):
@@ -51,7 +49,7 @@ def test_a_run_that_tripped_is_made_again_with_its_trip(tmp_path):
     assert found.trips == ("overheated",)
 
 
-def test_another_plant_or_a_changed_command_does_not_pass(tmp_path, capsys):
+def test_another_plant_or_a_changed_command_does_not_pass(tmp_path):
     config = load_config(Path("simulated"))
     path = recorded(tmp_path, config)[0]
     other = replay_core(path, config.changed(simulation={"seed": 7}))

@@ -11,13 +11,12 @@ from drivers.teensy.protocol import Trip
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
-from rig.cli.main import main
 from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError, UsageError
 from rig.grasper.machine import axes_of_joints
 from rig.log.check import check_log
 from rig.log.reader import read_log
-from rig.protocols.protocol import Protocol, load_protocol
+from rig.protocols.protocol import Protocol, load_protocol, protocol_toml
 from rig.recording.campaign import open_campaign_folder, record_campaign
 
 pytestmark = pytest.mark.integration
@@ -91,15 +90,10 @@ def test_a_trip_of_any_motor_takes_all_three_out_of_force(library, change, motio
     axis = ("yaw", "jaw_1", "jaw_2")[int(np.argmax(np.abs(motion)))]
     number = 1 + int(np.argmax(np.abs(motion)))
     assert axis in told.value.what or f"_{number}" in told.value.what
-    with Session(settings, link_again(link)) as session:
+    with Session(settings, SimulatedTransport(link.board, tick_s=5e-4)) as session:
         (*_, last) = session.rest(0.05)
     assert all((last.counts[f"command_{k}_e4"] == 0).all() for k in (1, 2, 3))
     assert not last.armed
-
-
-def link_again(link: object) -> SimulatedTransport:
-    """A fresh link to the same board."""
-    return SimulatedTransport(link.board, tick_s=5e-4)
 
 
 @pytest.mark.parametrize("bad", [1.01, -1.01, np.nan, np.inf])
@@ -132,27 +126,17 @@ def mixed(config: Config, protocol: str, folder: Path) -> None:
         list(record_campaign(session, todo[:1], folder))
 
 
-def test_commands_on_the_grasper_as_a_person_types_them(tmp_path, capsys):
-    path = tmp_path / "short.toml"
-    path.write_text(
-        'name = "short"\n[[runs]]\nkind = "joint_sine"\njoints = ["grasp"]\nangles_rad = [0.25]\n'
-        "duration_s = 0.5\nfrequencies_hz = [2.0]\n"
-    )
-    out = str(tmp_path / "campaign")
-    assert main(["record", "-c", "grasper", "-p", str(path), "-o", out, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["look_at"] == []
-    assert main(["log", "check", out]) == 0
-    capsys.readouterr()
-    live = ["live", "-c", "grasper", "-p", str(path), "--pace", "0", "--json"]
-    assert main(live) == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert lines[-1]["summary"]["lost"] == 0
-    for command in (["doctor"], ["selftest"], ["stop"], ["firmware", "version"]):
-        assert main([*command, "-c", "grasper"]) == 0, command
-    assert main(["config", "show", "grasper"]) == 0
-    assert "grasper protocol" in capsys.readouterr().out
-    assert main(["grip", "-c", "grasper", "--torque", "0.05"]) == 2
-    assert "is a grasper" in capsys.readouterr().err
-    assert main(["calibrate", "torque", "-c", "grasper", "--operator", "me", "--yes"]) == 2
-    assert "is a grasper" in capsys.readouterr().err
+def test_commands_on_the_grasper_as_a_person_types_them(tmp_path, said, answered):
+    path, out = tmp_path / "short.toml", tmp_path / "campaign"
+    run = {"kind": "joint_sine", "joints": ["grasp"], "angles_rad": [0.25], "duration_s": 0.5}
+    protocol = {"name": "short", "runs": [run | {"frequencies_hz": [2.0]}]}
+    path.write_text(protocol_toml(Protocol.model_validate(protocol)))
+    assert answered("record -c grasper -p", path, "-o", out)["look_at"] == []
+    said("log check", out)
+    printed = said("live -c grasper --pace 0 --json -p", path).out
+    assert json.loads(printed.splitlines()[-1])["summary"]["lost"] == 0
+    for command in ("doctor", "selftest", "stop", "config show"):
+        said(command, "grasper" if command == "config show" else "-c grasper")
+    assert "grasper protocol" in said("firmware version -c grasper").out
+    for command in ("grip --torque 0.05", "calibrate torque --operator me --yes"):
+        assert "is a grasper" in said(command, "-c grasper", code=2).err

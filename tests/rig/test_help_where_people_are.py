@@ -14,7 +14,6 @@ import calibration
 import drivers
 import estimation
 import rig
-from rig.cli.main import main
 from rig.errors import A_BUG, KNOWN_ERRORS, PAGE, ExitCode, anchor_of
 from tests.rig.log.conftest import write_log
 from tests.rig.test_campaigns import diagnosed
@@ -32,33 +31,27 @@ def empty(tmp_path, monkeypatch):
     return tmp_path
 
 
-def said(capsys) -> str:
-    assert main([]) == 0
-    return capsys.readouterr().out
-
-
-def test_with_nothing_there_the_demo_and_a_configuration_are_proposed(empty, capsys):
-    words = said(capsys)
+def test_with_nothing_there_the_demo_and_a_configuration_are_proposed(empty, said):
+    words = said().out
     for command in ("rig demo", "rig config init", "rig record --sim", "rig -h"):
         assert command in words
 
 
-def test_a_configured_rig_without_calibration_is_to_be_calibrated(empty, capsys):
-    assert main(["config", "init"]) == 0
-    capsys.readouterr()
-    words = said(capsys)
+def test_a_configured_rig_without_calibration_is_to_be_calibrated(empty, said):
+    said("config init")
+    words = said().out
     assert "rig doctor" in words
     assert "rig calibrate torque" in words
     assert "rig config init" not in words
 
 
-def test_a_configuration_that_cannot_be_read_is_named(empty, capsys):
+def test_a_configuration_that_cannot_be_read_is_named(empty, said):
     (empty / "rig.toml").write_text("nonsense = 1\n")
-    assert "rig config check rig.toml" in said(capsys)
+    assert "rig config check rig.toml" in said().out
 
 
 @pytest.mark.parametrize("state", ["undiagnosed", "lossy", "diagnosed"])
-def test_the_newest_recording_decides_what_to_do_with_it(empty, capsys, state):
+def test_the_newest_recording_decides_what_to_do_with_it(empty, said, state):
     folder = empty / "logs" / "monday"
     folder.mkdir(parents=True)
     write_log(folder / "a.mcap", drop=frozenset({30} if state == "lossy" else ()))
@@ -69,16 +62,13 @@ def test_the_newest_recording_decides_what_to_do_with_it(empty, capsys, state):
         "lossy": "rig log check logs/monday",
         "diagnosed": "identified, ripple.motor",
     }
-    assert expected[state] in said(capsys)
+    assert expected[state] in said().out
 
 
-def test_the_raw_logs_of_a_calibration_are_no_recording_to_diagnose(empty, capsys):
-    words = ["--sim", "--yes", "--operator", "Ada", "--out", "logs/a"]
-    assert main(["calibrate", "gearbox", *words]) == 0
-    capsys.readouterr()
-    assert "rig record --sim" in said(capsys)
-    assert main(["campaigns", "--json"]) == 0
-    (campaign,) = json.loads(capsys.readouterr().out)["campaigns"]
+def test_the_raw_logs_of_a_calibration_are_no_recording_to_diagnose(empty, said, answered):
+    said("calibrate gearbox --sim --yes --operator Ada --out logs/a")
+    assert "rig record --sim" in said().out
+    (campaign,) = answered("campaigns")["campaigns"]
     assert {run["protocol"] for run in campaign["runs"]} == {"calibration of gearbox"}
 
 
@@ -111,33 +101,25 @@ def test_every_error_has_a_section_of_the_troubleshooting_page():
     assert A_BUG in anchors
 
 
-def test_an_error_names_its_section(empty, capsys):
-    assert main(["replay", "nothing.mcap", "--json"]) == ExitCode.USAGE
-    out, err = capsys.readouterr()
+def test_an_error_names_its_section(empty, said):
+    out, err = said("replay nothing.mcap --json", code=ExitCode.USAGE)
     assert err.splitlines()[-1] == f"  more: {PAGE}#a-command-is-refused"
     assert json.loads(out)["error"]["more"].endswith("#a-command-is-refused")
 
 
-def test_a_bundle_holds_what_a_question_needs_and_no_secret(empty, capsys, monkeypatch):
+def test_a_bundle_holds_what_a_question_needs_and_no_secret(empty, said, monkeypatch):
     folder = empty / "logs" / "monday"
     folder.mkdir(parents=True)
     write_log(folder / "a.mcap", drop=frozenset({30}))
     monkeypatch.setenv("HOME", str(empty))
-    assert main(["config", "show", "--sim"]) == 0
-    text = capsys.readouterr().out
+    text = said("config show --sim").out
     text = text.replace('name = "simulated rig"', 'name = "rig of //ada:hunter2@host token=abc123"')
     (empty / "rig.toml").write_text(text)
-    assert main(["doctor", "--bundle", "question.zip"]) in (0, 1)
-    assert "question.zip" in capsys.readouterr().out
+    assert "question.zip" in said("doctor --bundle question.zip").out
     with zipfile.ZipFile(empty / "question.zip") as archive:
         content = {name: archive.read(name).decode() for name in archive.namelist()}
-    assert set(content) == {
-        "versions.json",
-        "findings.json",
-        "configuration.json",
-        "calibrations.json",
-        "newest_campaign.json",
-    }
+    names = ("versions", "findings", "configuration", "calibrations", "newest_campaign")
+    assert set(content) == {f"{name}.json" for name in names}
     assert json.loads(content["versions.json"])["packages"]["numpy"]
     assert json.loads(content["newest_campaign.json"])["checks"][0]["problems"]
     whole = "".join(content.values())
@@ -148,8 +130,8 @@ def test_a_bundle_holds_what_a_question_needs_and_no_secret(empty, capsys, monke
     assert len(user) < 3 or not re.search(rf"\b{re.escape(user)}\b", whole)
 
 
-def test_a_bundle_does_not_replace_another_kind_of_file(empty, capsys):
+def test_a_bundle_does_not_replace_another_kind_of_file(empty, said):
     log = write_log(empty / "a.mcap")
     before = log.read_bytes()
-    assert main(["doctor", "--sim", "--bundle", str(log)]) == ExitCode.USAGE
+    said("doctor --sim --bundle", log, code=ExitCode.USAGE)
     assert log.read_bytes() == before

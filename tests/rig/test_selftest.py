@@ -1,6 +1,5 @@
 """The acceptance test of a bench: on fakes here, on a real one where RIG_BENCH names it."""
 
-import json
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +8,6 @@ import pytest
 
 from drivers.teensy.profile import Profile
 from drivers.transport.simulated import SimulatedTransport
-from rig.cli.main import main
 from rig.configuration.check import refuse_problems
 from rig.configuration.config import Config, load_config
 from rig.doctor.bench import bench_tests, page
@@ -67,16 +65,14 @@ def test_a_silent_board_fails_everything(monkeypatch):
     assert len(failing(simulated(), monkeypatch, lambda board, data: b"")) == 6
 
 
-def test_selftest_speaks_to_machines(capsys):
-    assert main(["selftest", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+def test_selftest_speaks_to_machines(answered):
+    told = answered("selftest")
     assert told["passed"]
     assert {"name", "passed", "detail"} == set(told["checks"][0])
 
 
-def test_the_tests_for_a_person_are_named_and_are_those_of_the_page(capsys):
-    assert main(["selftest", "--sim", "--bench", "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
+def test_the_tests_for_a_person_are_named_and_are_those_of_the_page(answered):
+    said = answered("selftest --sim --bench")
     tests = bench_tests()
     assert [test["name"] for test in said["by_hand"]] == [test.name for test in tests]
     assert all(test.why and test.do and test.shows for test in tests)

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from rig.cli.main import main
-from rig.configuration.config import load_config
+from rig.configuration.config import SHIPPED, load_config
 from rig.log.reader import LogFile, read_log
+from rig.protocols.protocol import Protocol, protocol_toml
 
 pytestmark = pytest.mark.integration
 
@@ -25,27 +26,20 @@ WAYS = {
 }
 Logs = dict[str, LogFile]
 COMMON = ("spindle_angle_rad", "target_angle_rad", "motor_angle_rad", "motor_current_a")
-PROTOCOL = """
-name = "short"
-[[runs]]
-kind = "sine"
-frequencies_hz = [2.0]
-loads_a = [0.0]
-duration_s = 0.5
-"""
 
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("protocol") / "short.toml"
-    path.write_text(PROTOCOL)
+    run = {"kind": "sine", "frequencies_hz": [2.0], "loads_a": [0.0], "duration_s": 0.5}
+    path.write_text(protocol_toml(Protocol.model_validate({"name": "short", "runs": [run]})))
     return str(path)
 
 
 def configured(way: str, folder: Path) -> str:
     """The shipped configuration, patient with a machine that does other things too."""
     name, simulation = WAYS[way]
-    text = (Path(__file__).parents[2] / f"rig/configuration/shipped/{name}.toml").read_text()
+    text = (SHIPPED / f"{name}.toml").read_text()
     assert text.count("[simulation]") <= 1
     if simulation:
         text = text.replace("[simulation]", f"[simulation]\n{simulation}")
@@ -108,12 +102,9 @@ def test_fake_and_library_leave_the_same_counts(logs):
 
 
 @pytest.mark.parametrize("way", list(WAYS))
-def test_every_way_is_shown_live(way, library, protocol, tmp_path, capsys):
-    config = configured(way, tmp_path)
-    capsys.readouterr()
-    words = ["live", "-c", config, "-p", protocol, "--pace", "0", "--duration", "1"]
-    assert main([*words, "--json"]) == 0
-    *_, last = (json.loads(line) for line in capsys.readouterr().out.splitlines())
+def test_every_way_is_shown_live(way, library, protocol, tmp_path, said):
+    words = ("live --pace 0 --duration 1 --json -c", configured(way, tmp_path), "-p", protocol)
+    *_, last = (json.loads(line) for line in said(*words).out.splitlines())
     assert last["summary"]["ended"] == "finished"
     assert last["summary"]["lost"] == 0
     assert last["summary"]["samples"] >= 1000

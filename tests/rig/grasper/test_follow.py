@@ -1,6 +1,5 @@
 """The master's driver on its fake, and a grasper whose three motors follow it in position."""
 
-import json
 import os
 import signal
 from pathlib import Path
@@ -14,7 +13,6 @@ from drivers.teensy_master.fake import REACH, open_fake
 from drivers.transport.faulty import Faults
 from rig.bench.firmware import source_hash
 from rig.bench.logger import open_logger
-from rig.cli.main import main
 from rig.configuration.config import SHIPPED, load_config
 from rig.errors import ExitCode, UsageError
 from rig.grasper import follow
@@ -77,11 +75,9 @@ def test_setpoints_are_the_masters_own_turn_from_where_the_grasper_stands(potent
     np.testing.assert_allclose(axes, HERE + axes_of_joints(0.5 * (joints - joints[0])), atol=1e-12)
 
 
-def test_three_motors_go_where_the_master_goes(link, capsys):
-    code = main(["grasper", "follow", "--sim", "--duration", "3", "--scale", "0.3", "--json"])
-    assert code == ExitCode.OK
+def test_three_motors_go_where_the_master_goes(link, answered):
+    told = answered("grasper follow --sim --duration 3 --scale 0.3")
     assert not is_armed(link.board, GRASPER)
-    told = json.loads(capsys.readouterr().out)
     reach_rad = 0.3 * REACH * np.radians(300.0) / 4095
     yaw, jaw_1, jaw_2 = told["axes"]
     assert yaw["highest_rad"] == pytest.approx(reach_rad, rel=0.1)
@@ -96,17 +92,15 @@ def test_three_motors_go_where_the_master_goes(link, capsys):
     assert len(log.topics["/rig/sample"]) >= 6000
 
 
-def test_the_firmware_process_follows_in_real_time(library, capsys):
-    assert main(["grasper", "follow", "-c", "grasper_pty", "--duration", "1", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+def test_the_firmware_process_follows_in_real_time(library, answered):
+    told = answered("grasper follow -c grasper_pty --duration 1")
     assert all(axis["highest_rad"] > axis["lowest_rad"] for axis in told["axes"])
     assert read_log(Path(told["log"])).end.clean
 
 
-def test_a_master_that_requests_too_much_trips_the_grasper(link, capsys):
-    code = main(["grasper", "follow", "--sim", "--duration", "6", "--scale", "1"])
-    assert code == ExitCode.SAFETY
-    assert "force" in capsys.readouterr().err
+def test_a_master_that_requests_too_much_trips_the_grasper(link, said):
+    words = "grasper follow --sim --duration 6 --scale 1"
+    assert "force" in said(words, code=ExitCode.SAFETY).err
     assert not is_armed(link.board, GRASPER)
 
 
@@ -129,7 +123,7 @@ def test_a_broken_wire_disarms_the_motors(link, monkeypatch, tmp_path):
     assert not is_armed(link.board, GRASPER)
 
 
-def test_ctrl_c_quits_with_disarmed_motors(link, monkeypatch, capsys):
+def test_ctrl_c_quits_with_disarmed_motors(link, monkeypatch, said):
     pieces = []
 
     def asked(*given):
@@ -140,10 +134,9 @@ def test_ctrl_c_quits_with_disarmed_motors(link, monkeypatch, capsys):
             yield piece
 
     monkeypatch.setattr(follow, "setpoints", asked)
-    assert main(["grasper", "follow", "--sim"]) == ExitCode.INTERRUPTED
+    assert "safe" in said("grasper follow --sim", code=ExitCode.INTERRUPTED).err
     assert len(pieces) == 20
     assert not is_armed(link.board, GRASPER)
-    assert "safe" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
