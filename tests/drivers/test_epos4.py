@@ -45,17 +45,18 @@ class Tapped(SimulatedCanBus):
             super().send(frame)
 
 
-def armed(node: Epos4Fake) -> tuple[Epos4, Tapped]:
+def armed() -> tuple[Epos4Fake, Epos4, Tapped]:
+    """A drive in force, its driver, and the bus between them."""
+    node = Epos4Fake()
     bus = Tapped(node)
     device = Epos4(bus)
     device.start()
     device.arm()
-    return device, bus
+    return node, device, bus
 
 
 def test_a_torque_turns_the_motor_and_the_end_is_powerless():
-    node = Epos4Fake()
-    device, _ = armed(node)
+    node, device, _ = armed()
     sent_n_m = device.set_torque(1.001e-3)
     assert sent_n_m == pytest.approx(80 * 12.46e-6)
     positions = []
@@ -72,12 +73,10 @@ def test_a_torque_turns_the_motor_and_the_end_is_powerless():
     device.close()
     assert node.state is State.SWITCH_ON_DISABLED
     assert node.torque_n_m == 0.0
-    with pytest.raises(LinkLostError):
-        device.read(0.1)
 
 
 def test_set_up_and_arm_send_their_messages_in_order():
-    device, bus = armed(Epos4Fake())
+    _, device, bus = armed()
     heartbeat = 0x700 + 127
     spoken = [frame for frame in bus.sent if frame.can_id != heartbeat]
     said = [f"{frame.can_id:x} {frame.data.hex()}" for frame in spoken]
@@ -140,7 +139,7 @@ def test_an_unarmed_drive_is_only_watched():
 
 @pytest.mark.parametrize("torque", [np.nan, np.inf, -np.inf, 0.025, -0.025])
 def test_a_torque_that_must_not_be_is_refused(torque):
-    device, _ = armed(Epos4Fake())
+    _, device, _ = armed()
     with pytest.raises(DriverError, match=r"cannot be commanded|beyond"):
         device.set_torque(torque)
     assert device.read(0.1).columns["command_torque_n_m"][0] == 0.0
@@ -153,8 +152,7 @@ def test_a_command_is_off_by_half_a_step_at_most(torque):
 
 
 def test_an_error_stops_the_session_in_words_and_is_cleared_by_hand():
-    node = Epos4Fake()
-    device, _ = armed(node)
+    node, device, _ = armed()
     device.set_torque(1e-3)
     device.read(0.1)
     node.fail(0x3220, 4)
@@ -176,8 +174,7 @@ def test_an_error_stops_the_session_in_words_and_is_cleared_by_hand():
 
 
 def test_a_drive_that_stops_operation_by_itself_is_reported():
-    node = Epos4Fake()
-    device, _ = armed(node)
+    node, device, _ = armed()
     node.state = State.QUICK_STOP
     with pytest.raises(DriveFaultError, match="quick stop"):
         device.read(0.1)
@@ -187,8 +184,7 @@ def test_a_drive_that_stops_operation_by_itself_is_reported():
 
 def after_a_pause() -> tuple[Epos4Fake, Epos4]:
     """A drive in force whose host paused for longer than the drive waits."""
-    node = Epos4Fake()
-    device, _ = armed(node)
+    node, device, _ = armed()
     device.set_torque(1e-3)
     device.read(0.1)
     node.advance(180)  # the host's last beat may be 63 ms old
@@ -255,8 +251,7 @@ def test_a_stopped_node_is_cleared_too():
 
 
 def test_a_drive_that_somebody_takes_out_of_operation_is_reported_at_the_next_heartbeat():
-    node = Epos4Fake()
-    device, _ = armed(node)
+    node, device, _ = armed()
     device.read(0.1)
     node.receive(CanFrame(0, bytes([0x80, 1])))  # pre-operational
     said = 0
@@ -271,8 +266,7 @@ def test_a_drive_that_somebody_takes_out_of_operation_is_reported_at_the_next_he
 
 
 def test_a_drive_that_restarts_is_reported_and_not_commanded_any_more():
-    node = Epos4Fake()
-    device, bus = armed(node)
+    node, device, bus = armed()
     device.set_torque(1e-3)
     device.read(0.1)
     node.receive(CanFrame(0, bytes([0x81, 1])))
@@ -311,7 +305,7 @@ def test_a_host_that_only_waits_beats_all_the_same():
 
 
 def test_a_disarm_that_nobody_confirms_is_no_disarm():
-    device, bus = armed(Epos4Fake())
+    _, device, bus = armed()
     bus.lose = lambda frame: frame.can_id == 0x601
     with pytest.raises(DisarmUnconfirmedError, match=r"cut its supply.*250 ms"):
         device.disarm()
@@ -322,8 +316,7 @@ def test_a_disarm_that_nobody_confirms_is_no_disarm():
 
 
 def test_a_disarm_is_not_believed_while_the_statusword_differs():
-    node = Epos4Fake()
-    device, bus = armed(node)
+    node, device, bus = armed()
     # the drive confirms the write of the controlword and does not follow it
     deaf = bytes.fromhex("2b406000 00000000")
     bus.lose = lambda frame: frame.can_id == 0x201
@@ -374,22 +367,21 @@ def test_options_that_are_no_drives(options):
         open_epos4("can:virtual:options", **options)
 
 
-@pytest.mark.parametrize(
-    ("word", "state"),
-    [
-        (0x0200, State.NOT_READY),
-        (0x0240, State.SWITCH_ON_DISABLED),
-        (0x0270, State.SWITCH_ON_DISABLED),
-        (0x0231, State.READY),
-        (0x0233, State.SWITCHED_ON),
-        (0x0637, State.OPERATION_ENABLED),
-        (0x0217, State.QUICK_STOP),
-        (0x021F, State.FAULT_REACTION),
-        (0x0208, State.FAULT),
-    ],
-)
-def test_a_statusword_is_a_state(word, state):
-    assert protocol.state_of(word) is state
+WORDS = {
+    State.NOT_READY: [0x0200],
+    State.SWITCH_ON_DISABLED: [0x0240, 0x0270],
+    State.READY: [0x0231],
+    State.SWITCHED_ON: [0x0233],
+    State.OPERATION_ENABLED: [0x0637],
+    State.QUICK_STOP: [0x0217],
+    State.FAULT_REACTION: [0x021F],
+    State.FAULT: [0x0208],
+}
+
+
+@pytest.mark.parametrize("state", WORDS, ids=lambda state: state.name)
+def test_a_statusword_is_a_state(state):
+    assert {protocol.state_of(word) for word in WORDS[state]} == {state}
 
 
 def test_process_data_and_codes_are_those_of_the_specification():

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import strategies as st
 
 from drivers.teensy import protocol
 from drivers.teensy.core import BoardStart, FirmwareBoard
@@ -170,8 +169,3 @@ def test_offers_differ_between_starts_of_a_board(library):
             assert host.arm() is Result.OK
             host.command(Kind.DISARM)
     assert len(offers) == 39 * 5
-
-
-# what a line, a second program or an attacker may send: old frames, in any order, cut or whole
-numbers = st.integers(0, 6)
-sessions = st.sampled_from(["offer", "live", "zero", "old"])

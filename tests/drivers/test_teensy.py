@@ -307,16 +307,11 @@ def test_disarm_is_not_believed_when_the_board_reports_that_it_is_armed():
     logger.close()
 
 
-def arm_and_fail(logger: TeensyLogger) -> None:
-    with logger:
-        logger.arm(GAINS, WIDEST)
-        raise ZeroDivisionError
-
-
 def test_leaving_the_with_block_disarms(make_board):
     board = make_board()
-    with pytest.raises(ZeroDivisionError):
-        arm_and_fail(logger_of(board))
+    with pytest.raises(ZeroDivisionError), logger_of(board) as logger:  # noqa: PT012
+        logger.arm(GAINS, WIDEST)
+        raise ZeroDivisionError
     with logger_of(board) as logger:
         logger.start()
         status = logger.read(0.1).samples["status"]

@@ -22,31 +22,22 @@ from rig.diagnosis.ledger import Ledger, look_at
 from rig.diagnosis.run import run_diagnosis
 from rig.diagnosis.schema import DiagnosisSchema
 from tests.estimation.campaigns import runs, spring
+from tests.rig.simulated import protocol_file
 
 pytestmark = pytest.mark.long
 
 
 def run(folder: Path, *words: str) -> dict[str, Any]:
     """Diagnose, and return the JSON."""
-    out = folder / "diagnosis.json"
-    ledger = str(folder / "looks.jsonl")
+    out, ledger = folder / "diagnosis.json", str(folder / "looks.jsonl")
     whole = ["diagnose", str(folder), "--json-out", str(out), "--ledger", ledger, *words]
     assert main(whole) == 0
-    found: dict[str, Any] = json.loads(out.read_text())
-    return found
+    return json.loads(out.read_text())
 
 
 @dataclass(frozen=True)
 class Whole:
-    """One diagnosis of recordings that lack a spring, with every output.
-
-    Attributes:
-        recordings: The recordings.
-        folder: Folder of its files.
-        found: The JSON.
-        printed: What a person sees.
-        done: What was computed.
-    """
+    """One diagnosis of recordings that lack a spring: folder, JSON, what is printed, result."""
 
     recordings: list[Recording]
     folder: Path
@@ -76,6 +67,12 @@ def campaign(whole, monkeypatch):
     monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(whole.recordings))
 
 
+@pytest.fixture
+def done(whole, campaign, monkeypatch):
+    """Every diagnosis is the one that was computed."""
+    monkeypatch.setattr("rig.diagnosis.run.run_diagnosis", lambda *_, **__: whole.done)
+
+
 def test_a_diagnosis_leaves_json_report_and_model(whole):
     found = whole.found
     DiagnosisSchema.model_validate(found)
@@ -94,18 +91,11 @@ def test_a_diagnosis_leaves_json_report_and_model(whole):
     assert written.evidence.rmse == pytest.approx(found["rmse_after"]["motor"], rel=0.5)
     assert written.evidence.made_at
     page = (whole.folder / "report/diagnosis.html").read_text()
-    assert "[spring.position]" in page
-    for part in (
-        "motor: residual over ",
-        "motor: error of each held-out test run",
-        "motor: measured and estimated",
-        "Parameters of the findings",
-        "Probability of each name",
-        "Declared parameters: motor",
-        "What to check",
-        "Next experiment",
-    ):
-        assert part in page
+    charts = ("residual over ", "error of each held-out test run", "measured and estimated")
+    parts = [f"motor: {chart}" for chart in charts]
+    parts += ["Parameters of the findings", "Probability of each name", "What to check"]
+    parts += ["Declared parameters: motor", "Next experiment", "[spring.position]"]
+    assert [part for part in parts if part not in page] == []
     assert "[spring.position]" in whole.printed
 
 
@@ -131,28 +121,26 @@ def test_a_second_look_at_the_same_runs_is_exploratory_with_any_seed(whole, camp
     assert len(ledger.read_text().splitlines()) == 2
 
 
-def test_a_diagnosis_that_leaves_nothing_does_not_use_up_the_runs(
-    whole, campaign, monkeypatch, tmp_path
-):
+@pytest.mark.usefixtures("done")
+def test_a_diagnosis_that_leaves_nothing_does_not_use_up_the_runs(monkeypatch, tmp_path, said):
     """A fault while its page is made, after the held-out runs were opened."""
 
     def broken(*_: object) -> str:
         raise ValueError("no page")
 
-    monkeypatch.setattr("rig.diagnosis.run.run_diagnosis", lambda *_, **__: whole.done)
     monkeypatch.setattr("rig.reports.diagnosis.page", broken)
     ledger = tmp_path / "looks.jsonl"
-    words = ["diagnose", str(tmp_path), "--equation", "motor", "--ledger", str(ledger)]
-    assert main([*words, "--report", str(tmp_path)]) == 70
+    words = ("diagnose --equation motor", tmp_path, "--ledger", ledger)
+    said(*words, "--report", tmp_path, code=70)
     assert not ledger.exists()
 
 
-def test_a_reader_that_leaves_early_has_the_files(whole, campaign, monkeypatch, tmp_path):
+@pytest.mark.usefixtures("done")
+def test_a_reader_that_leaves_early_has_the_files(monkeypatch, tmp_path):
     class Left(io.StringIO):
         def write(self, text: str) -> int:
             raise BrokenPipeError
 
-    monkeypatch.setattr("rig.diagnosis.run.run_diagnosis", lambda *_, **__: whole.done)
     monkeypatch.setattr("sys.stdout", Left())
     out, ledger = tmp_path / "diagnosis.json", tmp_path / "looks.jsonl"
     words = ["diagnose", str(tmp_path), "--equation", "motor", "--ledger", str(ledger)]
@@ -169,24 +157,18 @@ def test_every_equation_that_is_decided_goes_into_the_model_file(campaign, tmp_p
     assert decided == list(found["unit"]) == ["motor", "gearbox", "cable"]
 
 
-def test_campaigns_keep_their_diagnoses_and_are_diagnosed_once(tmp_path, monkeypatch, capsys):
+def test_campaigns_keep_their_diagnoses_and_are_diagnosed_once(
+    tmp_path, monkeypatch, said, answered
+):
     monkeypatch.setenv("RIG_STATE_DIR", str(tmp_path / "state"))
     root = tmp_path / "logs"
-    one_run = tmp_path / "one.toml"
-    one_run.write_text(
-        'name = "one"\n[[runs]]\nkind = "sine"\nfrequencies_hz = [0.5]\nloads_a = [0.4]\n'
-        "duration_s = 4.0\n"
-    )
-    for k, protocol in enumerate(("quick", "quick", str(one_run))):
-        words = ["record", "--sim", "-p", protocol, "-o", str(root / f"day-{k}")]
-        assert main([*words, "--seed", str(k)]) == 0
-    assert main(["diagnose", str(root / "day-0"), "--equation", "motor", "--quick"]) == 0
+    for k, protocol in enumerate(("quick", "quick", protocol_file(tmp_path, duration_s=4.0))):
+        said(f"record --sim --seed {k} -p", protocol, "-o", root / f"day-{k}")
     pages = [root / name / "diagnosis/diagnosis.html" for name in ("day-0", "day-1")]
-    assert f"Report: {pages[0]}" in capsys.readouterr().out.replace("\n", "")
+    printed = said("diagnose --equation motor --quick", root / "day-0").out
+    assert f"Report: {pages[0]}" in printed.replace("\n", "")
     made = pages[0].stat().st_mtime_ns
-    words = ["campaigns", "--root", str(root), "--diagnose", "--json"]
-    assert main(words) == 0
-    rows = json.loads(capsys.readouterr().out)["campaigns"]
+    rows = answered("campaigns --diagnose --root", root)["campaigns"]
     failed = {Path(row["folder"]).name: row["failed"] for row in rows}
     assert "too few" in failed.pop("day-2")
     assert failed == {"day-0": "", "day-1": ""}
@@ -194,11 +176,10 @@ def test_campaigns_keep_their_diagnoses_and_are_diagnosed_once(tmp_path, monkeyp
     assert len((tmp_path / "state/looks.jsonl").read_text().splitlines()) == len(pages)
     assert pages[0].stat().st_mtime_ns == made  # newer than its logs
     made = pages[1].stat().st_mtime_ns
-    assert main(words) == 0  # a second call has nothing to do
+    again = answered("campaigns --diagnose --root", root)["campaigns"]
+    assert again == rows  # a second call has nothing to do
     assert pages[1].stat().st_mtime_ns == made
-    assert json.loads(capsys.readouterr().out)["campaigns"] == rows
-    assert main(["campaigns", "--root", str(root), "--json"]) == 0
-    listed = json.loads(capsys.readouterr().out)["campaigns"]
+    listed = answered("campaigns --root", root)["campaigns"]
     assert sum(bool(one["diagnosis"]) for one in listed) == len(pages)
 
 

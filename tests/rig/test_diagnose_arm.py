@@ -10,7 +10,6 @@ from estimation.campaign import Campaign
 from estimation.diagnosis.split import cut_and_split, path_of
 from estimation.recording import Recording
 from rig.arm.simulated import RATE_HZ, draw_arm, excitation, recorded, simulate
-from rig.cli.main import main
 from rig.diagnosis import subject
 from rig.diagnosis.run import repeats
 from rig.diagnosis.schema import DiagnosisSchema
@@ -33,13 +32,12 @@ def runs() -> Campaign:
     return Campaign.of(made)
 
 
-def test_a_joint_is_diagnosed_like_any_balance(tmp_path, monkeypatch, capsys):
+def test_a_joint_is_diagnosed_like_any_balance(tmp_path, monkeypatch, said):
     campaign = runs()
     monkeypatch.setattr(subject, "open_campaign", lambda *_: campaign)
     out, report = tmp_path / "diagnosis.json", tmp_path / "report"
-    words = ["diagnose", str(tmp_path), "--equation", "joint.2", "--quick", "--json-out", str(out)]
-    words += ["--report", str(report), "--ledger", str(tmp_path / "looks.jsonl")]
-    assert main(words) == 0
+    words = ("--quick --json-out", out, "--report", report, "--ledger", tmp_path / "looks.jsonl")
+    said("diagnose --equation joint.2", tmp_path, *words)
     found = json.loads(out.read_text())
     DiagnosisSchema.model_validate(found)
     assert set(found["rmse_before"]) == {"joint.2"}
@@ -49,10 +47,9 @@ def test_a_joint_is_diagnosed_like_any_balance(tmp_path, monkeypatch, capsys):
     page = (report / "diagnosis.html").read_text()
     assert first["family"] in page
     assert "joint.2: residual over joint 2" in page
-    assert main(words) == 0
+    said("diagnose --equation joint.2", tmp_path, *words)
     assert json.loads(out.read_text())["exploratory"] is True
-    assert main([*words[:3], "joint.9", *words[4:]]) == 2
-    assert "joint.6" in capsys.readouterr().err
+    assert "joint.6" in said("diagnose --equation joint.9", tmp_path, *words, code=2).err
 
 
 def test_whole_periods_of_one_path_are_repeats():

@@ -3,14 +3,12 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
 from estimation.recording import Instrument, Recording
-from rig.cli.main import main
 from rig.diagnosis import subject
 from tests.estimation.campaigns import runs, spring
 
@@ -87,20 +85,24 @@ CASES: dict[str, tuple[Spoil, str]] = {
 }
 
 
-def command(monkeypatch, folder: Path, recordings: list[Recording]) -> list[str]:
-    """Return the words that diagnose recordings."""
-    monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
-    words = ["diagnose", str(folder), "--equation", "motor", "--quick"]
-    words += ["--ledger", str(folder / "looks.jsonl")]
-    return [*words, "--json-out", str(folder / "diagnosis.json")]
+@pytest.fixture
+def diagnose(monkeypatch, tmp_path, said):
+    """Diagnose recordings and return what is printed."""
+
+    def run(recordings, *words, code=5):
+        monkeypatch.setattr(subject, "open_campaign", lambda *_: Campaign.of(recordings))
+        files = ("--ledger", tmp_path / "looks.jsonl", "--json-out", tmp_path / "diagnosis.json")
+        return said("diagnose --equation motor --quick", tmp_path, *files, *words, code=code).err
+
+    return run
 
 
-def test_what_limits_a_diagnosis_is_reported(monkeypatch, tmp_path):
+def test_what_limits_a_diagnosis_is_reported(diagnose, tmp_path):
     few = [
         r.with_columns(load_command_a=np.full(len(r), 0.5))
         for r in runs(spring, count=6, seconds=2.0)
     ]
-    assert main(command(monkeypatch, tmp_path, [jumping(few[0]), *few[1:]])) == 0
+    diagnose([jumping(few[0]), *few[1:]], code=0)
     found = json.loads((tmp_path / "diagnosis.json").read_text())
     assert len(found["runs"]["discover"]) == 4
     assert few[0].name not in {*found["runs"]["discover"], *found["runs"]["confirm"]}
@@ -111,33 +113,28 @@ def test_what_limits_a_diagnosis_is_reported(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("what", CASES)
-def test_nothing_is_decided_and_the_reason_is_reported(monkeypatch, tmp_path, capsys, what):
+def test_nothing_is_decided_and_the_reason_is_reported(diagnose, tmp_path, what):
     spoil, reason = CASES[what]
-    recordings = spoil(runs(spring, count=9, seconds=2.0))
-    assert main(command(monkeypatch, tmp_path, recordings)) == 5
-    said = capsys.readouterr().err
-    assert reason in " ".join(said.split())
-    assert "spring" not in said
+    printed = diagnose(spoil(runs(spring, count=9, seconds=2.0)))
+    assert reason in " ".join(printed.split())
+    assert "spring" not in printed
     assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize("option", ["--json-out", "--report", "--model-out", "--protocol-out"])
-def test_an_output_that_cannot_be_written_is_refused_before_the_work(option, tmp_path, capsys):
+def test_an_output_that_cannot_be_written_is_refused_before_the_work(option, tmp_path, said):
     """The held-out runs would be used up, and nobody would have seen the result."""
     ledger = tmp_path / "looks.jsonl"
-    words = ["diagnose", str(tmp_path / "no such recordings"), "--ledger", str(ledger)]
-    assert main([*words, option, "/dev/null/x"]) == 2
-    assert "/dev/null/x" in capsys.readouterr().err
+    words = ("diagnose", tmp_path / "no such recordings", "--ledger", ledger)
+    assert "/dev/null/x" in said(*words, option, "/dev/null/x", code=2).err
     assert not ledger.exists()
 
 
-def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(monkeypatch, tmp_path, capsys):
-    words = command(monkeypatch, tmp_path, runs(spring, count=9, seconds=2.0))
-    assert main([*words, "--ledger", "/dev/null/x"]) == 5
-    assert "reading the recordings" not in capsys.readouterr().err
+def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(diagnose, tmp_path):
+    printed = diagnose(runs(spring, count=9, seconds=2.0), "--ledger /dev/null/x")
+    assert "reading the recordings" not in printed
     assert not [*tmp_path.iterdir()]
 
 
-def test_an_unknown_equation_is_a_usage_error(tmp_path, capsys):
-    assert main(["diagnose", str(tmp_path), "--equation", "elbow"]) == 2
-    assert "elbow" in capsys.readouterr().err
+def test_an_unknown_equation_is_a_usage_error(tmp_path, said):
+    assert "elbow" in said("diagnose --equation elbow", tmp_path, code=2).err

@@ -1,6 +1,5 @@
 """`rig loop --sim`: rounds until the name is unique, partly with a stand-in for the diagnosis."""
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,7 +7,6 @@ import pytest
 
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.split import Sealed
-from rig.cli.main import main
 from rig.configuration.config import load_config
 from rig.diagnosis import loop as looping
 from rig.diagnosis.loop import NO_RIVALS, NOTHING, SPENT, UNIQUE, Budget, run_loop
@@ -22,12 +20,7 @@ pytestmark = pytest.mark.long
 
 NEXT = {
     "name": "small",
-    "protocol": {
-        "name": "small",
-        "runs": [
-            {"kind": "sine", "frequencies_hz": [1.0], "loads_a": [0.2, 0.4], "duration_s": 1.0}
-        ],
-    },
+    "protocol": short_protocol(2).model_dump(exclude_unset=True) | {"name": "small"},
 }
 
 
@@ -90,7 +83,7 @@ def test_a_loop_ends_with_its_budget(tmp_path, diagnosed):
     assert [r.stopped for r in made] == [SPENT]
 
 
-def test_a_real_rig_a_full_folder_and_an_empty_budget_are_refused(tmp_path, capsys):
+def test_a_real_rig_a_full_folder_and_an_empty_budget_are_refused(tmp_path, said):
     real = load_config().changed(logger={"url": "socket://nowhere:1"})
     with pytest.raises(UsageError, match="real rig"):
         list(run_loop(tmp_path, real, [], Budget(3, 20.0)))
@@ -99,8 +92,7 @@ def test_a_real_rig_a_full_folder_and_an_empty_budget_are_refused(tmp_path, caps
         list(run_loop(tmp_path, simulated(), [], Budget(3, 20.0)))
     with pytest.raises(UsageError, match="allows nothing"):
         Budget(0, 20.0)
-    assert main(["loop"]) == 2
-    assert "--sim" in capsys.readouterr().err
+    assert "--sim" in said("loop", code=2).err
 
 
 def test_what_is_hidden_is_chosen_by_name_by_seed_or_not_at_all():
@@ -115,13 +107,11 @@ def test_what_is_hidden_is_chosen_by_name_by_seed_or_not_at_all():
         chosen(["motor_ripple=much"], 0)
 
 
-def test_the_whole_loop_names_what_is_hidden(tmp_path, capsys):
+def test_the_whole_loop_names_what_is_hidden(tmp_path, answered):
     protocol = tmp_path / "first.toml"
     protocol.write_text(protocol_toml(PROTOCOL))
-    words = ["loop", "--sim", "--hide", "motor_ripple=1.0", "--equation", "motor", "--quick"]
-    words += ["--protocol", str(protocol), "--out", str(tmp_path / "loop"), "--seed", "1"]
-    assert main([*words, "--rounds", "1", "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
+    words = "loop --sim --hide motor_ripple=1.0 --equation motor --quick --seed 1 --rounds 1"
+    said = answered(words, "--protocol", protocol, "--out", tmp_path / "loop")
     assert said["hidden"] == {"motor_ripple": 1.0}
     (only,) = said["rounds"]
     assert only["diagnosis"]["findings"][0]["family"] == "ripple.motor"
