@@ -87,3 +87,10 @@ def log(tmp_path: Path) -> Path:
 def make_log() -> WriteLog:
     """The function that writes a log."""
     return write_log
+
+
+def flip(path: Path, place: int, bit: int = 1) -> None:
+    """Change a byte of a file."""
+    data = bytearray(path.read_bytes())
+    data[place] ^= bit
+    path.write_bytes(data)

@@ -39,13 +39,9 @@ READERS = {
 @pytest.mark.parametrize("kind", list(ExportFormat))
 def test_every_value_is_exported_exactly(tmp_path, log, kind):
     written = export_log(log, kind)
-    assert [item.name for item in written] == [
-        f"run.rig-sample.{kind.value}",
-        f"run.rig-counts.{kind.value}",
-    ]
-    assert sorted(item.name for item in tmp_path.iterdir()) == sorted(
-        ["run.mcap", *(item.name for item in written)]
-    )
+    names = [f"run.rig-sample.{kind.value}", f"run.rig-counts.{kind.value}"]
+    assert [item.name for item in written] == names
+    assert {item.name for item in tmp_path.iterdir()} == {"run.mcap", *names}
     source = read_log(log)
     for path, topic in zip(written, (SAMPLE, COUNTS), strict=True):
         columns = READERS[kind](path)

@@ -12,11 +12,13 @@ from estimation.recording import Flag, Instrument, Mark, Recording, Stretch
 from rig.errors import DataError
 from rig.importers.log import IMPORTER
 from rig.importers.registry import open_campaign
+from rig.log.check import Verdict, check_log
 from rig.log.convert import recording_from_log, write_recording
 from rig.log.messages import UnflaggedSampleError
 from rig.log.reader import DamagedLogError, read_log
 from rig.log.repair import repair_log
-from tests.rig.log.conftest import write_log
+from tests.conftest import ROOT
+from tests.rig.log.conftest import flip, write_log
 
 TEXT = st.text(max_size=20)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -163,9 +165,7 @@ def test_a_run_recorded_again_stands_before_the_repair_of_its_first_half(tmp_pat
 
 def test_the_repair_of_a_closed_log_stands_in_for_it(tmp_path, make_log):
     log = make_log(tmp_path / "sine.mcap")
-    data = bytearray(log.read_bytes())
-    data[data.find(b"zstd") + 60] ^= 1
-    log.write_bytes(data)
+    flip(log, log.read_bytes().find(b"zstd") + 60)
     repaired = repair_log(log).repaired
     (run,) = IMPORTER.open(tmp_path).runs
     assert run.source == repaired
@@ -179,15 +179,13 @@ def test_two_whole_logs_of_one_name_are_refused(tmp_path):
 
 
 def test_a_damaged_log_is_not_half_imported(tmp_path, log):
-    data = bytearray(log.read_bytes())
-    data[data.find(b"zstd") + 60] ^= 1
-    (tmp_path / "sub").mkdir()
-    damaged = tmp_path / "sub" / "run.mcap"
-    damaged.write_bytes(data)
+    whole = log.read_bytes()
+    damaged = log.rename(tmp_path / "run.mcap")
+    flip(damaged, whole.find(b"zstd") + 60)
     campaign = IMPORTER.open(damaged)
     with pytest.raises(DamagedLogError, match="rig log repair"):
         campaign.runs[0].recording()
-    damaged.write_bytes(log.read_bytes()[:-1])
+    damaged.write_bytes(whole[:-1])
     with pytest.raises(DamagedLogError, match="does not end as MCAP"):
         IMPORTER.open(damaged)
 
@@ -214,3 +212,18 @@ def test_one_file_that_is_no_log_does_not_close_the_others(tmp_path):
     (tmp_path / "a.mcap").unlink()
     with pytest.raises(DataError, match="not an MCAP file"):
         open_campaign(tmp_path)
+
+
+EXAMPLE = ROOT / "logs" / "example"
+
+
+def test_the_example_is_whole_and_reads_as_a_run():
+    (log,) = EXAMPLE.glob("*.mcap")
+    assert check_log(log).verdict is Verdict.COMPLETE
+    (run,) = open_campaign(EXAMPLE)
+    assert len(run) == 2000
+    assert run.conditions["load_command_a"] == 0.5
+    assert run.conditions["frequency_hz"] == 0.5
+    np.testing.assert_allclose(run["load_command_a"], 0.5)
+    grasp_rad = np.ptp(run["spindle_angle_rad"])
+    assert 0.98 * np.pi / 3 < grasp_rad < 1.02 * np.pi / 3

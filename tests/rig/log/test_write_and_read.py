@@ -10,6 +10,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 
+from benchmarks.reliability.kills import kill_once
 from estimation.recording import Flag, Mark, Stretch
 from rig.errors import DataError, UsageError
 from rig.log.container import Container
@@ -41,8 +42,7 @@ def times(count, first=0):
 class Clock:
     """A clock that stands still until it is moved."""
 
-    def __init__(self):
-        self.now_s = 100.0
+    now_s = 100.0
 
     def __call__(self):
         return self.now_s
@@ -111,9 +111,8 @@ def test_a_file_of_another_writer_with_interleaved_streams_is_read(tmp_path, com
         writer.start("ros2", library="other")
         numbers = {}
         for stream in (STREAM, other):
-            schema = writer.register_schema(
-                stream.message_type, "ros2msg", stream.schema_text.encode()
-            )
+            text = stream.schema_text.encode()
+            schema = writer.register_schema(stream.message_type, "ros2msg", text)
             numbers[stream.topic] = writer.register_channel(stream.topic, "cdr", schema)
         text = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
         numbers["/s"] = writer.register_channel("/s", "cdr", text)
@@ -286,3 +285,10 @@ def test_a_signal_while_bytes_are_written_does_not_spoil_the_checksum(tmp_path):
         file.seek(0)
         list(StreamReader(file, validate_crcs=True).records)
     assert not scan(path.read_bytes(), path).damage
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_killed_recorder_loses_at_most_a_quarter_second(tmp_path, seed):
+    killed = kill_once(tmp_path, seed)
+    assert killed.handed_over >= 700
+    assert killed.lost_s <= MAX_LOSS_S
