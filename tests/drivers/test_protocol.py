@@ -29,11 +29,6 @@ def test_no_other_frame_has_the_size_of_a_sample():
     assert (SAMPLE_DTYPE.itemsize - 4) % SETPOINT_DTYPE.itemsize
 
 
-def test_the_text_names_every_kind():
-    lines = REFERENCE.text.splitlines()
-    assert [line.split(":")[0] for line in lines[2:-3]] == [f"{k} {k.name}" for k in Kind]
-
-
 def test_an_unknown_trip_is_refused():
     fields = REFERENCE.decode(protocol.encode(Kind.TRIP_REPORT, 1, 99, 255, 0, 0, 0, 0))[2]
     with pytest.raises(FrameError, match="99"):

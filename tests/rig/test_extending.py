@@ -9,7 +9,6 @@ import pytest
 
 from drivers.errors import LinkError
 from estimation.effects import UnknownEffectError, catalogue, effect
-from rig.cli.main import main
 from tests.estimation import test_effects as contract
 
 PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
@@ -39,30 +38,25 @@ def install(tmp_path, monkeypatch):
     catalogue.cache_clear()
 
 
-def test_the_templates_effect_keeps_the_contract_of_every_effect(install, capsys):
+def test_the_templates_effect_keeps_the_contract_of_every_effect(install, said):
     install()
     kind = effect("friction.cubic")
     contract.test_an_effect_is_documented_and_its_parameters_have_units_and_bounds(kind)
     contract.test_a_search_may_enter_it_in_each_balance_it_names_with_units(kind)
     contract.test_a_sample_that_is_not_finite_spoils_no_later_one(kind)
     contract.test_columns_stay_finite_on_constant_and_repeated_samples(kind, 0.4)
-    assert main(["effects", "friction.cubic"]) == 0
-    assert "cube of speed" in capsys.readouterr().out
+    assert "cube of speed" in said("effects friction.cubic").out
 
 
-def test_the_templates_importer_opens_its_files(install, tmp_path, capsys):
+def test_the_templates_importer_opens_its_files(install, tmp_path, said):
     install()
     folder = tmp_path / "bench"
     folder.mkdir()
     time_s = np.arange(4000) / 1000
     torque_n_m = 0.3 * np.sin(time_s)
-    np.savetxt(
-        folder / "a.acme", np.column_stack([time_s * 1e3, 400 * torque_n_m, torque_n_m * 1e2])
-    )
-    assert (
-        main(["log", "export", str(folder), "--format", "csv", "--out", str(tmp_path / "t.csv")])
-        == 0
-    )
+    rows = np.column_stack([time_s * 1e3, 400 * torque_n_m, torque_n_m * 1e2])
+    np.savetxt(folder / "a.acme", rows)
+    said("log export", folder, "--format csv --out", tmp_path / "t.csv")
     head = (tmp_path / "t.csv").read_text().splitlines()[0]
     assert '"motor_current_a","proximal_torque_n_m"' in head
 

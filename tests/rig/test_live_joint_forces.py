@@ -9,7 +9,6 @@ import pytest
 
 from estimation import model_file
 from estimation.recording import Recording
-from rig.cli.main import main
 from rig.configuration.config import SHIPPED
 from rig.diagnosis.subject import subject
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints, of_joints
@@ -32,15 +31,14 @@ def test_the_grasp_is_of_both_jaws_and_the_pitch_of_the_one_that_touches():
     assert [widths[joint] for joint in JOINTS] == pytest.approx([0.15, 0.2, 0.3])
 
 
-def test_live_shows_three_forces_with_intervals_and_the_age_of_their_fit(capsys):
-    assert main(["live", "-c", "grasper", "--pace", "0", "--duration", "6", "--json"]) == 0
-    frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    channels = frames[-2]["channels"]
+def test_live_shows_three_forces_with_intervals_and_the_age_of_their_fit(said):
+    frame = json.loads(said("live -c grasper --pace 0 --duration 6 --json").out.splitlines()[-2])
+    channels = frame["channels"]
     assert tuple(channels) == JOINTS
     for channel in channels.values():
         assert channel["half_width95"] > 0
         assert abs(channel["estimate"] - channel["sensor"]) < 2 * channel["half_width95"]
-    (status,) = [d for d in frames[-2]["devices"] if d["name"] == "estimate"]
+    (status,) = [d for d in frame["devices"] if d["name"] == "estimate"]
     assert " ago" in status["detail"]
 
 

@@ -8,11 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 
 from estimation.campaign import Campaign
 from estimation.recording import Flag, Recording, Stretch
-from rig.cli.replay import replay
 from rig.errors import DataError, ExitCode, UsageError
 from rig.live.keys import no_keys
 from rig.live.replay import Pace, lost_samples, replay_blocks
@@ -153,58 +151,54 @@ def logs(monkeypatch, tmp_path):
     """Make every path open as the campaign given."""
 
     def use(*recordings):
-        monkeypatch.setattr(
-            "rig.machines.recordings.open_campaign", lambda *_: Campaign.of(recordings)
-        )
-        return str(tmp_path)
+        campaign = Campaign.of(recordings)
+        monkeypatch.setattr("rig.machines.recordings.open_campaign", lambda *_: campaign)
+        return tmp_path
 
     return use
 
 
-def command(*words):
-    app = typer.Typer()
-    app.command()(replay)
-    return app(args=[*words], standalone_mode=False)
+@pytest.fixture
+def frames(said):
+    """Replay as JSON lines; return the frames and the summary."""
+
+    def run(path, words=""):
+        printed = said("replay --json --speed 0", path, words)
+        assert printed.err == ""
+        *found, last = map(json.loads, printed.out.splitlines())
+        return found, last["summary"]
+
+    return run
 
 
-def test_a_recording_of_another_machine_is_shown_by_a_channel_that_it_has(logs, capsys):
-    own = recording()
-    current_a = own["motor_current_a"]
-    path = logs(recording(columns={"motor_angle_rad": current_a, "motor_current_a": current_a}))
-    assert command(path, "--json", "--speed", "0") == 0
-    frames = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    (shown,) = frames[-2]["channels"].items()
+def test_a_recording_of_another_machine_is_shown_by_a_channel_that_it_has(logs, frames):
+    current_a = recording()["motor_current_a"]
+    columns = {"motor_angle_rad": current_a, "motor_current_a": current_a}
+    found, _ = frames(logs(recording(columns=columns)))
+    (shown,) = found[-1]["channels"].items()
     assert shown[0] == "motor_current_a"
     assert shown[1]["sensor"] is not None
 
 
-def test_command_writes_json_lines(logs, capsys):
-    path = logs(recording())
-    assert command(path, "--json", "--speed", "0", "--lever-mm", "10") == 0
-    out, err = capsys.readouterr()
-    frames = [json.loads(line) for line in out.splitlines()]
-    assert len(frames) == 21
-    grip = frames[5]["channels"][GRIP]
+def test_command_writes_json_lines(logs, frames):
+    found, summary = frames(logs(recording()), "--lever-mm 10")
+    assert len(found) == 20
+    grip = found[5]["channels"][GRIP]
     assert grip["tip_force_n"] == pytest.approx(grip["sensor"] / 0.010)
     assert grip["tip_force_from"] == "sensor"
-    assert frames[-1]["summary"]["samples"] == 2000
-    assert err == ""
+    assert summary["samples"] == 2000
 
 
-def test_command_writes_plain_lines_and_reports_which_run(logs, capsys):
+def test_command_writes_plain_lines_and_reports_which_run(logs, said):
     path = logs(recording("00").exclude("runaway"), recording("01"), recording("02"))
-    assert command(path, "--plain", "--speed", "0") == 0
-    out, err = capsys.readouterr()
+    out, err = said("replay --plain --speed 0", path)
     assert err == "Run 01, 2 of 3; --run NAME shows another.\n"
     assert "Finished after 2.0 s: 2000 samples, lost 0." in out
 
 
-@pytest.mark.parametrize(
-    "words", [("--run", "99"), ("--speed", "-1"), ("--speed", "nan"), ("--lever-mm", "0")]
-)
-def test_command_refuses_what_cannot_be(logs, words):
-    with pytest.raises(UsageError):
-        command(logs(recording()), *words)
+@pytest.mark.parametrize("words", ["--run 99", "--speed -1", "--speed nan", "--lever-mm 0"])
+def test_command_refuses_what_cannot_be(logs, words, said):
+    said("replay", logs(recording()), words, code=2)
 
 
 def test_a_reader_that_closes_early_causes_no_message(tmp_path):

@@ -1,13 +1,9 @@
 """`rig study delsol` on one simulated hydraulic arm."""
 
-import json
-
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from rig.arm.hidden import FAMILIES
-from rig.cli.study import study_app
 from rig.output.provenance import Provenance
 from rig.studies.delsol import study as delsol
 from rig.studies.delsol.diagnosis import PULLS, Named
@@ -19,15 +15,15 @@ pytestmark = pytest.mark.long
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
 
-def test_the_command_finds_the_hoses_and_does_better_than_the_paper(tmp_path, monkeypatch):
+def test_the_command_finds_the_hoses_and_does_better_than_the_paper(
+    tmp_path, monkeypatch, answered
+):
     done = delsol.one_arm(0)
     monkeypatch.setattr(delsol, "one_arm", lambda number: done)
     out = tmp_path / "delsol.md"
-    words = ["delsol", "--seeds", "1", "--json", "--out", str(out), "--state", str(tmp_path)]
-    ran = CliRunner().invoke(study_app, [*words, "--figures", str(tmp_path / "figures")])
-    assert ran.exit_code == 0, ran.output
+    words = ("study delsol --seeds 1 --out", out, "--state", tmp_path)
+    found = answered(*words, "--figures", tmp_path / "figures")
     assert "figures/delsol-forces.svg" in out.read_text()
-    found = json.loads(ran.stdout)
     assert len(found["named"]) == len(FAMILIES)
     pulls = [each for each in found["named"][0] if each["family"] in PULLS]
     assert [each["joint"] for each in pulls] == [1]

@@ -1,14 +1,11 @@
 """`rig study loop` on made recordings whose friction changes along the travel and sticks."""
 
-import json
-
 import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
 from estimation.effects import effect
 from estimation.recording import Instrument, Recording
-from rig.cli.main import main
 from rig.errors import DataError
 from rig.studies.loop import study as loop
 
@@ -63,11 +60,9 @@ def test_friction_that_sticks_is_found_and_proved_on_runs_kept_back(made, tmp_pa
     assert row.parameters == 2 + sum(step.parameters for step in row.steps) <= 15
 
 
-def test_the_command_writes_tables_and_json(made, tmp_path, capsys):
+def test_the_command_writes_tables_and_json(made, tmp_path, answered):
     page = tmp_path / "loop.md"
-    words = ["study", "loop", "--data", str(tmp_path), "--task", "1", "--out", str(page), "--json"]
-    assert main(words) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = answered("study loop --task 1 --data", tmp_path, "--out", page)
     assert found["rows"][0]["task"]["samples"] == "closing"
     text = page.read_text()
     assert "held-out test runs" in text

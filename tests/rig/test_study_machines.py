@@ -1,13 +1,11 @@
 """`rig study machines` on small tables of the same layouts as the published ones."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import savemat
 
-from rig.cli.main import main
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import read_runs
 from rig.machines.shipped import place_of
@@ -36,10 +34,9 @@ def test_the_published_estimates_find_what_was_planted(data):
 
 
 @pytest.mark.long
-def test_absent_machines_are_named_and_the_others_studied(data, capsys):
+def test_absent_machines_are_named_and_the_others_studied(data, answered):
     page = data / "page.md"
-    assert main(["study", "machines", str(data), "--out", str(page), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = answered("study machines", data, "--out", page)
     (row,) = found["rows"]
     assert (row["case"], row["equation"]) == ("EMPS", "carriage")
     assert np.isfinite(row["declared_percent"])
@@ -49,6 +46,5 @@ def test_absent_machines_are_named_and_the_others_studied(data, capsys):
     assert "(../machines/emps.md)" in text
 
 
-def test_a_folder_without_any_machine_is_refused(tmp_path, capsys):
-    assert main(["study", "machines", str(tmp_path)]) == 2
-    assert "No machine's recordings" in capsys.readouterr().err
+def test_a_folder_without_any_machine_is_refused(tmp_path, said):
+    assert "No machine's recordings" in said("study machines", tmp_path, code=2).err

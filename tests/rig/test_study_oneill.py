@@ -1,15 +1,14 @@
 """`rig study oneill` on an analytic campaign, and on the measured data where it is there."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from estimation.campaign import Campaign
-from estimation.recording import Flag, Stretch
-from rig.cli.study import study_app
+from estimation.recording import Flag, Recording, Stretch
 from rig.errors import DataError
 from rig.studies.oneill import data
 from rig.studies.oneill.data import Source, open_reference
@@ -59,12 +58,10 @@ def test_a_run_with_flagged_closing_samples_is_left_out_with_the_reason():
 
 def test_what_is_missing_is_reported_and_too_little_is_refused():
     runs = list(campaign())
-    bare = [
-        type(r)(
-            r.name, r.time_s, {n: v for n, v in r.columns.items() if n != "motor_command_ratio"}
-        )
-        for r in runs
-    ]
+    bare = []
+    for r in runs:
+        columns = {n: v for n, v in r.columns.items() if n != "motor_command_ratio"}
+        bare.append(Recording(r.name, r.time_s, columns))
     found = run_study(Source(Campaign.of(bare), "x", measured=False))
     assert {row.surrogate for row in found.rows} == {"current", "gearbox"}
     assert any("no command" in note for note in found.notes)
@@ -87,9 +84,7 @@ def test_markdown_states_counts_rows_and_provenance(result):
 
 def named(names: list[str]) -> Campaign:
     runs = list(campaign())[: len(names)]
-    return Campaign.of(
-        type(r)(name, r.time_s, r.columns) for r, name in zip(runs, names, strict=True)
-    )
+    return Campaign.of(replace(r, name=name) for r, name in zip(runs, names, strict=True))
 
 
 def test_the_reference_part_is_picked_and_reported(tmp_path, monkeypatch):
@@ -112,20 +107,18 @@ def test_the_reference_part_is_picked_and_reported(tmp_path, monkeypatch):
     assert "do not apply" in other.notes[0]
 
 
-def test_the_command_writes_tables_and_json(tmp_path, monkeypatch):
+def test_the_command_writes_tables_and_json(tmp_path, monkeypatch, said):
     monkeypatch.setattr(
         data, "open_reference", lambda path: Source(campaign(), "analytic rig", measured=False)
     )
-    words = ["oneill", "--data", str(tmp_path), "--json", "--seed", "5"]
-    words += ["--out", str(tmp_path / "d" / "oneill.md")]
-    done = CliRunner().invoke(study_app, words, catch_exceptions=False)
-    assert done.exit_code == 0
-    found = json.loads(done.stdout)
+    out = tmp_path / "d" / "oneill.md"
+    printed = said("study oneill --json --seed 5 --data", tmp_path, "--out", out)
+    found = json.loads(printed.out)
     assert found["schema"] == "rig.study.oneill/1"
     assert found["provenance"]["seed"] == 5
     assert len(found["rows"]) == 15
-    assert "Table I: proximal torque" in done.stderr
-    assert (tmp_path / "d" / "oneill.md").read_text().startswith("# Grip torque and jaw angle")
+    assert "Table I: proximal torque" in printed.err
+    assert out.read_text().startswith("# Grip torque and jaw angle")
 
 
 @pytest.mark.measured

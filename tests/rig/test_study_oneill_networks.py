@@ -5,12 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from estimation.campaign import Campaign
 from estimation.networks.training import Settings, has_torch, train
 from estimation.scores import rmse
-from rig.cli.study import study_app
 from rig.errors import DataError
 from rig.studies.oneill import data
 from rig.studies.oneill import networks as study
@@ -19,7 +16,7 @@ from rig.studies.oneill.data import CAUSAL, Source, closing_table, held_out_mask
 from rig.studies.oneill.network_jobs import CHANNELS, jobs
 from rig.studies.oneill.networks import NetworkStudy, Training, run_networks
 from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROXIMAL
-from tests.estimation.synthetic import campaign
+from tests.estimation.synthetic import campaign_with_jaw
 
 pytestmark = pytest.mark.long
 
@@ -27,16 +24,9 @@ torch_only = pytest.mark.skipif(not has_torch(), reason="torch is not installed 
 QUICK = Settings(iterations=4)
 
 
-def with_jaw() -> Campaign:
-    return Campaign.of(
-        run.with_columns(jaw_angle_rad=1.1 * run["spindle_angle_rad"] - 0.3 * run[DISTAL])
-        for run in campaign()
-    )
-
-
 @pytest.fixture(scope="module")
 def table():
-    return closing_table(with_jaw(), CHANNELS)
+    return closing_table(campaign_with_jaw(), CHANNELS)
 
 
 def test_masks_hold_out_whole_runs_conditions_or_samples(table):
@@ -51,7 +41,7 @@ def test_masks_hold_out_whole_runs_conditions_or_samples(table):
         {f"{r // 3}{r % 3}" for r in set(table.run[m])}
         for m in held_out_masks(table, "run-wise", 3)
     ]
-    assert folds == [set(split.test.names) for split in with_jaw().folds(5, 3)]
+    assert folds == [set(split.test.names) for split in campaign_with_jaw().folds(5, 3)]
     bare = replace(table, conditions={**table.conditions, "frequency_hz": np.full(9, np.nan)})
     assert held_out_masks(bare, "lofo", 0) == []
 
@@ -60,7 +50,7 @@ def test_the_table_holds_each_channel_without_lag_and_as_live(table):
     live, offline = (table[[p + PROXIMAL]][:, 0] for p in (CAUSAL, ""))
     assert 0 < np.sqrt(np.mean((live - offline) ** 2)) < 0.01
     with pytest.raises(DataError, match="wrist_roll_rad"):
-        closing_table(with_jaw(), CHANNELS, ("wrist_roll_rad",))
+        closing_table(campaign_with_jaw(), CHANNELS, ("wrist_roll_rad",))
 
 
 def test_an_estimate_holds_no_more_than_half_a_second_and_no_target():
@@ -125,16 +115,16 @@ def test_rows_are_scored_next_to_the_paper(deep):
 
 
 @torch_only
-def test_the_command_reports_what_it_could_not_train(tmp_path, monkeypatch):
+def test_the_command_reports_what_it_could_not_train(tmp_path, monkeypatch, said):
     monkeypatch.setattr(
-        data, "open_reference", lambda path: Source(with_jaw(), "analytic rig", measured=False)
+        data,
+        "open_reference",
+        lambda path: Source(campaign_with_jaw(), "analytic rig", measured=False),
     )
-    words = ["oneill", "--data", str(tmp_path), "--networks", "--minutes", "0", "--json"]
-    words += ["--state", str(tmp_path / "s"), "--out", str(tmp_path / "d.md")]
-    done = CliRunner().invoke(study_app, words, catch_exceptions=False)
-    assert done.exit_code == 0
-    assert json.loads(done.stdout)["networks"]["rows"] == []
-    assert "Not run" in done.stderr
+    words = ("study oneill --networks --minutes 0 --json --data", tmp_path)
+    printed = said(*words, "--state", tmp_path / "s", "--out", tmp_path / "d.md")
+    assert json.loads(printed.out)["networks"]["rows"] == []
+    assert "Not run" in printed.err
     assert "Not run" in (tmp_path / "d.md").read_text()
 
 

@@ -1,10 +1,7 @@
 """`rig study payload` on the measured runs with and without a mass."""
 
-import json
-
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from estimation.arm.motion import motion_of
 from estimation.arm.payload import carried_torque
@@ -13,9 +10,8 @@ from estimation.arm.tables import PSM, PointMass
 from estimation.recording import Recording
 from rig.arm.payload import find_payload
 from rig.arm.simulated import draw_arm
-from rig.cli.main import main
-from rig.cli.study import study_app
 from rig.errors import DataError
+from tests.rig.arms import psm_recording
 
 pytestmark = pytest.mark.long
 
@@ -23,15 +19,12 @@ pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)"
 
 
 @pytest.mark.measured
-def test_the_measured_mass_is_found_and_none_where_there_is_none(measured_data, tmp_path):
+def test_the_measured_mass_is_found_and_none_where_there_is_none(measured_data, tmp_path, answered):
     if not (measured_data / "psm").is_dir():
         pytest.skip(f"no arm data at {measured_data / 'psm'}")
     out = tmp_path / "payload.md"
-    words = ["payload", "--data", str(measured_data / "psm"), "--out", str(out), "--json"]
-    words += ["--on", "one19_insertion_105g", "--on", "one19"]
-    ran = CliRunner().invoke(study_app, words)
-    assert ran.exit_code == 0, ran.output
-    with_mass, without = json.loads(ran.stdout)["masses"]
+    words = ("study payload --on one19_insertion_105g --on one19 --out", out)
+    with_mass, without = answered(*words, "--data", measured_data / "psm")["masses"]
     assert with_mass["mass_kg"] == pytest.approx(0.105, rel=0.03)
     assert abs(without["mass_kg"]) < 0.002
     assert "| one19_insertion_105g |" in out.read_text()
@@ -56,16 +49,7 @@ def made_run(name: str, seconds: float, period_s: float, mass_kg: float = 0.0) -
     loaded = PSM.with_payload(PointMass("weight", 2, (0.01, 0.535, -0.02), mass_kg))
     torque = regressor(PSM, motion) @ ARM + carried_torque(loaded, motion)
     torque += 0.002 * np.ptp(torque, axis=0) * rng.normal(size=torque.shape)
-    columns = {}
-    for k in range(7):
-        units = (
-            "angle_rad velocity_rad_s torque_n_m" if k != 2 else "position_m velocity_m_s force_n"
-        )
-        effort = torque[:, k] if k < 6 else np.zeros(len(time))
-        values = (position[:, k], motion.velocity[:, k], effort)
-        for unit, column in zip(units.split(), values, strict=True):
-            columns[f"joint_{k + 1}_{unit}"] = column
-    return Recording(name, time, columns)
+    return psm_recording(name, position, motion.velocity, torque, RATE_HZ)
 
 
 def test_a_mass_is_found_at_any_speed_even_where_a_run_repeats_only_twice():
@@ -89,7 +73,5 @@ def test_a_mass_mounted_elsewhere_is_refused_and_not_misread():
         find_payload(fitted, [made_run("one19_parallel_105g", 30.0, 5.0, 0.1)], 0.535, 0.005)
 
 
-def test_a_run_named_twice_is_refused(capsys):
-    words = ["study", "payload", "--data", ".", "--on", "two18"]
-    assert main(words) == 2
-    assert "named twice" in capsys.readouterr().err
+def test_a_run_named_twice_is_refused(said):
+    assert "named twice" in said("study payload --data . --on two18", code=2).err

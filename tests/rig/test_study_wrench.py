@@ -1,14 +1,9 @@
 """`rig study wrench`: tables 3.1 to 3.3 of the thesis on simulated arms."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
-
-from rig.cli.main import main
-from rig.cli.study import study_app
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
@@ -23,18 +18,16 @@ pytestmark = pytest.mark.long
 FREE = (HAND, SERIES)
 
 
-def test_the_command_reports_every_family(tmp_path, monkeypatch):
+def test_the_command_reports_every_family(tmp_path, monkeypatch, answered):
     done = {number: one_arm(number) for number in (0, 1)}
     monkeypatch.setattr(
         "rig.studies.wrench.study.one_arm",
         lambda number: replace(done[min(number, 1)], family=FAMILIES[number]),
     )
     out = tmp_path / "wrench.md"
-    words = ["wrench", "--seeds", "1", "--json", "--out", str(out), "--state", str(tmp_path)]
-    ran = CliRunner().invoke(study_app, [*words, "--figures", str(tmp_path / "figures")])
-    assert ran.exit_code == 0, ran.output
+    words = ("study wrench --seeds 1 --out", out, "--state", tmp_path)
+    found = answered(*words, "--figures", tmp_path / "figures")
     assert "figures/wrench-3-3.svg" in out.read_text()
-    found = json.loads(ran.stdout)
     assert [arm["family"] for arm in found["arms"]] == list(FAMILIES)
     thesis, ours = (
         np.mean([arm["errors"][table][method] for arm in found["arms"] for table in FREE])
@@ -58,10 +51,9 @@ def test_wrenches_in_the_tip_frame_are_those_of_the_body_jacobian():
     assert np.allclose(at_base, at_tip)
 
 
-def test_an_interrupted_study_reports_how_to_go_on(tmp_path, monkeypatch, capsys):
+def test_an_interrupted_study_reports_how_to_go_on(tmp_path, monkeypatch, said):
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("rig.studies.wrench.study.run", stopped)
-    assert main(["study", "wrench", "--state", str(tmp_path)]) == 130
-    assert f"kept in {tmp_path}" in capsys.readouterr().err
+    assert f"kept in {tmp_path}" in said("study wrench --state", tmp_path, code=130).err

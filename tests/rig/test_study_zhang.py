@@ -1,16 +1,12 @@
 """`rig study zhang`: seven joints on simulated arms, networks and physical model."""
 
-import json
-
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from estimation.arm.wrist import candidates
 from estimation.networks.training import Settings, has_torch
 from rig.arm.hidden import FAMILIES
 from rig.arm.simulated import draw_arm
-from rig.cli.study import study_app
 from rig.studies.seeds import Keeper
 from rig.studies.zhang import free as zhang_free
 from rig.studies.zhang import networks as zhang_networks
@@ -77,7 +73,9 @@ def test_free_motion_identifies_the_error_of_the_coupling_matrix():
 
 
 @torch_only
-def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path, monkeypatch):
+def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(
+    tmp_path, monkeypatch, answered
+):
     monkeypatch.setattr(zhang_free, "MINUTES", 2.8)
     monkeypatch.setattr(zhang_free, "OTHER_MINUTES", (1.0, 0.3, 0.4))
     monkeypatch.setattr(zhang_free, "OUR_OTHER_MINUTES", 0.5)
@@ -87,10 +85,8 @@ def test_the_command_does_all_experiments_and_goes_on_where_it_stopped(tmp_path,
     done = one_arm(0)
     monkeypatch.setattr("rig.studies.zhang.study.one_arm", lambda number: done)
     out, state = tmp_path / "zhang.md", tmp_path / "state"
-    words = ["zhang", "--seeds", "1", "--json", "--out", str(out), "--state", str(state)]
-    ran = CliRunner().invoke(study_app, [*words, "--figures", str(tmp_path)])
-    assert ran.exit_code == 0, ran.output
-    found = json.loads(ran.stdout)
+    words = ("study zhang --seeds 1 --out", out, "--state", state, "--figures", tmp_path)
+    found = answered(*words)
     assert len(found["outcomes"]) == len(FAMILIES)
     cells = found["outcomes"][0]
     networks, ours = (

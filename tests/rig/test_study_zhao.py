@@ -9,7 +9,6 @@ from estimation.effects import effect
 from estimation.filters import CausalFilter, LowPass
 from estimation.model import Estimate, Term
 from estimation.model_file import parse, to_toml
-from rig.cli.main import main
 from rig.grasper.current_force import CurrentForce, angle_led
 from rig.grasper.hidden import FAMILIES, OWN, with_family
 from rig.grasper.inputs import end_of_hold, hold
@@ -156,6 +155,5 @@ def test_haptics_are_right_also_with_friction_not_declared():
         assert material.mean_n_rad == pytest.approx(material.true_n_rad, rel=0.15)
 
 
-def test_an_unknown_prototype_is_refused(capsys):
-    assert main(["study", "zhao", "--prototype", "fourth"]) == 2
-    assert "third, journal, ball" in capsys.readouterr().err
+def test_an_unknown_prototype_is_refused(said):
+    assert "third, journal, ball" in said("study zhao --prototype fourth", code=2).err
