@@ -6,9 +6,12 @@ import pytest
 
 from estimation.campaign import Campaign
 from estimation.recording import Recording
+from rig.studies.instruments import intervals_page
+from rig.studies.instruments.intervals import TARGETS, run_intervals
 from rig.studies.instruments.page import page
 from rig.studies.instruments.study import run_instruments
-from tests.estimation.synthetic import campaign
+from rig.studies.oneill.paper import PROXIMAL
+from tests.estimation.synthetic import campaign, campaign_with_jaw
 
 pytestmark = pytest.mark.long
 
@@ -50,3 +53,41 @@ def test_every_single_run_and_threes_are_adapted_with(study):
     wanted = study.rows[0].result.adapted.rmse
     assert min(abs(error - wanted) for error in one.rmse_n_m) < 0.01 * wanted
     assert [row[2] for row in page(study).tables[1].rows] == ["9", "40"]
+
+
+@pytest.fixture(scope="module")
+def covered():
+    runs = list(campaign_with_jaw())
+    other = [run.with_columns(**{PROXIMAL: run[PROXIMAL] + 0.02}) for run in runs]
+    both = {"own": Campaign.of(runs), "other": Campaign.of(other)}
+    return run_intervals(both, ["own", "other"])
+
+
+def test_each_run_is_held_out_once_and_once_for_each_condition(covered):
+    for name in ("own", "other"):
+        for target in TARGETS:
+            rows = [r for r in covered.levels if (r.instrument, r.target) == (name, target)]
+            by = {row.left_out: row for row in rows}
+            assert by["run"].runs == 9
+            assert by["edge"].runs + by["between"].runs == 2 * 9
+    for row in (*covered.levels, *covered.adapted):
+        assert row.worst_run <= row.worst_level <= row.covered <= 1
+        assert row.worst_run <= row.median <= 1
+        assert 0 <= row.no_width < 1
+        assert row.half_width > 0
+
+
+def test_adapted_rows_hold_the_runs_that_were_not_adapted_with(covered):
+    assert {(row.left_out, row.runs) for row in covered.adapted} == {("1 run", 8), ("3 runs", 6)}
+    moved = [row for row in covered.adapted if row.target == PROXIMAL]
+    assert all(row.rmse < 0.01 for row in moved)  # the other zero is taken up
+
+
+def test_the_page_states_the_aims_and_every_row(covered):
+    shown = intervals_page.page(covered)
+    levels, adapted = shown.tables
+    assert len(levels.rows) == len(covered.levels)
+    assert len(adapted.rows) == len(covered.adapted)
+    assert "1.4 times that on unseen runs" in shown.paragraphs[0]
+    usual = [row for row in levels.rows if row[2] == "run"]
+    assert {row[-2] for row in usual} == {"1.00"}
