@@ -9,7 +9,8 @@ from drivers.teensy import protocol
 from drivers.teensy.core import BoardStart, CoreGuard, FirmwareBoard, FirmwareMissingError
 from drivers.teensy.protocol import Kind, Result, SafeState, Trip
 from drivers.teensy.reference import Limits
-from tests.drivers.bench_physics import PlainBench, ScriptedBench
+from rig.simulation.bench import SimulatedBench
+from tests.drivers.bench_physics import ScriptedBench
 from tests.drivers.raw_host import GAINS, RawHost
 
 WIDEST = Limits()
@@ -138,7 +139,7 @@ def test_a_late_sample_is_judged_by_the_time_that_passed(library):
     rows = np.zeros((4, 6), np.int32)
     rows[:, 0] = (0, 90, 180, 270)
     for ticks, expected in ((10.0, Trip.NONE), (1.0, Trip.ENCODER_JUMP)):
-        guard = CoreGuard(RawHost(FirmwareBoard(PlainBench())).profile, GAINS, limits, library)
+        guard = CoreGuard(RawHost(FirmwareBoard(SimulatedBench())).profile, GAINS, limits, library)
         assert guard.first_crossing(rows, np.full(4, ticks))[1] == expected
 
 
@@ -305,7 +306,7 @@ def test_setpoints_neither_jump_nor_begin_far_from_the_shaft(library):
 
 def test_no_host_raises_a_limit_that_the_board_was_built_with(library):
     own = dataclasses.replace(TIGHT, watchdog_us=100_000, torque_e3=70, dry_ticks=500)
-    board = FirmwareBoard(PlainBench(), library=library, own=([1, 0, 0, 0, 2700], own))
+    board = FirmwareBoard(SimulatedBench(), library=library, own=([1, 0, 0, 0, 2700], own))
     within = {"gains": [20.0, 0, 0, 0.5, 2700.0], "limits": own}
     host = RawHost(board, gains=within["gains"])
     for change in (
@@ -329,9 +330,9 @@ def test_refusals(library):
     nan = GAINS.copy()
     nan[0] = np.nan
     for gains in (nan, GAINS * np.inf, GAINS * 1e5, GAINS * [1, 1, 1, -1, 1], -GAINS):
-        host = RawHost(FirmwareBoard(PlainBench(), library=library), gains=gains)
+        host = RawHost(FirmwareBoard(SimulatedBench(), library=library), gains=gains)
         assert host.arm() is Result.BAD_VALUE
-    host = RawHost(FirmwareBoard(PlainBench(), library=library))
+    host = RawHost(FirmwareBoard(SimulatedBench(), library=library))
     for change in (
         {"max_current": -1},
         {"min_spindle": 1, "max_spindle": 0},
@@ -369,7 +370,7 @@ def test_refusals(library):
 
 
 def test_a_host_that_does_not_read_loses_whole_frames_and_gets_their_number(library):
-    board = FirmwareBoard(PlainBench(), library=library)
+    board = FirmwareBoard(SimulatedBench(), library=library)
     host = RawHost(board)
     host.command(Kind.START)
     board.advance(3000)
@@ -383,7 +384,7 @@ def test_a_host_that_does_not_read_loses_whole_frames_and_gets_their_number(libr
 
 def test_a_missing_library_reports_what_to_type(tmp_path):
     with pytest.raises(FirmwareMissingError, match="make -C firmware"):
-        FirmwareBoard(PlainBench(), library=tmp_path / "none.so")
+        FirmwareBoard(SimulatedBench(), library=tmp_path / "none.so")
     (tmp_path / "other.so").write_bytes(b"no library")
     with pytest.raises(FirmwareMissingError, match="make -C firmware"):
-        FirmwareBoard(PlainBench(), library=tmp_path / "other.so")
+        FirmwareBoard(SimulatedBench(), library=tmp_path / "other.so")

@@ -11,19 +11,19 @@ from drivers.teensy.fake import PythonBoard
 from drivers.teensy.protocol import Kind, Result, Trip
 from drivers.teensy.reference import Limits
 from drivers.transport.simulated import Board
-from tests.drivers.bench_physics import START_SPINDLE, PlainBench
+from rig.simulation.bench import SimulatedBench
 from tests.drivers.raw_host import GAINS, RawHost
 
 QUICK = Limits(watchdog_us=100_000)
-HERE = START_SPINDLE
+HERE = 1366
 
 
 @pytest.fixture(params=["plain", "core"])
 def board(request: pytest.FixtureRequest) -> Board:
     """A board on its bench: the plain simulated one, and the compiled core."""
     if request.param == "plain":
-        return PythonBoard(PlainBench())
-    return FirmwareBoard(PlainBench(), library=request.getfixturevalue("library"))
+        return PythonBoard(SimulatedBench())
+    return FirmwareBoard(SimulatedBench(), library=request.getfixturevalue("library"))
 
 
 def moving_host(board: Board) -> RawHost:
@@ -163,7 +163,7 @@ def test_a_trip_is_cleared_by_its_name_alone(board):
 def test_offers_differ_between_starts_of_a_board(library):
     offers = set()
     for boot in range(1, 40):
-        host = RawHost(FirmwareBoard(PlainBench(), BoardStart(boot=boot)))
+        host = RawHost(FirmwareBoard(SimulatedBench(), BoardStart(boot=boot)))
         for _ in range(5):
             offers.add(host.hello().offer)
             assert host.arm() is Result.OK

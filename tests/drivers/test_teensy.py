@@ -23,11 +23,12 @@ from drivers.teensy.protocol import Result
 from drivers.teensy.reference import REFERENCE, Limits
 from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import Board, SimulatedTransport
-from tests.drivers.bench_physics import START_SPINDLE, PlainBench
+from rig.simulation.bench import SimulatedBench
 from tests.drivers.taps import once
 
 GAINS = [20.0, 0.05, -1.0, 0.2, 10000.0]
 WIDEST = Limits()
+START_SPINDLE = 1366
 
 MakeBoard = Callable[..., Board]
 
@@ -36,9 +37,9 @@ MakeBoard = Callable[..., Board]
 def make_board(request: pytest.FixtureRequest) -> MakeBoard:
     """A board on its bench: the Python fake, and the firmware core."""
     if request.param == "fake":
-        return lambda tick_us=0: PythonBoard(PlainBench(), tick_us)
+        return lambda tick_us=0: PythonBoard(SimulatedBench(), tick_us)
     library = request.getfixturevalue("library")
-    return lambda tick_us=0: FirmwareBoard(PlainBench(), BoardStart(tick_us=tick_us), library)
+    return lambda tick_us=0: FirmwareBoard(SimulatedBench(), BoardStart(tick_us=tick_us), library)
 
 
 def logger_of(board: Board) -> TeensyLogger:
@@ -165,7 +166,7 @@ def test_a_dry_queue_holds_the_last_target_and_reports_it(make_board):
     ],
 )
 def test_setpoints_are_whole_numbers_in_range(targets, loads):
-    logger = logger_of(PythonBoard(PlainBench()))
+    logger = logger_of(PythonBoard(SimulatedBench()))
     logger.arm(GAINS, WIDEST)
     with pytest.raises(DriverError):
         logger.queue(targets, loads)
@@ -176,7 +177,7 @@ def test_setpoints_are_whole_numbers_in_range(targets, loads):
 
 
 def test_another_protocol_is_refused_by_name_before_anything_moves():
-    board = PythonBoard(PlainBench(), protocol_hash=0xDEADBEEF)
+    board = PythonBoard(SimulatedBench(), protocol_hash=0xDEADBEEF)
     logger = logger_of(board)
     with pytest.raises(
         ProtocolMismatchError, match=f"deadbeef.*{REFERENCE.protocol_hash:08x}.*rig firmware flash"
@@ -186,7 +187,7 @@ def test_another_protocol_is_refused_by_name_before_anything_moves():
 
 
 def test_a_hello_reply_of_another_layout_is_a_mismatch():
-    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(SimulatedBench()))
     cable.incoming = once(lambda _: encode_frame(b"\x02\x02\x01\x00" + bytes(60)))
     with pytest.raises(ProtocolMismatchError, match="another layout"):
         logger.identify()
@@ -211,7 +212,7 @@ def test_a_half_frame_at_the_start_does_no_harm(make_board):
 
 
 def test_a_silent_board_is_a_timeout_after_the_retries():
-    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(SimulatedBench()))
     cable.incoming = lambda _: b""
     with pytest.raises(LinkTimeoutError, match="sim://"):
         logger.identify()
@@ -271,7 +272,7 @@ def test_lost_and_repeated_samples_are_counted_and_never_made_up(make_board):
 
 
 def test_frames_nobody_expected_are_counted():
-    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(SimulatedBench()))
     logger.start()
     strange = encode_frame(bytes(42)) + encode_frame(b"\x01\x63ab") + encode_frame(b"\x01\x10ab")
     cable.incoming = once(lambda data: strange + data)
@@ -281,7 +282,7 @@ def test_frames_nobody_expected_are_counted():
 
 
 def test_disarm_is_not_believed_without_an_answer():
-    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(SimulatedBench()))
     logger.arm(GAINS, WIDEST)
     cable.incoming = lambda _: b""
     with pytest.raises(DisarmUnconfirmedError, match=r"not confirmed.*cut its supply"):
@@ -293,7 +294,7 @@ def test_disarm_is_not_believed_without_an_answer():
 
 
 def test_disarm_is_not_believed_when_the_board_reports_that_it_is_armed():
-    cable, logger = behind_a_bad_cable(PythonBoard(PlainBench()))
+    cable, logger = behind_a_bad_cable(PythonBoard(SimulatedBench()))
     logger.arm(GAINS, WIDEST)
 
     def still_armed(data: bytes) -> bytes:
@@ -319,6 +320,6 @@ def test_leaving_the_with_block_disarms(make_board):
 
 
 def test_a_disarm_needs_no_matching_protocol():
-    logger = logger_of(PythonBoard(PlainBench(), protocol_hash=1))
+    logger = logger_of(PythonBoard(SimulatedBench(), protocol_hash=1))
     logger.disarm()
     logger.close()

@@ -31,5 +31,5 @@ def example() -> tuple[Diagnosis, Traces]:
         confidence=0.71,
         probabilities={"ripple.motor": 0.71, "ripple.current": 0.25},
     )
-    notes = ("A note with a <tag> & more.",)
-    return replace(found.diagnosis, findings=(doubted,), notes=notes), traces(found)
+    told = {"notes": ("A note with a <tag> & more.",), "noise_floor": {"motor": 1e-3}}
+    return replace(found.diagnosis, findings=(doubted,), **told), traces(found)
