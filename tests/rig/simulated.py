@@ -1,5 +1,6 @@
 """Small protocols and sessions on the simulated rig that several tests share."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import STATUS_ARMED
 from drivers.teensy.reference import REFERENCE
+from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import Board, SimulatedTransport
 from rig.bench.session import Session
 from rig.configuration.config import Config, load_config
@@ -46,21 +48,11 @@ def protocol_file(folder: Path, *, runs: int = 1, duration_s: float = 1.0) -> Pa
     return path
 
 
-class Wrapped:
-    """A board whose output goes through a function: for losing and damaging bytes."""
-
-    def __init__(self, board: Board, change: object) -> None:
-        self._board = board
-        self._change = change
-
-    def receive(self, data: bytes) -> None:
-        self._board.receive(data)
-
-    def advance(self, ticks: int) -> None:
-        self._board.advance(ticks)
-
-    def transmit(self) -> bytes:
-        return self._change(self._board.transmit())
+def behind(link: SimulatedTransport, change: Callable[[bytes], bytes]) -> FaultyTransport:
+    """A link whose incoming bytes go through a function: for losing and damaging them."""
+    cable = FaultyTransport(link)
+    cable.incoming = change
+    return cable
 
 
 def status_of(board: Board, profile: Profile = REFERENCE) -> NDArray[np.uint16]:

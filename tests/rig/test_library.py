@@ -1,4 +1,4 @@
-"""`import rig` as a library: light to import, and the notebook of the documentation runs."""
+"""`import rig` as a library: light to import, the notebook runs; `rig diff` of its campaigns."""
 
 import json
 import runpy
@@ -12,16 +12,17 @@ import pytest
 import rig
 from estimation.campaign import Campaign
 from estimation.recording import Recording
+from rig.log.convert import write_recording
 
 NOTEBOOK = Path(__file__).parents[2] / "docs" / "notebook.ipynb"
 TIME_S = np.arange(0, 8, 0.01)
 
 
-def axis_run(name: str, phase: float) -> Recording:
+def axis_run(name: str, phase: float, damping: float = 5.0, seed: int = 0) -> Recording:
     position = 0.2 * np.sin(2 * TIME_S + phase) + 0.1 * np.sin(0.7 * TIME_S)
     speed = np.gradient(position, TIME_S)
-    noise = np.random.default_rng(int(10 * phase)).normal(0, 0.05, TIME_S.size)
-    force = 2.0 * np.gradient(speed, TIME_S) + 5.0 * speed + noise
+    noise = np.random.default_rng(seed + int(10 * phase)).normal(0, 0.05, TIME_S.size)
+    force = 2.0 * np.gradient(speed, TIME_S) + damping * speed + noise
     return Recording(name, TIME_S, {"axis_position_m": position, "drive_force_n": force})
 
 
@@ -155,3 +156,49 @@ def test_the_notebook_runs(tmp_path):
     assert finding.family == "ripple.motor"
     error = names["found"].errors["motor"]
     assert error.after < error.before
+
+
+def recorded(folder: Path, damping: float, seed: int) -> Path:
+    folder.mkdir()
+    for k in range(5):
+        run = axis_run(f"{k}", 1.3 * k, damping, seed)
+        write_recording(folder / f"{k}.mcap", run)
+    return folder
+
+
+@pytest.fixture
+def axis(tmp_path):
+    (tmp_path / "axis.toml").write_text(MODEL)
+    return tmp_path / "axis.toml"
+
+
+@pytest.mark.integration
+def test_a_change_is_stated_in_words_and_as_json(tmp_path, axis, said):
+    before, after = recorded(tmp_path / "a", 5.0, 100), recorded(tmp_path / "b", 6.5, 200)
+    third = recorded(tmp_path / "c", 6.5, 300)
+    printed = said("diff", before, after, "--on", third, "--json --model", axis)
+    answer = json.loads(printed.out)
+    assert answer["schema"] == "rig.diff/2"
+    (change,) = answer["changes"]
+    assert change["verdict"] == "moved"
+    assert change["parameters"]["damping"] == pytest.approx(1.5, rel=0.1)
+    assert answer["predicted"]["motor"]["as_b"] < answer["predicted"]["motor"]["with_a"]
+    assert "Moved: friction.viscous damping of motor" in printed.err
+
+
+@pytest.mark.integration
+def test_too_few_runs_are_refused(tmp_path, axis, said):
+    words = (
+        "diff",
+        recorded(tmp_path / "a", 5.0, 100),
+        recorded(tmp_path / "b", 6.5, 200),
+        "--model",
+    )
+    for name in ("0", "1"):
+        (tmp_path / "b" / f"{name}.mcap").unlink()
+    assert "3 runs, too few to compare" in said(*words, axis, code=5).err
+    for name in ("2", "3"):
+        (tmp_path / "b" / f"{name}.mcap").unlink()
+    printed = said(*words, axis, code=5).err
+    assert "The second campaign has 1 run, too few to compare" in printed
+    assert "lap_s under [data.runs]" in printed

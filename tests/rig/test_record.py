@@ -14,7 +14,7 @@ from rig.log.check import Verdict, check_log
 from rig.log.reader import read_log
 from rig.log.streams import COUNTS, SAMPLE
 from rig.recording.campaign import open_campaign_folder, record_campaign
-from tests.rig.simulated import Wrapped, protocol_file, short_protocol, simulated, transport
+from tests.rig.simulated import behind, protocol_file, short_protocol, simulated, transport
 
 pytestmark = pytest.mark.integration
 
@@ -141,7 +141,7 @@ def test_lost_samples_make_a_run_incomplete_and_are_listed(tmp_path):
             bad[int(generator.integers(0, len(bad)))] ^= 0x11
         return bytes(bad)
 
-    lossy = SimulatedTransport(Wrapped(link.board, damage), step_s=0.2)
+    lossy = behind(SimulatedTransport(link.board, step_s=0.2), damage)
     (result,) = record(tmp_path, config, short_protocol(1), link=lossy)
     assert 0 < result.expected - result.samples < 40
     assert "lost" in result.remark

@@ -12,14 +12,13 @@ from hypothesis import strategies as st
 from calibration.linear import shipped_calibration_set
 from drivers.teensy.protocol import STATUS_ARMED, TOP, SafeState, Trip, TripReport
 from drivers.teensy.reference import REFERENCE, Limits
-from drivers.transport.simulated import SimulatedTransport
 from rig.bench.session import Session
 from rig.bench.trips import WORDS, HostWatch, trip_error
 from rig.errors import ExitCode, SafetyTripError, exit_code_of
 from rig.machines.reading import Reading
 from rig.machines.reference import ReferenceMachine
 from rig.machines.safety import board_limits, check_samples
-from tests.rig.simulated import Wrapped, is_armed, simulated, transport
+from tests.rig.simulated import behind, is_armed, simulated, transport
 
 pytestmark = [pytest.mark.integration, pytest.mark.usefixtures("library")]
 
@@ -135,7 +134,7 @@ def test_a_second_ctrl_c_does_not_break_into_the_way_out(number):
         return data
 
     handler = signal.getsignal(number)
-    paced = SimulatedTransport(Wrapped(link.board, strike))
+    paced = behind(link, strike)
     with pytest.raises(KeyboardInterrupt), Session(config, paced) as session:  # noqa: PT012
         next(session.play(HOLD, LOAD))
         leaving = True

@@ -1,18 +1,26 @@
-"""The acceptance test of a bench: on fakes here, on a real one where RIG_BENCH names it."""
+"""The acceptance test of a bench, and its first motion: every wrong wire is a sentence.
 
+On fakes here, the acceptance test on a real bench where RIG_BENCH names it.
+"""
+
+import ctypes
 import os
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.profile import Profile
 from drivers.transport.simulated import SimulatedTransport
 from rig.configuration.check import refuse_problems
-from rig.configuration.config import Config, load_config
+from rig.configuration.config import load_config
 from rig.doctor.bench import bench_tests, page
+from rig.doctor.commission import REACH_RAD, commission
 from rig.doctor.selftest import selftest
-from tests.rig.simulated import Wrapped, simulated, transport
+from rig.simulation.bench import SimulatedBench
+from tests.rig.simulated import behind, simulated, transport
 
 pytestmark = pytest.mark.integration
 
@@ -38,31 +46,34 @@ def test_the_simulated_rig_passes_with_every_kind_of_device(names, library):
     assert all(check.passed for check in checks), [c for c in checks if not c.passed]
 
 
-def failing(config: Config, monkeypatch: pytest.MonkeyPatch, change: object) -> list[str]:
+@pytest.fixture
+def failing(monkeypatch):
     """The checks that fail on a board whose output goes through a function."""
 
-    def opened(config: Config, step_s: float | None = None) -> SimulatedTransport:
-        link = transport(config)
-        return SimulatedTransport(Wrapped(link.board, lambda data: change(link.board, data)))
+    def run(config, change):
+        def opened(config, step_s=None):
+            return behind(transport(config), change)
 
-    monkeypatch.setattr("rig.bench.logger.open_logger", opened)
-    monkeypatch.setattr("rig.bench.devices.open_logger", opened)
-    return [check.name for check in selftest(config) if not check.passed]
+        monkeypatch.setattr("rig.bench.logger.open_logger", opened)
+        monkeypatch.setattr("rig.bench.devices.open_logger", opened)
+        return [check.name for check in selftest(config) if not check.passed]
+
+    return run
 
 
-def test_a_board_whose_watchdog_sleeps_fails(monkeypatch):
+def test_a_board_whose_watchdog_sleeps_fails(monkeypatch, failing):
     encode = Profile.encode_arm
 
     def patient(profile, sequence, gains, limits, session):
         return encode(profile, sequence, gains, replace(limits, watchdog_us=1_000_000), session)
 
     monkeypatch.setattr(Profile, "encode_arm", patient)
-    failed = failing(simulated(firmware=True), monkeypatch, lambda board, data: data)
+    failed = failing(simulated(firmware=True), bytes)
     assert "the board goes to its safe state when the host is silent" in failed
 
 
-def test_a_silent_board_fails_everything(monkeypatch):
-    assert len(failing(simulated(), monkeypatch, lambda board, data: b"")) == 6
+def test_a_silent_board_fails_everything(failing):
+    assert len(failing(simulated(), lambda data: b"")) == 6
 
 
 def test_selftest_speaks_to_machines(answered):
@@ -77,3 +88,82 @@ def test_the_tests_for_a_person_are_named_and_are_those_of_the_page(answered):
     assert [test["name"] for test in said["by_hand"]] == [test.name for test in tests]
     assert all(test.why and test.do and test.shows for test in tests)
     assert Path("docs/bench.md").read_text() == page()
+
+
+MOTOR, SPINDLE, JAW, CURRENT = 0, 1, 2, 5
+TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p)
+
+
+class MiswiredBench:
+    """The simulated bench with inputs and the command wired wrong.
+
+    Args:
+        factors: Factor of each input that is wired wrong: -1 for A and B swapped, 0 for a cable.
+        command: Factor of the command.
+    """
+
+    def __init__(self, factors: dict[int, int], command: int = 1) -> None:
+        self._inner = SimulatedBench()
+        self._factors = factors
+        self._command = command
+        self.spindle: list[int] = []
+
+    def advance_with_board(self, ticks, tick_address, board_address, tick_us):
+        core = TICK(tick_address)
+
+        def between(board: int, now_us: int, inputs: int, outputs: int) -> None:
+            row = np.ctypeslib.as_array((ctypes.c_int32 * 7).from_address(inputs))
+            self.spindle.append(int(row[SPINDLE]))
+            for column, factor in self._factors.items():
+                row[column] *= factor
+            core(board, now_us, inputs, outputs)
+            given = np.ctypeslib.as_array((ctypes.c_int32 * 2).from_address(outputs))
+            given[0] *= self._command
+
+        called = TICK(between)
+        address = ctypes.cast(called, ctypes.c_void_p).value or 0
+        self._inner.advance_with_board(ticks, address, board_address, tick_us)
+
+
+def results(bench, monkeypatch, config=None):
+    link = SimulatedTransport(FirmwareBoard(bench), step_s=0.02)
+    monkeypatch.setattr("rig.bench.logger.open_logger", lambda _: link)
+    return {check.name: check.passed for check in commission(config or simulated())}
+
+
+@pytest.mark.usefixtures("library")
+def test_a_sound_rig_passes_both_ways(said):
+    said("commission --sim")
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize(
+    ("factors", "command", "failed"),
+    [
+        ({MOTOR: -1}, 1, "motor_angle_rad follows, closing"),
+        ({SPINDLE: -1}, 1, "spindle_angle_rad follows, closing"),
+        ({JAW: -1}, 1, "jaw_angle_rad follows, closing"),
+        ({SPINDLE: 0}, 1, "spindle_angle_rad follows, closing"),
+        ({MOTOR: 0}, 1, "motor_angle_rad follows, closing"),
+        ({CURRENT: 0}, 1, "the measured current follows the command, closing"),
+        ({}, -1, "the measured current follows the command, closing"),
+        ({}, 0, "the measured current follows the command, closing"),
+    ],
+)
+def test_a_wrong_wire_is_named_and_the_shaft_hardly_turns(monkeypatch, factors, command, failed):
+    bench = MiswiredBench(factors, command)
+    made = results(bench, monkeypatch)
+    assert [name for name, passed in made.items() if not passed] == [failed]
+    turned_rad = np.ptp(bench.spindle) * 2 * np.pi / 8192
+    assert turned_rad < 2 * REACH_RAD
+
+
+@pytest.mark.usefixtures("library")
+def test_a_board_without_zeros_does_not_move(monkeypatch):
+    bench = MiswiredBench({})
+    link = SimulatedTransport(FirmwareBoard(bench, BoardStart(simulated=False)), step_s=0.02)
+    monkeypatch.setattr("rig.bench.logger.open_logger", lambda _: link)
+    *_, last = commission(simulated())
+    assert not last.passed
+    assert "rig reference" in last.detail
+    assert np.ptp(bench.spindle or [0]) < 5

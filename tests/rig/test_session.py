@@ -18,7 +18,7 @@ from estimation.recording import Flag
 from rig.bench.session import LoggerStalledError, Session
 from rig.errors import SafetyTripError
 from rig.machines.reading import reading_of, with_setpoints
-from tests.rig.simulated import Wrapped, is_armed, session, simulated, transport
+from tests.rig.simulated import behind, is_armed, session, simulated, transport
 
 pytestmark = pytest.mark.integration
 
@@ -96,8 +96,7 @@ def test_a_silent_logger_is_named_within_a_second():
     config = simulated()
     link = transport(config)
     silent = False
-    board = Wrapped(link.board, lambda data: b"" if silent else data)
-    paced = SimulatedTransport(board)
+    paced = behind(link, lambda data: b"" if silent else data)
     unsafe = pytest.raises(SafetyTripError, match="did not confirm")
     with unsafe as left, Session(config, paced) as session:
         next(session.rest(0.1))
@@ -121,7 +120,7 @@ def test_lost_and_damaged_bytes_are_counted_and_nothing_is_made_up():
                 bad[place] ^= 0x55
         return bytes(bad)
 
-    with Session(config, SimulatedTransport(Wrapped(link.board, damage), step_s=0.2)) as session:
+    with Session(config, behind(SimulatedTransport(link.board, step_s=0.2), damage)) as session:
         readings = list(session.rest(3.0))
         counters = session.counters
     ticks = np.concatenate([r.tick_us for r in readings])

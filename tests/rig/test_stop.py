@@ -1,4 +1,4 @@
-"""`rig stop` while another program has the rig: it must let go, and the board is read back."""
+"""`rig stop` and `rig firmware flash`: who has the board lets go of it, and it is not armed."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""An instrument's estimators on another one: rows, table, and that adapting helps."""
+"""An instrument's estimators on another one: adapting helps, and intervals hold."""
 
 from dataclasses import replace
 

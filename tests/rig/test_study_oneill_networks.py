@@ -1,4 +1,4 @@
-"""The network rows of `rig study oneill`, on a small analytic campaign."""
+"""The rows of networks and of states of `rig study oneill`, on a small analytic campaign."""
 
 import json
 from dataclasses import replace
