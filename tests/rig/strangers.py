@@ -85,7 +85,12 @@ elbow_angle_rad = "q2"
 
 
 def axis_table(
-    file: Path, runs: int = 10, asymmetry: float = 0.0, cogging: float = 0.0, seed: int = 1
+    file: Path,
+    runs: int = 10,
+    asymmetry: float = 0.0,
+    cogging: float = 0.0,
+    warming: str = "",
+    seed: int = 1,
 ) -> None:
     """Write a table of an axis.
 
@@ -94,6 +99,7 @@ def axis_table(
         runs: Laps.
         asymmetry: Difference of its viscous friction between the directions, N s/m as share.
         cogging: Amplitude of a force that repeats every 12 mm, as share.
+        warming: The parameter of friction that falls with a temperature, in the last column, °C.
         seed: Seed of the noise.
     """
     random = np.random.default_rng(seed)
@@ -101,11 +107,16 @@ def axis_table(
     position = 0.15 * np.sin(2 * np.pi * time_s / 4.0) + 0.03 * np.sin(2.7 * time_s)
     speed = np.gradient(position, time_s)
     pwm = 0.01 * np.gradient(speed, time_s) + 0.2 * speed + 0.05 * np.tanh(speed / 2e-3)
+    warmth = 6.0 * random.permutation(runs)[(time_s // 4.0).astype(int)] / runs
+    falls = {"damping": 0.015 * speed, "friction": 0.003 * np.tanh(speed / 2e-3)}
+    pwm -= warmth * falls.get(warming, 0.0)
     pwm += asymmetry * np.abs(speed) + random.normal(0.0, 1e-3, time_s.size)
     pwm += cogging * np.sin(2 * np.pi * position / 0.012 + 0.3)
     read = np.round(position * 20000) / 20000
-    rows = np.column_stack([1e3 * time_s, 255 * pwm, 1e3 * read])
-    np.savetxt(file, rows, delimiter=",", header="t,pwm,x", comments="", fmt="%.9g")
+    warmth = 25.0 + warmth + random.normal(0.0, 0.05, time_s.size)
+    rows = np.column_stack([1e3 * time_s, 255 * pwm, 1e3 * read, warmth][: 4 if warming else 3])
+    head = "t,pwm,x,warm" if warming else "t,pwm,x"
+    np.savetxt(file, rows, delimiter=",", header=head, comments="", fmt="%.9g")
 
 
 def drive_table(
@@ -156,22 +167,6 @@ def _trial(
         torque + random.normal(0, 0.01, len(turn)),
     ]
     return np.column_stack([np.full(len(turn), k), time_s, *counts, *read])
-
-
-def warming_table(file: Path, viscous: bool = False, runs: int = 10, seed: int = 1) -> None:
-    """Write a table of an axis whose friction falls with a temperature, in the last column, °C."""
-    random = np.random.default_rng(seed)
-    time_s = np.arange(0.0, 4.0 * runs, 2e-3)
-    position = 0.15 * np.sin(2 * np.pi * time_s / 4.0) + 0.03 * np.sin(2.7 * time_s)
-    speed = np.gradient(position, time_s)
-    warmth = 25.0 + 6.0 * random.permutation(runs)[(time_s // 4.0).astype(int)] / runs
-    pwm = 0.01 * np.gradient(speed, time_s) + 0.2 * speed + 0.05 * np.tanh(speed / 2e-3)
-    pwm -= (warmth - 25.0) * (0.015 * speed if viscous else 0.003 * np.tanh(speed / 2e-3))
-    pwm += random.normal(0.0, 1e-3, time_s.size)
-    read = np.round(position * 20000) / 20000
-    warmth = warmth + random.normal(0.0, 0.05, time_s.size)
-    rows = np.column_stack([1e3 * time_s, 255 * pwm, 1e3 * read, warmth])
-    np.savetxt(file, rows, delimiter=",", header="t,pwm,x,warm", comments="", fmt="%.9g")
 
 
 def arm_table(file: Path, runs: int = 10, seed: int = 1) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
+from estimation.effects import catalogue
 from rig.cli.main import app, main
 from rig.errors import ExitCode, exit_code_of
 from rig.output.console import plain
@@ -27,8 +28,38 @@ def test_help_imports_nothing_heavy():
     assert "record" in done.stdout
 
 
-def test_an_unknown_verb_is_a_usage_error(said):
-    assert "recrod" in said("recrod", code=ExitCode.USAGE).err
+SLIPS = {
+    "recrod": "recrod",
+    "effects friction.colomb": "friction.coulomb",
+    "machine show emsp": "Did you mean 'emps'",
+    "machine new new.toml --axis carriage:mm": "has the unit 'mm'",
+    "machine new new.toml --axis carriage": "is not NAME:rad or NAME:m",
+    "machine new new.toml --axis a:rad --sensor b:a_angle_rad": "There is no axis 'b'",
+    "machine new new.toml --axis a:rad --axis b:rad --transmission a:b:x": "is not a number",
+    "diagnose . --equation elbow": "elbow",
+    "diagnose --plan quick --machine emps": "recordings of the machine instead",
+    "diagnose --plan no-such-protocol": "no protocol",
+    "loop": "--sim",
+    "grip --torque 1.0": "cannot be held",
+    "grip --torque 0": "cannot be held",
+    "grip --torque -0.1": "cannot be held",
+    "grip --torque nan": "cannot be held",
+    "reference --yes -c canopen": "no board to reference",
+    "reference --yes --sim --at 0 --at 1": "spindle_angle_rad",
+    "reference --yes -c grasper --at 0": "yaw_angle_rad, jaw_1_angle_rad, jaw_2_angle_rad",
+    "study zhao --prototype fourth": "third, journal, ball",
+    "study machines .": "No machine's recordings",
+}
+"""Commands that cannot be meant, and a part of what is said."""
+
+
+@pytest.mark.parametrize("words", SLIPS)
+def test_a_slip_is_a_usage_error_that_names_it_or_what_may_be_meant(
+    words, said, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert SLIPS[words] in said(words, code=ExitCode.USAGE).err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_error_that_nobody_raised_on_purpose_has_its_own_code():
@@ -118,3 +149,23 @@ def test_json_has_no_nan_and_no_numpy():
 
     value = plain({"a": np.float64("nan"), "b": np.arange(2), "c": (1, float("inf"))})
     assert json.dumps(value, allow_nan=False) == '{"a": null, "b": [0, 1], "c": [1, null]}'
+
+
+def test_every_effect_is_listed_with_a_sentence(said):
+    lines = dict(line.split(maxsplit=1) for line in said("effects").out.splitlines())
+    for name in catalogue():
+        assert len(lines[name].split()) >= 2, name
+
+
+def test_a_family_is_listed_by_the_beginning_of_its_names(answered):
+    ids = [one["id"] for one in answered("effects friction")["effects"]]
+    assert "friction.coulomb" in ids
+    assert all(name.startswith("friction.") for name in ids)
+
+
+def test_an_effect_is_described_with_equation_and_parameters(said):
+    for name, one in catalogue().items():
+        out = said("effects", name).out
+        assert "Equation" in out
+        for parameter in (*one.amplitudes, *one.shape):
+            assert f"parameter {parameter.name}: {parameter.description}" in out

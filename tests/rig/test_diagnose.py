@@ -221,3 +221,10 @@ def test_two_paths_are_diagnosed_by_their_periods_and_the_claim_reports_it(monke
     assert len(found["runs"]["discover"]) == len(found["runs"]["confirm"]) == 6
     assert "Two recorded paths only" in found["notes"][0]
     assert found["exploratory"] is True
+
+
+def test_a_protocol_shows_which_effects_its_runs_distinguish(answered):
+    plan = answered("diagnose --plan quick --equation motor")
+    assert (plan["source"], plan["runs"]) == ("quick", 12)
+    chance = {(e["place"], e["family"]): e["probability"] for e in plan["effects"]}
+    assert chance["motor", "ripple.motor"] > chance["motor", "hysteresis.bouc_wen"]

@@ -134,7 +134,3 @@ def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(diagnose, tm
     printed = diagnose(runs(spring, count=9, seconds=2.0), "--ledger /dev/null/x")
     assert "reading the recordings" not in printed
     assert not [*tmp_path.iterdir()]
-
-
-def test_an_unknown_equation_is_a_usage_error(tmp_path, said):
-    assert "elbow" in said("diagnose --equation elbow", tmp_path, code=2).err

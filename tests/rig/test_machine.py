@@ -183,25 +183,6 @@ def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_te
     said("machine new", out, words, table, code=2)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("--axis carriage:mm", "has the unit 'mm'"),
-        ("--axis carriage", "is not NAME:rad or NAME:m"),
-        ("--axis a:rad --sensor b:a_angle_rad", "There is no axis 'b'"),
-        ("--axis a:rad --axis b:rad --transmission a:b:x", "is not a number"),
-    ],
-)
-def test_wrong_words_are_named(tmp_path, said, words, message):
-    assert message in said("machine new", tmp_path / "new.toml", words, code=2).err
-
-
-def test_an_unknown_machine_names_the_shipped_ones(said):
-    printed = said("machine show emsp", code=2).err
-    assert "Did you mean 'emps'" in printed
-    assert "reference" in printed
-
-
 @pytest.fixture(scope="module")
 def geared(tmp_path_factory):
     """Return a rig of ratio 20 drawn at random: its machine file and its recordings."""

@@ -51,18 +51,6 @@ def test_without_a_confirmation_nothing_is_referenced(restarted, monkeypatch, sa
         played(restarted)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("-c canopen", "no board to reference"),
-        ("--sim --at 0 --at 1", "spindle_angle_rad"),
-        ("-c grasper --at 0", "yaw_angle_rad, jaw_1_angle_rad, jaw_2_angle_rad"),
-    ],
-)
-def test_a_place_that_does_not_fit_the_rig_is_refused(words, message, said):
-    assert message in said("reference --yes", words, code=2).err
-
-
 def test_the_index_stands_for_the_mark(restarted, said):
     words = "reference --sim --index --at 0.3"
     assert "through its index" in said(words, code=3).err

@@ -99,17 +99,9 @@ def test_a_board_called_by_pointer_closes_the_same_loop():
     assert bench.ticks_done == TICKS
 
 
+LOSSES = ("friction", "viscous", "damping")
 FREE = PlantParameters(
-    motor_friction_n_m=0.0,
-    motor_viscous_n_m_s_rad=0.0,
-    gear_damping_n_m_s_rad=0.0,
-    spindle_friction_n_m=0.0,
-    spindle_viscous_n_m_s_rad=0.0,
-    cable_load_friction_ratio=0.0,
-    cable_damping_n_m_s_rad=0.0,
-    jaw_friction_n_m=0.0,
-    jaw_viscous_n_m_s_rad=0.0,
-    load_friction_n_m=0.0,
+    **{i.name: 0.0 for i in fields(PlantParameters) if any(loss in i.name for loss in LOSSES)}
 )
 """A rig that loses nothing."""
 

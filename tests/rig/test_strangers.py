@@ -6,7 +6,7 @@ import math
 import pytest
 
 from rig.diagnosis.schema import DiagnosisSchema
-from tests.rig.strangers import ARM, AXIS, DRIVE, arm_table, axis_table, drive_table, warming_table
+from tests.rig.strangers import ARM, AXIS, DRIVE, arm_table, axis_table, drive_table
 
 pytestmark = pytest.mark.integration
 
@@ -101,7 +101,7 @@ def test_friction_follows_a_temperature_that_the_machine_states(
     # at the usual 50 Hz the acceleration of this encoder is mostly noise
     text = text.replace("[machine]\n", "[machine]\ncutoff_hz = 15\n")
     (tmp_path / "axis.toml").write_text(text)
-    warming_table(tmp_path / "axis.csv", viscous=parameter == "damping")
+    axis_table(tmp_path / "axis.csv", warming=parameter)
     (finding,) = diagnosed("axis", "--model-out model.toml")["findings"]
     assert finding["family"] == "friction.warmup"
     assert finding["depends_on"] == [speed, "temperature"]

@@ -44,7 +44,3 @@ def test_absent_machines_are_named_and_the_others_studied(data, answered):
     text = page.read_text()
     assert "no recordings in sts3215" in text
     assert "(../machines/emps.md)" in text
-
-
-def test_a_folder_without_any_machine_is_refused(tmp_path, said):
-    assert "No machine's recordings" in said("study machines", tmp_path, code=2).err

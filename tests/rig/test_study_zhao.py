@@ -153,7 +153,3 @@ def test_haptics_are_right_also_with_friction_not_declared():
         assert min(answer.order_confidence, answer.place_confidence) > 0.95
     for material in answers[1].materials:
         assert material.mean_n_rad == pytest.approx(material.true_n_rad, rel=0.15)
-
-
-def test_an_unknown_prototype_is_refused(said):
-    assert "third, journal, ball" in said("study zhao --prototype fourth", code=2).err
