@@ -81,28 +81,20 @@ def test_set_up_and_arm_send_their_messages_in_order():
     spoken = [frame for frame in bus.sent if frame.can_id != heartbeat]
     said = [f"{frame.can_id:x} {frame.data.hex()}" for frame in spoken]
     writes = [line for line in said if line[:3] != "601" or line[4:6] in ("2f", "2b", "23")]
-    expected = [
-        "0 8001",
-        "601 2b17100064000000",
-        "601 2b07600002000000",  # voltage off when the host is lost, and at a fault
-        "601 2b5e600000000000",
-        "601 2f29100100000000",  # and pre-operational, so that objects can be reached
-        "601 2300180181010080",  # TPDO1 off, synchronous, mapped, counted, on
-        "601 2f00180201000000",
-        "601 2f001a0000000000",
-        "601 23001a0110004160",
-        "601 23001a0220006460",
-        "601 23001a031001d230",
-        "601 2f001a0003000000",
-        "601 2300180181010000",
-        "601 2300140101020080",  # RPDO1 off, at once, mapped, counted, on
-        "601 2f001402ff000000",
-        "601 2f00160000000000",
-        "601 2300160110004060",
-        "601 2300160210007160",
-        "601 2f00160002000000",
-        "601 2300140101020000",
-    ]
+    set_up = (
+        "0 8001; 601 2b17100064000000; "
+        # voltage off when the host is lost, and at a fault
+        "601 2b07600002000000; 601 2b5e600000000000; "
+        # and pre-operational, so that objects can be reached
+        "601 2f29100100000000; "
+        # TPDO1 off, synchronous, mapped, counted, on
+        "601 2300180181010080; 601 2f00180201000000; 601 2f001a0000000000; 601 23001a0110004160; "
+        "601 23001a0220006460; 601 23001a031001d230; 601 2f001a0003000000; 601 2300180181010000; "
+        # RPDO1 off, at once, mapped, counted, on
+        "601 2300140101020080; 601 2f001402ff000000; 601 2f00160000000000; 601 2300160110004060; "
+        "601 2300160210007160; 601 2f00160002000000; 601 2300140101020000"
+    )
+    expected = set_up.split("; ")
     assert writes[: len(expected)] == expected
     assert writes[-6:] == [
         "601 23161001fa007f00",  # the host is node 127 and beats every 250 ms at the latest

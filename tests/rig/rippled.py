@@ -11,25 +11,13 @@ from rig.simulation.hidden import HiddenEffect
 
 MOTOR = model_file.read(Path("motor"))
 
+RUN = {"kind": "sine", "amplitude_rad": 0.3, "duration_s": 4.0}
 PROTOCOL = Protocol.model_validate(
     {
         "name": "small",
         "runs": [
-            {
-                "kind": "sine",
-                "frequencies_hz": [0.25, 0.4],
-                "loads_a": [0.2, 0.5, 0.8],
-                "amplitude_rad": 0.3,
-                "duration_s": 4.0,
-            },
-            {
-                "kind": "sine",
-                "frequencies_hz": [0.3],
-                "loads_a": [0.4],
-                "amplitude_rad": 0.3,
-                "duration_s": 4.0,
-                "repeats": 3,
-            },
+            RUN | {"frequencies_hz": [0.25, 0.4], "loads_a": [0.2, 0.5, 0.8]},
+            RUN | {"frequencies_hz": [0.3], "loads_a": [0.4], "repeats": 3},
         ],
     }
 )

@@ -23,11 +23,7 @@ def test_the_simulated_rig_is_the_default():
         ("motor_current_a = 0.6", "motor_current_a = -0.6", "greater than 0"),
         ('name = "simulated rig"', "", "name: Field required"),
         ("lever_arm_m = 0.012", "lever_arm_m = inf", "finite"),
-        (
-            "motor_current_a = 0.6",
-            "motor_current_a = 600",
-            r"limits.motor_current_a: .*60, given 600 A",
-        ),
+        ("current_a = 0.6", "current_a = 600", r"limits.motor_current_a: .*60, given 600 A"),
         ("[limits]", '[devices.jaw]\nulr = "sim://"\n[limits]', r"ulr: .*did you mean 'url'"),
     ],
 )
@@ -78,21 +74,22 @@ def test_unequal_bit_rates_on_one_bus_are_refused():
         refuse_problems(on_one_bus({}, {"options": {"base": 0x68}}))
 
 
+SIM = {"url": "sim://"}
+CAN = {"driver": "ati-can", "url": "can:socketcan:can1"}
+
+
 @pytest.mark.parametrize(
     ("device", "message"),
     [
-        ({"driver": "ati-can", "url": "can:slcan:/dev/ttyACM0?bitrate=500000"}, "500000"),
-        ({"driver": "ati-kan", "url": "can:socketcan:can1"}, "no driver 'ati-kan'"),
-        ({"driver": "usb520", "url": "can:socketcan:can1"}, "on no CAN bus"),
-        ({"driver": "ati-can", "url": "/dev/ttyACM0"}, "needs a CAN bus"),
-        (
-            {"driver": "usb520", "url": "sim://", "options": {"baud_rat": 1}},
-            "did you mean 'baud_rate'?",
-        ),
-        ({"driver": "usb520", "url": "sim://", "options": {"rate_hz": 50}}, "given 50 Hz"),
-        ({"driver": "ati-can", "url": "can:socketcan:can1", "options": {"base": "x"}}, "base"),
-        ({"driver": "ati-can", "url": "can:socketcan:can1", "options": {"base": 500}}, "127"),
-        ({"driver": "qia128", "url": "sim://", "options": {"rated_load": True}}, "rated_load"),
+        (CAN | {"url": "can:slcan:/dev/ttyACM0?bitrate=500000"}, "500000"),
+        (CAN | {"driver": "ati-kan"}, "no driver 'ati-kan'"),
+        (CAN | {"driver": "usb520"}, "on no CAN bus"),
+        (CAN | {"url": "/dev/ttyACM0"}, "needs a CAN bus"),
+        (SIM | {"driver": "usb520", "options": {"baud_rat": 1}}, "did you mean 'baud_rate'?"),
+        (SIM | {"driver": "usb520", "options": {"rate_hz": 50}}, "given 50 Hz"),
+        (CAN | {"options": {"base": "x"}}, "base"),
+        (CAN | {"options": {"base": 500}}, "127"),
+        (SIM | {"driver": "qia128", "options": {"rated_load": True}}, "rated_load"),
     ],
 )
 def test_what_a_device_cannot_be(device, message):

@@ -1,6 +1,5 @@
 """The figures that the pages begin with, made again from the measured runs."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.estimators.bank import BankEstimator, BankRecipe, fit_runs
 from estimation.estimators.run_evidence import RunEvidence
-from rig.cli.main import main
 from rig.importers.jaw_steps import with_one_zero
 from rig.importers.registry import open_campaign
 from rig.models.adapt import run_adaptation
@@ -24,11 +22,15 @@ TARGET, LOAD = "proximal_torque_n_m", "motor_current_a"
 RUNAWAY = "07"
 
 
-def opened(folder: Path, name: str) -> Campaign:
+def archive_of(folder: Path, name: str) -> Path:
     path = folder / f"mrdlab-{name}.tar.xz"
     if not path.is_file():
         pytest.skip(f"no measured data at {path}")
-    return open_campaign(path)
+    return path
+
+
+def opened(folder: Path, name: str) -> Campaign:
+    return open_campaign(archive_of(folder, name))
 
 
 def rows(page: str, start: str) -> list[list[str]]:
@@ -68,14 +70,11 @@ def test_an_adapted_estimator_has_the_pages_error(measured_data, source, tool):
         assert 1e3 * found.adapted.rmse == pytest.approx(float(adapted), rel=0.02)
 
 
-def test_a_live_fit_has_the_pages_error_on_runs_left_out(measured_data, capsys):
-    archive = measured_data / "mrdlab-Tool_4_Maryland_L_4.tar.xz"
-    if not archive.is_file():
-        pytest.skip(f"no measured data at {archive}")
+def test_a_live_fit_has_the_pages_error_on_runs_left_out(measured_data, answered):
+    archive = archive_of(measured_data, "Tool_4_Maryland_L_4")
     (row,) = rows("oneill.md", "neutral: proximal torque, mN m, from current | 7")
-    words = ["fit", str(archive), "--model", "states", "--surrogate", LOAD, "--live", "--json"]
-    assert main(words) == 0
-    error = json.loads(capsys.readouterr().out)["held_out"]["rmse"]
+    found = answered("fit --model states --live --surrogate", LOAD, archive)
+    error = found["held_out"]["rmse"]
     # other folds than the page's, and the runaway run is in
     assert 1e3 * error == pytest.approx(float(row[4]), rel=0.1)
 

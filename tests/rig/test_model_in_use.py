@@ -39,6 +39,7 @@ def model(path: Path) -> Path:
 
 def test_a_model_is_used_by_every_session_of_its_rig_until_taken_back(home, answered):
     assert load_config().model_path == SHIPPED_MODEL
+    assert simulated().changed(model="mine.npz").model_path == Path("mine.npz")
     used = answered("model use", model(home / "mine.toml"))
     assert used["replaced"] == str(SHIPPED_MODEL)
     assert used["estimates"] == [GRIP]
@@ -58,10 +59,6 @@ def test_only_a_fitted_model_is_used(home, said):
     model_file.write(model_file.read(Path("motor")), home / "declared.toml")
     assert "not fitted" in said("model use declared.toml", code=5).err
     assert load_config().model_path == SHIPPED_MODEL
-
-
-def test_a_configuration_may_name_an_estimator_file(home):
-    assert simulated().changed(model="mine.npz").model_path == Path("mine.npz")
 
 
 def logs(folder: Path) -> Path:

@@ -33,16 +33,12 @@ def folder(tmp_path_factory):
     return path
 
 
-def test_a_campaign_is_one_whole_log_a_run(folder):
+def test_a_campaign_is_one_whole_log_a_run_with_what_was_known(folder):
     logs = sorted(folder.glob("*.mcap"))
     assert [log.stem for log in logs] == [f"00{k}-sine-1Hz-0.{k + 1}A" for k in range(3)]
     assert {check_log(log).verdict for log in logs} == {Verdict.COMPLETE}
     assert not list(folder.glob("*.part"))
-
-
-def test_the_runs_read_back_with_what_was_known(folder):
-    campaign = open_campaign(folder)
-    runs = list(campaign)
+    runs = list(open_campaign(folder))
     assert [r.conditions["load_command_a"] for r in runs] == [0.1, 0.2, 0.3]
     for run in runs:
         assert len(run) == 1000

@@ -76,14 +76,11 @@ def test_the_papers_method_lands_near_its_table(mean_grasper):
     assert mean_grasper["yaw"].slope == pytest.approx(1.55, abs=0.05)
 
 
-def test_ours_is_at_most_half_of_it_without_more_delay(mean_grasper):
+def test_ours_is_at_most_half_of_it_by_the_added_friction_without_more_delay(mean_grasper):
     for cell in mean_grasper.values():
         paper, ours = np.abs(cell.paper.errors_n), np.abs(cell.ours.errors_n)
         assert (ours <= np.maximum(paper / 2, 0.03)).all()
         assert abs(cell.ours.delay_ms) <= 3
-
-
-def test_the_added_friction_is_what_makes_the_difference(mean_grasper):
     cell = mean_grasper["pitch"]
     assert np.abs(cell.ours.errors_n).max() < 0.5 * np.abs(cell.undeclared.errors_n).max()
 
