@@ -1,4 +1,4 @@
-"""`rig fit --model states`, `rig adapt` and `rig export` from recordings to files."""
+"""`rig fit --model states`, `rig adapt`, `rig export`, and `rig estimator compare` of the files."""
 
 import json
 from dataclasses import replace
@@ -10,6 +10,7 @@ from estimation.campaign import Campaign
 from estimation.estimator import load
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.network import NetworkEstimator
+from estimation.estimators.origin import data_hash
 from estimation.networks.network import Network
 from estimation.recording import Instrument, Recording
 from rig.cli.main import main
@@ -140,3 +141,71 @@ def test_what_adapt_cannot_do_is_reported(folders, states, tmp_path, said):
 def test_export_writes_a_header(states, tmp_path, said):
     said("export", states, "--out", tmp_path / "grip.h")
     assert "static inline grip_estimate grip_step" in (tmp_path / "grip.h").read_text()
+
+
+OFF_N_M = 0.1
+"""More than the half width of the estimator's interval in a part of every run."""
+
+
+@pytest.fixture(scope="module")
+def worse(states, tmp_path_factory):
+    path = tmp_path_factory.mktemp("worse") / "worse.npz"
+    estimator = load(states)
+    off = estimator.weights.copy()
+    off[0] += OFF_N_M
+    replace(estimator, weights=off, origin=None).save(path)
+    return path
+
+
+def test_a_fit_states_its_data_by_hash_the_code_and_its_error(states, folders):
+    origin = load(states).origin
+    assert len(origin.data) == len(list(folders[0].iterdir()))
+    assert len(set(origin.data.values())) == len(origin.data)
+    assert origin.code.startswith("rig ")
+    assert 0 < origin.figures["held_out_rmse"] <= origin.figures["held_out_p95"]
+
+
+def test_a_hash_is_of_the_samples_alone():
+    first, second, *_ = campaign()
+    assert data_hash(replace(first, name="other", notes="later")) == data_hash(first)
+    changed = first[TARGET].copy()
+    changed[100] = np.nextafter(changed[100], 1.0)
+    assert data_hash(first.with_columns(**{TARGET: changed})) != data_hash(first)
+    assert data_hash(second) != data_hash(first)
+
+
+def test_an_adapted_estimator_states_its_own_runs_and_its_source(states, folders, tmp_path, said):
+    out = tmp_path / "adapted.npz"
+    said("adapt", states, folders[0], "--runs 01,05 --no-scratch --out", out)
+    origin = load(out).origin
+    assert set(origin.data) == {"01", "05"}
+    assert origin.data.items() <= load(states).origin.data.items()
+    assert origin.adapted_from
+    assert "unused_runs_rmse" in origin.figures
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_the_better_one_is_found_whichever_comes_first(states, worse, folders, said, swapped):
+    files = (worse, states) if swapped else (states, worse)
+    printed = said("estimator compare --json", *files, "--on", folders[0])
+    found = json.loads(printed.out)
+    for part in ("states.npz is better", "worse.npz", "does not state what it was made from"):
+        assert part in printed.err
+    place = int(swapped)
+    assert found["rmse"][place] < found["rmse"][1 - place]
+    assert len(found["sides"][place]["seen"]) == len(found["runs"])
+    for run in found["runs"]:
+        assert run["mean"][1 - place] - run["mean"][place] == pytest.approx(OFF_N_M)
+        assert run["covered"][place] > run["covered"][1 - place]
+
+
+def test_an_estimator_is_not_better_than_itself(states, folders, said):
+    printed = said("estimator compare", states, states, "--on", folders[0])
+    assert "do not show which is better" in printed.out
+
+
+def test_estimators_of_different_channels_are_refused(states, folders, tmp_path, said):
+    other = tmp_path / "other.npz"
+    replace(load(states), target="distal_torque_n_m").save(other)
+    printed = said("estimator compare", states, other, "--on", folders[0], code=2)
+    assert "different channels" in printed.err

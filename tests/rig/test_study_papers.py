@@ -2,6 +2,7 @@
 
 import os
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from rig.studies.delsol.study import PEAK_PERCENT, STIFFNESS_N_M, TABLE_1_HZ, TA
 from rig.studies.oneill.paper import PAPER as ONEILL
 from rig.studies.oneill.paper import PAPER_POSE_SAMPLES
 from rig.studies.pique.study import THESIS_TABLE_3_2
+from rig.studies.seeds import Keeper, kept_outcomes
 from rig.studies.wrench.study import SERIES, TABLES
 from rig.studies.zhang.study import PAPER as ZHANG
 from rig.studies.zhang.study import PAPER_FORCE_N, PAPER_MOMENT_N_M
@@ -98,3 +100,35 @@ def test_a_page_shows_only_the_rows_of_its_command():
     shown = {tuple(row) for row in coverage("pique", "wrench").rows}
     assert shown < set(rows("pique"))
     assert {tuple(row) for row in coverage("pique").rows} == set(rows("pique"))
+
+
+@dataclass(frozen=True)
+class Square:
+    value: int
+
+
+made: list[int] = []
+
+
+def square(seed: int) -> Square:
+    made.append(seed)
+    return Square(seed * seed)
+
+
+def run(state: Path, seeds: int, schema: str = "squares/1") -> tuple[list[int], int]:
+    made.clear()
+    told: list[None] = []
+    keeper = Keeper(state, on_seed=lambda: told.append(None))
+    found = kept_outcomes(Square, square, seeds, schema, keeper)
+    assert len(told) == seeds
+    return [each.value for each in found], len(made)
+
+
+@pytest.mark.integration
+def test_a_stopped_study_goes_on_and_a_damaged_outcome_is_made_again(tmp_path):
+    assert run(tmp_path, 2) == ([0, 1], 2)
+    assert run(tmp_path, 4) == ([0, 1, 4, 9], 2)
+    assert run(tmp_path, 4) == ([0, 1, 4, 9], 0)
+    next(tmp_path.glob("*-3.json")).write_text("{")
+    assert run(tmp_path, 4) == ([0, 1, 4, 9], 1)
+    assert run(tmp_path, 2, "squares/2") == ([0, 1], 2)  # another layout is another study
