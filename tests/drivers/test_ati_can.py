@@ -2,6 +2,8 @@
 
 import contextlib
 import re
+from collections import deque
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -15,13 +17,43 @@ from drivers.device import AXES, SampleFlag
 from drivers.errors import DriverError, FrameError, LinkError, LinkTimeoutError
 from drivers.transport.can_bus import CanFrame
 from drivers.transport.simulated_can import SimulatedCanBus
-from tests.drivers.scripted_can import Exchange, ScriptedCanBus
 
+Exchange = tuple[CanFrame, list[CanFrame]]
+"""A frame the driver must send, and the frames that answer it."""
 counts = st.integers(-(2**15), 2**15 - 1)
 
 
 def frame(can_id: int, data: str = "") -> CanFrame:
     return CanFrame(can_id, bytes.fromhex(data))
+
+
+class Scripted:
+    """A node that fails on a frame that is not the script's next."""
+
+    def __init__(self, script: list[Exchange]) -> None:
+        self.script, self.answers = deque(script), []
+
+    def receive(self, frame: CanFrame) -> None:
+        assert self.script, f"sent after the end of the script: {frame}"
+        expected, self.answers = self.script.popleft()
+        assert frame == expected
+
+    def advance(self, ticks: int) -> None:
+        pass
+
+    def transmit(self) -> list[CanFrame]:
+        answers, self.answers = self.answers, []
+        return answers
+
+
+@contextlib.contextmanager
+def scripted(script: list[Exchange]) -> Iterator[SimulatedCanBus]:
+    """A bus that holds a conversation to its script; at the end nothing is unsent or unread."""
+    node = Scripted(script)
+    bus = SimulatedCanBus([node])
+    yield bus
+    assert not node.script, f"never sent: {list(node.script)}"
+    assert bus.read(0.0) is None, "never read"
 
 
 def set_up(base: int = 0x200) -> list[Exchange]:
@@ -44,7 +76,7 @@ def set_up(base: int = 0x200) -> list[Exchange]:
 
 def test_the_conversation_of_the_manual():
     reading = [frame(0x200, "0000 0001 0003 0005"), frame(0x201, "0002 ffff 8001")]
-    with ScriptedCanBus([*set_up(), (frame(0x200), reading)]) as bus:
+    with scripted([*set_up(), (frame(0x200), reading)]) as bus:
         device = AtiCan(bus)
         identity = device.identify()
         assert (identity.serial, identity.firmware) == ("FT123456", "3.8.17")
@@ -58,12 +90,12 @@ def test_the_conversation_of_the_manual():
 
 
 def test_a_script_that_is_not_followed_fails():
-    with pytest.raises(AssertionError), ScriptedCanBus([(frame(0x205), [])]) as bus:
+    with pytest.raises(AssertionError), scripted([(frame(0x205), [])]) as bus:
         bus.send(frame(0x206))
-    unread = ScriptedCanBus([(frame(0x205), [frame(0x205)])])
-    with pytest.raises(AssertionError, match="never read"), unread:
-        unread.send(frame(0x205))
-    with pytest.raises(AssertionError, match="never sent"), ScriptedCanBus(set_up()):
+    unread = scripted([(frame(0x205), [frame(0x205)])])
+    with pytest.raises(AssertionError, match="never read"), unread as bus:
+        bus.send(frame(0x205))
+    with pytest.raises(AssertionError, match="never sent"), scripted(set_up()):
         pass
 
 
@@ -88,7 +120,7 @@ def test_replies_are_paired_among_other_frames_and_stragglers():
         frame(0x281, "00"),
         frame(0x201, second),
     ]
-    with ScriptedCanBus([*set_up(), (frame(0x200), answer)]) as bus:
+    with scripted([*set_up(), (frame(0x200), answer)]) as bus:
         device = AtiCan(bus)
         device.start()
         batch = device.read(0.1)
@@ -102,7 +134,7 @@ def test_half_an_answer_is_asked_for_again_and_none_is_a_gap():
     whole = [frame(0x200, "0000 0007 0003 0005"), frame(0x201, "0002 0004 0006")]
     polls: list[Exchange] = [(frame(0x200), half), (frame(0x200), whole)]
     silence: list[Exchange] = [(frame(0x200), [])] * 3
-    with ScriptedCanBus([*set_up(), *polls, *silence, (frame(0x200), whole)]) as bus:
+    with scripted([*set_up(), *polls, *silence, (frame(0x200), whole)]) as bus:
         device = AtiCan(bus, rate_hz=10.0)
         device.start()
         batch = device.read(0.1)
@@ -252,7 +284,7 @@ def test_firmware_3_7_is_the_first_that_is_asked_for_units():
     """Source: ATI 9610-05-1030, commands 7 and 8."""
     first, *others = set_up()
     assert first == (frame(0x20F), [frame(0x20F, "03080011")])
-    with ScriptedCanBus([(first[0], [frame(0x20F, "03070000")]), *others]) as bus:
+    with scripted([(first[0], [frame(0x20F, "03070000")]), *others]) as bus:
         assert AtiCan(bus).identify().firmware == "3.7.0"
     assert protocol.encode_counts_per_unit(1000, 2000).hex() == "000003e8000007d0"
 
