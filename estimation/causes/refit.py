@@ -2,18 +2,20 @@
 
 The search reads signals predicted from other sensors. Here every channel is read as measured, as a
 model in use reads it, and the amplitudes are least squares within their bounds on the training
-runs. Shapes stay as they were found. Fits and errors count the samples that the model counts: at
+runs. Shapes of causes stay as they were found; those of declared terms were fitted without the
+causes, and move next to them. Fits and errors count the samples that the model counts: at
 standstill friction takes any value.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.campaign import Campaign
+from estimation.causes import shapes
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.derived import settled_places
 from estimation.fit_problem import OFFSET, FitError, FitRun, prepared
@@ -22,6 +24,9 @@ from estimation.model import Estimate, Model, Term
 from estimation.predicted import without_unused
 from estimation.recording import FloatArray, Recording
 from estimation.within_bounds import solve_within
+
+MOVES = 4
+"""Turns of moving the declared shapes."""
 
 Unwritten = Callable[[str, FloatArray], FloatArray]
 """Name of a run and times in it to the columns of a cause that no model file holds, (n, k)."""
@@ -53,11 +58,21 @@ class Part:
 
 @dataclass(frozen=True)
 class Solved:
-    """An equation's amplitudes, declared ones first, and the mean residual over training runs."""
+    """An equation with causes on the training runs.
+
+    Attributes:
+        parts: The causes.
+        declared: The declared terms, at the shapes of the least error next to the causes.
+        weights: Amplitudes, declared ones first.
+        level: Mean residual over the runs.
+        squared: Sum of squared residuals.
+    """
 
     parts: tuple[Part, ...]
+    declared: tuple[Term, ...]
     weights: FloatArray
     level: float
+    squared: float
 
 
 @dataclass(frozen=True)
@@ -140,7 +155,7 @@ class Refit:
             return None
         run, judged = known
         target = run.whole[self.model.target][judged]
-        table = self._table(solved.parts, name, judged)
+        table = self._table(solved.parts, solved.declared, name, judged)
         return judged, target - table @ solved.weights - solved.level
 
     def channel(self, solved: Solved, name: str, channel: str) -> FloatArray | None:
@@ -170,8 +185,10 @@ class Refit:
         """
         terms = [p.term for p in parts if p.is_written and p.term is not None]
         campaign = Campaign.of([self.recordings[n] for n in self.train_names])
+        own = dict(zip(map(id, self._declared), self.solve(parts).declared, strict=True))
+        declared = [own.get(id(term), term) for term in self.model.terms]
         while True:
-            model = replace(self.model, terms=(*self.model.terms, *terms), evidence=None)
+            model = replace(self.model, terms=(*declared, *terms), evidence=None)
             try:
                 return without_unused(fit(model, campaign, bootstrap=bootstrap, shapes="keep"))
             except FitError:
@@ -196,17 +213,23 @@ class Refit:
         return replace(term, values={p.name: last.values[p.name] for p in term.effect.shape})
 
     def _fitted(self, parts: tuple[Part, ...]) -> Solved:
+        solved, share = self._amplitudes(parts, tuple(self._declared)), 1.0
+        for _ in range(MOVES if parts and shapes.any_of(self._declared) else 0):
+            further = self._amplitudes(parts, self._moved(solved, share))
+            if further.squared < solved.squared:
+                solved = further
+            else:
+                share *= 0.5
+        return solved
+
+    def _amplitudes(self, parts: tuple[Part, ...], declared: tuple[Term, ...]) -> Solved:
+        """Return the amplitudes at given shapes."""
         grams, means, samples = [], [], 0
-        for name in self.train_names:
-            known = self._run(parts, name)
-            if known is None:
-                continue
-            run, _ = known
-            table = self._table(parts, name, run.places)
+        for name, run in self._train_runs(parts):
+            table = self._table(parts, declared, name, run.places)
             whole = np.column_stack([table, run.whole[self.model.target][run.places]])
             means.append(whole.mean(axis=0))
-            centred = whole - means[-1] if self.model.run_offsets else whole
-            grams.append(centred.T @ centred)
+            grams.append(self._products(whole))
             samples += len(whole)
         gram = np.sum(grams, axis=0)
         penalty, low, high = self._limits(parts)
@@ -215,7 +238,29 @@ class Refit:
         level = 0.0
         if self.model.run_offsets:
             level = float(np.mean([m[-1] - m[:-1] @ weights for m in means]))
-        return Solved(parts, weights, level)
+        left = np.append(-weights, 1.0)
+        return Solved(parts, declared, weights, level, float(left @ gram @ left))
+
+    def _moved(self, solved: Solved, share: float) -> tuple[Term, ...]:
+        """Return the declared terms with their shapes a share of a Gauss-Newton step further."""
+        products = []
+        for name, run in self._train_runs(solved.parts):
+            table = self._table(solved.parts, solved.declared, name, run.places)
+            left = run.whole[self.model.target][run.places] - table @ solved.weights
+            own = shapes.slopes(solved.declared, solved.weights, partial(_columns, run=run))
+            products.append(self._products(np.column_stack([table, own, left])))
+        return shapes.moved(solved.declared, np.sum(products, axis=0), share)
+
+    def _train_runs(self, parts: Sequence[Part]) -> Iterator[tuple[str, FitRun]]:
+        """Yield the training runs that have a sample of the equation."""
+        for name in self.train_names:
+            if (known := self._run(parts, name)) is not None:
+                yield name, known[0]
+
+    def _products(self, whole: FloatArray) -> FloatArray:
+        """Return products of columns, each run's mean removed where offsets are a nuisance."""
+        centred = whole - whole.mean(axis=0) if self.model.run_offsets else whole
+        return np.asarray(centred.T @ centred)
 
     def _limits(self, parts: Sequence[Part]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the penalty and the bounds of every amplitude, shape (k,) each."""
@@ -233,12 +278,18 @@ class Refit:
         penalty, low, high = np.array(rows).T
         return penalty, low, high
 
-    def _table(self, parts: Sequence[Part], name: str, places: NDArray[np.intp]) -> FloatArray:
+    def _table(
+        self,
+        parts: Sequence[Part],
+        declared: Sequence[Term],
+        name: str,
+        places: NDArray[np.intp],
+    ) -> FloatArray:
         """Return the signed columns of a run: declared, found, and those without a term, (n, k)."""
         known = self._run(parts, name)
         assert known is not None  # noqa: S101 - narrows the type
         run, _ = known
-        blocks = [_columns(term, run, places) for term in self._declared]
+        blocks = [_columns(term, run, places) for term in declared]
         for part in parts:
             if part.term is not None:
                 acts = part.acts is None or name in part.acts
@@ -273,7 +324,9 @@ def _rms(squares: Mapping[str, float], samples: Mapping[str, int]) -> float:
     return float(np.sqrt(sum(squares.values()) / max(1, sum(samples.values()))))
 
 
-def _columns(term: Term, run: FitRun, places: NDArray[np.intp]) -> FloatArray:
+def _columns(term: Term, run: FitRun, places: NDArray[np.intp] | None = None) -> FloatArray:
+    """Return a term's signed columns at places of a run, by default at those that are fitted."""
+    places = run.places if places is None else places
     shape = term.numbers(term.effect.shape)
     if term.effect.start():
         return term.sign * term.columns(run.whole, shape)[places]

@@ -238,6 +238,14 @@ def test_a_belt_that_stiffens_is_the_only_explanation_of_the_angle_between_two_e
     assert (finding.family, finding.verdict) == ("transmission.stiffening", "identified")
 
 
+def test_the_width_of_a_declared_friction_is_another_next_to_a_cause() -> None:
+    """Fitted without the drag, the width makes up for a part of it."""
+    runs = turning(lambda angle, speed, _: 0.1 * speed * np.abs(speed))
+    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    assert finding.family == "friction.drag"
+    assert finding.rmse_after < 0.05 * finding.rmse_before
+
+
 def test_no_axis_of_the_reference_rig_is_apart_from_another() -> None:
     """The equations relate its shafts one after the other, so none is an axis of its own."""
     runs = list(draw(1_000_000, "clean").recordings)[:6]
