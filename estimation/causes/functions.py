@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from estimation.causes.angles import travel_of
 from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.instruments import signal
-from estimation.causes.places import Place, direction_width, travel_of
+from estimation.causes.places import Place, direction_width
 from estimation.derived import CAMPAIGN_TIME
 from estimation.recording import FloatArray
 

@@ -9,16 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import numpy as np
-
+from estimation.causes.angles import angles_of, related, signals_of, unrelated
 from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensitivity
-from estimation.derived import CAMPAIGN_TIME, measured_channels
-from estimation.signals import Combination, Signals
+from estimation.derived import CAMPAIGN_TIME
 
 Kind = Literal["loss", "actuator", "deflection", "lever", "torque sensor", "angle sensor"]
-
-MOST_BEND = 0.1
-"""Share of a joined axis' travel that may be the bend of what joins it."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +59,7 @@ class Place:
 
 def places_of(layout: Layout) -> list[Place]:
     """Return every place the declared equations know of."""
-    warmth = tuple(n for n in _signals(layout).temperatures if n in layout.measured)
+    warmth = tuple(n for n in signals_of(layout).temperatures if n in layout.measured)
     roles = {"temperature": warmth} if warmth else {}
     return [
         replace(place, roles={**place.roles, **roles})
@@ -76,9 +71,9 @@ def places_of(layout: Layout) -> list[Place]:
 
 def _places_of(layout: Layout) -> list[Place]:
     found = []
-    angles = _angles(layout)
+    angles = angles_of(layout)
     for equation in layout.equations.values():
-        own = _related(layout, equation, angles)
+        own = related(layout, equation, angles)
         found.append(_own(layout, equation, own, angles))
         if (actuator := _actuator(equation, own)) is not None:
             found.append(actuator)
@@ -90,11 +85,6 @@ def _places_of(layout: Layout) -> list[Place]:
     return found
 
 
-def travel_of(layout: Layout, position: str) -> float:
-    """Return the largest travel of a position in any run."""
-    return max(float(np.ptp(run.channels[position])) for run in layout.runs)
-
-
 def direction_width(layout: Layout, place: Place) -> float:
     """Return the speed over which friction changes its sign at a place."""
     equation = layout.equations[place.home]
@@ -103,71 +93,10 @@ def direction_width(layout: Layout, place: Place) -> float:
     return max((e.width for e in layout.equations.values()), default=0.0)
 
 
-def _angles(layout: Layout) -> list[str]:
-    """Return the angles that the equations read, the one with the largest travel first.
-
-    Those that follow by a known ratio come with them. No other channel is ever read: another
-    recorded channel may be a copy of a target.
-    """
-    signals = _signals(layout)
-    read = [n for e in layout.equations.values() for n in (e.target, *e.model.channels)]
-    names = {n for n in measured_channels(read, signals) if n in layout.measured}
-    for one in (c for c in signals.joined for _ in signals.joined):  # along a chain
-        both = {one.name, one.shares[0].channel}
-        if names & both and _agrees(layout, one):
-            names |= both
-    return sorted((n for n in names if n.endswith(ANGLES)), key=lambda n: -travel_of(layout, n))
-
-
-def _agrees(layout: Layout, joined: Combination) -> bool:
-    """Whether a position was recorded or derived, and moves as its neighbour and the ratio give."""
-    (share,) = joined.shares
-    if not all({joined.name, share.channel} <= {*run.channels} for run in layout.runs):
-        return False
-    channels = [run.channels for run in layout.runs]
-    moved = sum(float(np.var(c[joined.name])) for c in channels)
-    bent = sum(float(np.var(c[joined.name] - share.gain * c[share.channel])) for c in channels)
-    return bent < MOST_BEND**2 * moved
-
-
-def groups_apart(layout: Layout) -> int:
-    """Return the number of groups of equations that share no reading, as the joints of an arm."""
-    groups: list[set[str]] = []
-    for equation in layout.equations.values():
-        read = _read(equation) - {"time_s"}
-        shared = [g for g in groups if g & read]
-        groups = [g for g in groups if not g & read] + [read.union(*shared)]
-    return len(groups)
-
-
-def _related(layout: Layout, equation: Equation, angles: Sequence[str]) -> list[str]:
-    """Return the angles that equations relate to those an equation reads: of the same shafts.
-
-    Every angle, where it reads none.
-    """
-    read = [_read(e) & {*angles} for e in layout.equations.values()]
-    read += [{c.name, c.shares[0].channel} & {*angles} for c in _signals(layout).joined]
-    known: set[str] = set()
-    grown = _read(equation) & {*angles}
-    while grown > known:
-        known = grown
-        grown = known.union(*(r for r in read if r & known))
-    return [a for a in angles if a in known] or list(angles)
-
-
-def _read(equation: Equation) -> set[str]:
-    model = equation.model
-    return {*measured_channels([equation.target, *model.channels], model.signals)}
-
-
 def _computed(layout: Layout) -> set[str]:
     """Return the channels that an arm's links were fitted for: no sensor reads them."""
     terms = [t for e in layout.equations.values() for t in e.terms]
     return {c for t in terms if t.effect.id.startswith("arm.links") for c in t.channels.values()}
-
-
-def _signals(layout: Layout) -> Signals:
-    return next(iter(layout.equations.values())).model.signals
 
 
 def _motion(angle: str) -> dict[str, tuple[str, ...]]:
@@ -240,7 +169,7 @@ def _own(
         roles |= {"travel": (effort,)}
     if equation.of_angle:
         roles |= {"travel": (effort, *roles["travel"])}  # what bends has the history of its load
-        roles |= {"other_angle": _unrelated(layout, equation, everywhere)}
+        roles |= {"other_angle": unrelated(layout, equation, everywhere)}
         if "output_angle" in roles:  # a wave comes from either shaft of a gear
             ends = tuple(a for a in angles if a != roles["output_angle"][0] and _share(equation, a))
             roles |= {"output_angle": (*roles["output_angle"], *ends)}
@@ -253,15 +182,6 @@ def _own(
     apart = [_motion(a) for a in everywhere if a not in angles]
     others = tuple((*m["travel"], *m["speed"], *m["acceleration"]) for m in apart)
     return Place(equation.name, "loss", equation.name, enters, roles, others=others)
-
-
-def _unrelated(layout: Layout, equation: Equation, angles: Sequence[str]) -> tuple[str, ...]:
-    """Return the angles that no equation relates to those of an equation: of other joints."""
-    own = _read(equation)
-    read = [_read(e) for e in layout.equations.values()]
-    read += [{c.name, c.shares[0].channel} for c in _signals(layout).joined]
-    related = set().union(*(r for r in read if r & own & set(angles)))
-    return tuple(a for a in angles if a not in related)
 
 
 def _actuator(equation: Equation, angles: Sequence[str]) -> Place | None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from estimation.causes.angles import groups_apart
 from estimation.causes.candidates import (
     Claim,
     Group,
@@ -14,7 +15,6 @@ from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.places import groups_apart
 from estimation.causes.ranking import competing
 from estimation.causes.scoring import Scored
 

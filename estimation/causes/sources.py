@@ -12,9 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
+from estimation.causes.angles import travel_of
 from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
-from estimation.causes.places import Place, direction_width, travel_of
+from estimation.causes.places import Place, direction_width
 from estimation.effects import Effect, Parameter, Pointwise, catalogue
 from estimation.filters import holoborodko_derivative
 from estimation.recording import FloatArray
