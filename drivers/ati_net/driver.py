@@ -1,7 +1,7 @@
 """The driver of a Net F/T: calibration by TCP, then a stream of records by UDP."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import astuple, replace
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -86,8 +86,7 @@ class AtiNet(StreamedDevice):
                 f"It was asked for its calibration and had {ANSWER_TIMEOUT_S:g} s.",
                 "Check its power, the cable, and that this computer is in its network.",
             )
-        units_and_counts = astuple(protocol.decode_calibration(answer))[:4]
-        self._slopes = protocol.slopes(*units_and_counts)
+        self._slopes = protocol.decode_calibration(answer).slopes()
         self._identified = True
         return DeviceIdentity("ATI Net F/T", "", "")
 

@@ -5,7 +5,7 @@ Ethernet Axia.
 """
 
 import struct
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,12 @@ class Calibration:
     counts_per_torque: int
     scale_factors: tuple[int, ...] = (0, 0, 0, 0, 0, 0)
 
+    def slopes(self) -> NDArray[np.float64]:
+        """Return N a count three times, then N m a count three times, shape (6,)."""
+        return slopes(
+            self.force_unit, self.torque_unit, self.counts_per_force, self.counts_per_torque
+        )
+
 
 def slopes(
     force_unit: int, torque_unit: int, counts_per_force: int, counts_per_torque: int
@@ -129,8 +135,14 @@ def decode_records(datagram: bytes) -> NDArray[np.void]:
 
 def encode_calibration(calibration: Calibration) -> bytes:
     """Return the answer to `READ_CALIBRATION`."""
-    *units_and_counts, scale_factors = astuple(calibration)
-    return _CALIBRATION.pack(HEADER, *units_and_counts, *scale_factors)
+    return _CALIBRATION.pack(
+        HEADER,
+        calibration.force_unit,
+        calibration.torque_unit,
+        calibration.counts_per_force,
+        calibration.counts_per_torque,
+        *calibration.scale_factors,
+    )
 
 
 def decode_calibration(answer: bytes) -> Calibration:
