@@ -23,13 +23,9 @@ def angles_of(layout: Layout) -> list[str]:
     Those that follow by a known ratio come with them. No other channel is ever read: another
     recorded channel may be a copy of a target.
     """
-    signals = signals_of(layout)
-    read = [n for e in layout.equations.values() for n in (e.target, *e.model.channels)]
-    names = {n for n in measured_channels(read, signals) if n in layout.measured}
-    for one in (c for c in signals.joined for _ in signals.joined):  # along a chain
-        both = {one.name, one.shares[0].channel}
-        if names & both and _agrees(layout, one):
-            names |= both
+    read = set().union(*map(_read, layout.equations.values()))
+    agreeing = [_ends(one) for one in signals_of(layout).joined if _agrees(layout, one)]
+    names = _grown(read.intersection(layout.measured), agreeing)
     return sorted((n for n in names if n.endswith(ANGLES)), key=lambda n: -travel_of(layout, n))
 
 
@@ -59,23 +55,35 @@ def related(layout: Layout, equation: Equation, angles: Sequence[str]) -> list[s
 
     Every angle, where it reads none.
     """
-    read = [_read(e) & {*angles} for e in layout.equations.values()]
-    read += [{c.name, c.shares[0].channel} & {*angles} for c in signals_of(layout).joined]
-    known: set[str] = set()
-    grown = _read(equation) & {*angles}
-    while grown > known:
-        known = grown
-        grown = known.union(*(r for r in read if r & known))
+    own = _read(equation).intersection(angles)
+    known = _grown(own, [one.intersection(angles) for one in _together(layout)])
     return [a for a in angles if a in known] or list(angles)
 
 
 def unrelated(layout: Layout, equation: Equation, angles: Sequence[str]) -> tuple[str, ...]:
     """Return the angles that no equation relates to those of an equation: of other joints."""
-    own = _read(equation)
-    read = [_read(e) for e in layout.equations.values()]
-    read += [{c.name, c.shares[0].channel} for c in signals_of(layout).joined]
-    there = set().union(*(r for r in read if r & own & set(angles)))
+    own = _read(equation).intersection(angles)
+    there = set().union(*(one for one in _together(layout) if one & own))
     return tuple(a for a in angles if a not in there)
+
+
+def _together(layout: Layout) -> list[set[str]]:
+    """Return the channels that each equation reads, and the positions at each joint's ends."""
+    read = [_read(equation) for equation in layout.equations.values()]
+    return [*read, *map(_ends, signals_of(layout).joined)]
+
+
+def _grown(names: set[str], together: Sequence[set[str]]) -> set[str]:
+    """Return names with all that stand together with one of them, directly or through others."""
+    known: set[str] = set()
+    while names > known:
+        known = names
+        names = known.union(*(one for one in together if one & known))
+    return known
+
+
+def _ends(joined: Combination) -> set[str]:
+    return {joined.name, *(share.channel for share in joined.shares)}
 
 
 def _read(equation: Equation) -> set[str]:

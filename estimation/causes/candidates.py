@@ -56,6 +56,15 @@ class Claim:
         """Whether its form is unknown."""
         return isinstance(self.cause, Function)
 
+    @property
+    def has_means(self) -> bool:
+        """Whether the means of the runs show it.
+
+        What starts between runs also shifts their means, by its own offset; another factor of a
+        declared term shifts them as the term does.
+        """
+        return self.acts is None or self.given or self.cause.is_declared
+
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate(Claim):
@@ -207,10 +216,7 @@ def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
             noisy = _is_noisy(joint.layout, one)
             shaken = _columns(one, joint.layout.shaken) if noisy else None
             width = next(iter(columns[0].values())).shape[1]
-            key = (
-                *(width, _unit(one.cause), one.acts is None, one.given, shaken is None),
-                one.cause.is_declared,
-            )
+            key = (width, _unit(one.cause), one.has_means, shaken is None)
             held = waiting.setdefault(key, [])
             held.append((one, columns, shaken))
             if len(held) * width**2 >= AT_ONCE:
@@ -243,10 +249,7 @@ def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
     first = held[0][0]
     columns = _stacked(joint, [raw[1] for raw in held])
     shaken = _stacked(joint, [raw[2] for raw in held if raw[2] is not None])
-    # what starts between runs also shifts their means, by its own offset; another factor of a
-    # declared term shifts them as the term does
-    has_means = first.acts is None or first.given or first.cause.is_declared
-    laid = joint.projection.laid(columns, shaken, _unit(first.cause), has_means)
+    laid = joint.projection.laid(columns, shaken, _unit(first.cause), first.has_means)
     shown = np.flatnonzero(laid.size.min(axis=1) >= NOTHING)
     if len(shown) < len(held):
         laid = laid.only(shown)

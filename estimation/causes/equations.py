@@ -391,19 +391,16 @@ def _signals(
 ) -> RunSignals:
     models = [equation.model for equation in equations.values()]
     low_pass, signals = models[0].low_pass, models[0].signals
-    joined = [
-        c.name
-        for c in signals.joined
-        if c.shares[0].channel in measured and (c.name in measured or signals.combination(c.name))
-    ]
+    joined = [c.name for c in signals.joined if c.shares[0].channel in measured]
+    positions = [*measured, *(n for n in joined if signals.combination(n) is not None)]
     moved = [
         angle.removesuffix(kind) + rate
-        for angle in dict.fromkeys((*measured, *joined))
+        for angle in positions
         for kind, rates in RATES.items()
         if angle.endswith(kind)
         for rate in rates
     ]
-    wanted = [*measured, *joined, *moved, *(n for m in models for n in (*m.channels, m.target))]
+    wanted = [*positions, *moved, *(n for m in models for n in (*m.channels, m.target))]
     filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass, signals)
     valid, step, grid = _places(filtered, low_pass)
     channels = {name: np.array(filtered[name])[::step] for name in dict.fromkeys(wanted)}

@@ -18,7 +18,7 @@ from estimation.causes.folds import Folds
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.scoring import ByRun, Scored, assessed, best_of_each
-from estimation.causes.sources import RELATIVE, TURNING, Bend, Source, least_order
+from estimation.causes.sources import RELATIVE, Bend, Source, least_order
 from estimation.causes.weights import reweighted
 from estimation.effects import Parameter
 
@@ -119,8 +119,8 @@ def _nearby(layout: Layout, cause: Source, k: int, parameter: Parameter) -> list
     """Return values of one shape parameter between the points of its grid."""
     if parameter.name == "order":
         near = [cause.shape[k] + step for step in (-2.0, -1.0, 1.0, 2.0)]  # whole: of its shaft
-        angle = next(channel for role, channel in cause.channels if role in TURNING)
-        return [order for order in near if order >= least_order(layout, angle)]
+        least = least_order(layout, dict(cause.channels)[cause.turning])
+        return [order for order in near if order >= least]
     values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
     if parameter.name in ("width", "settled") or values is None or len(values) < 2:
         return []

@@ -11,6 +11,7 @@ import numpy as np
 from estimation.effects import Parameter
 from estimation.model import Estimate, Term
 from estimation.recording import FloatArray
+from estimation.shape_search import scaled, unscaled
 
 MOST = 0.5
 """Most that the logarithm of a shape moves in one step."""
@@ -70,5 +71,5 @@ def _moving(term: Term) -> list[Parameter]:
 
 
 def _with(term: Term, shape: Parameter, step: float) -> Term:
-    value = term.values[shape.name].value * np.exp(step)
-    return replace(term, values={**term.values, shape.name: Estimate(float(value))})
+    value = unscaled(shape, scaled(shape, term.values[shape.name].value) + step)
+    return replace(term, values={**term.values, shape.name: Estimate(value)})

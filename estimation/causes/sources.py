@@ -168,6 +168,11 @@ class Source:
         return any(parameter.name == "order" for parameter in self.effect.shape)
 
     @cached_property
+    def turning(self) -> str:
+        """The role of the angle or position that a wave repeats with."""
+        return next(role for role, _ in self.channels if role in TURNING)
+
+    @cached_property
     def _is_whole(self) -> bool:
         return self.parts == tuple(range(len(self.effect.amplitudes)))
 
@@ -447,8 +452,7 @@ def _worked_out(
         (x for p, x in zip(effect.shape, source.shape, strict=True) if p.name == "order"), None
     )
     if order is not None:
-        angle = next(n for r in TURNING for role, n in zip(roles, names, strict=True) if role == r)
-        passed = _passed(run, angle, order)
+        passed = _passed(run, names[roles.index(source.turning)], order)
         columns = columns * (passed[run.grid] if source.on_grid else passed)[:, None]
     return columns
 
