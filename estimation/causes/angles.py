@@ -26,7 +26,8 @@ def angles_of(layout: Layout) -> list[str]:
     read = set().union(*map(_read, layout.equations.values()))
     agreeing = [_ends(one) for one in signals_of(layout).joined if _agrees(layout, one)]
     names = _grown(read.intersection(layout.measured), agreeing)
-    return sorted((n for n in names if n.endswith(ANGLES)), key=lambda n: -travel_of(layout, n))
+    angles = [name for name in names if name.endswith(ANGLES)]
+    return sorted(angles, key=lambda name: (-travel_of(layout, name), name))  # a set has no order
 
 
 def _agrees(layout: Layout, joined: Combination) -> bool:
