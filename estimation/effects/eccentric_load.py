@@ -2,13 +2,12 @@
 
 from typing import ClassVar
 
-import numpy as np
+from estimation.effects.effect import Parameter, Parameters
+from estimation.effects.ripple_output import OutputHarmonics
+from estimation.effects.waves import Waves, harmonics_in
 
-from estimation.effects.effect import Inputs, Parameter, Parameters, Pointwise, Row, Shape
-from estimation.effects.ripple_output import OutputHarmonics, harmonics, harmonics_in
 
-
-class EccentricLoad(Pointwise):
+class EccentricLoad(Waves):
     """A pulley or a gear that is off centre. The order need not be an integer.
 
     Equation: torque = load (a sin(order angle) + b cos(order angle)), load in N m, angle in rad, a
@@ -29,11 +28,6 @@ class EccentricLoad(Pointwise):
     shape = (Parameter("order", "1", "periods per turn", 0.5, 16.5, linear=True, points=33),)
     told_apart_by = "the same sweep against two loads"
 
-    def row(self, inputs: Inputs, shape: Shape) -> Row:
-        """Return one value or one array per amplitude."""
-        phase = shape[0] * inputs["output_angle"]
-        return inputs["load"] * np.sin(phase), inputs["load"] * np.cos(phase)
-
 
 class EccentricHarmonics(EccentricLoad):
     """A pulley or a gear whose lever arm varies over a turn, not as a pure sine.
@@ -48,10 +42,6 @@ class EccentricHarmonics(EccentricLoad):
 
     id = "eccentric.load.harmonics"
     amplitudes = harmonics_in("target / load")
-
-    def row(self, inputs: Inputs, shape: Shape) -> Row:
-        """Return one value or one array per amplitude."""
-        return [inputs["load"] * x for x in harmonics(shape[0] * inputs["output_angle"])]
 
 
 class EccentricPulley(OutputHarmonics):

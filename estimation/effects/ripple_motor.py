@@ -2,12 +2,11 @@
 
 from typing import ClassVar
 
-import numpy as np
+from estimation.effects.effect import Parameter
+from estimation.effects.waves import Waves
 
-from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 
-
-class MotorRipple(Pointwise):
+class MotorRipple(Waves):
     """Cogging and commutation of the motor. The order need not be an integer.
 
     Equation: torque = a sin(order angle) + b cos(order angle), a and b in N m, angle in rad, order
@@ -22,14 +21,5 @@ class MotorRipple(Pointwise):
     id = "ripple.motor"
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"motor_angle": "motor_angle_rad"}
-    amplitudes = (
-        Parameter("sine", "target", "amplitude of the sine"),
-        Parameter("cosine", "target", "amplitude of the cosine"),
-    )
     shape = (Parameter("order", "1", "periods per turn", 0.5, 20.5, linear=True, points=401),)
     told_apart_by = "a sweep at a slow constant speed, and coasting without current"
-
-    def row(self, inputs: Inputs, shape: Shape) -> Row:
-        """Return one value or one array per amplitude."""
-        phase = shape[0] * inputs["motor_angle"]
-        return np.sin(phase), np.cos(phase)

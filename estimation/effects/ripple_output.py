@@ -1,31 +1,12 @@
 """Output ripple: torque or angle that is periodic in the output angle, after the gearhead."""
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
-import numpy as np
-
-from estimation.effects.effect import Inputs, Parameter, Parameters, Pointwise, Row, Shape
-
-
-def harmonics_in(unit: str) -> tuple[Parameter, ...]:
-    """Return the amplitudes of the harmonics, in a unit."""
-    return tuple(
-        Parameter(f"{wave}_{n}", unit, f"amplitude of the {wave} at {n} times the order")
-        for n in (1, 2, 3)
-        for wave in ("sine", "cosine")
-    )
+from estimation.effects.effect import Parameter
+from estimation.effects.waves import Waves, harmonics_in
 
 
-def harmonics(phase: Any) -> list[Any]:
-    """Return sine and cosine of each harmonic, in the order of the amplitudes.
-
-    Args:
-        phase: Phase of the first one, rad, a value or an array.
-    """
-    return [wave(n * phase) for n in (1, 2, 3) for wave in (np.sin, np.cos)]
-
-
-class OutputRipple(Pointwise):
+class OutputRipple(Waves):
     """A periodic error over the spindle's turn: bent shaft, gear teeth or notched pulley.
 
     Equation: torque or angle = a sin(order angle) + b cos(order angle), a and b in the target's
@@ -48,18 +29,9 @@ class OutputRipple(Pointwise):
         "joint": 1,
     }
     roles: ClassVar = {"output_angle": "spindle_angle_rad"}
-    amplitudes: ClassVar[Parameters] = (
-        Parameter("sine", "target", "amplitude of the sine"),
-        Parameter("cosine", "target", "amplitude of the cosine"),
-    )
     # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
     shape = (Parameter("order", "1", "periods per turn", 1.0, 32.0, linear=True, points=63),)
     told_apart_by = "a sweep at a slow constant speed over several turns, and under another load"
-
-    def row(self, inputs: Inputs, shape: Shape) -> Row:
-        """Return one value or one array per amplitude."""
-        phase = shape[0] * inputs["output_angle"]
-        return np.sin(phase), np.cos(phase)
 
 
 class OutputHarmonics(OutputRipple):
@@ -78,7 +50,3 @@ class OutputHarmonics(OutputRipple):
     amplitudes = harmonics_in("target")
     # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
     shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=31),)
-
-    def row(self, inputs: Inputs, shape: Shape) -> Row:
-        """Return one value or one array per amplitude."""
-        return harmonics(shape[0] * inputs["output_angle"])

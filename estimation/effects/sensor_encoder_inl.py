@@ -2,13 +2,11 @@
 
 from typing import ClassVar
 
-import numpy as np
-
-from estimation.effects.effect import Inputs, Parameter, Parameters, Pointwise, Row, Shape
-from estimation.effects.ripple_output import harmonics, harmonics_in
+from estimation.effects.effect import Parameter
+from estimation.effects.waves import Waves, harmonics_in
 
 
-class EncoderNonlinearity(Pointwise):
+class EncoderNonlinearity(Waves):
     """A periodic error of an encoder over its turn.
 
     Its causes are eccentricity (order 1), a tilted magnet (2), or unequal phases (4, or the number
@@ -30,19 +28,10 @@ class EncoderNonlinearity(Pointwise):
     id = "sensor.encoder_inl"
     balances: ClassVar = {"gearbox": 1, "stretch": 1}
     roles: ClassVar = {"encoder": "motor_angle_rad"}
-    amplitudes: ClassVar[Parameters] = (
-        Parameter("sine", "target", "amplitude of the sine"),
-        Parameter("cosine", "target", "amplitude of the cosine"),
-    )
     shape = (Parameter("order", "1", "periods per turn", 1.0, 32.0, linear=True, points=32),)
     told_apart_by = (
         "a slow sweep without load, repeated with the other sensor turned by half a turn"
     )
-
-    def row(self, inputs: Inputs, shape: Shape) -> Row:
-        """Return one value or one array per amplitude."""
-        phase = shape[0] * inputs["encoder"]
-        return np.sin(phase), np.cos(phase)
 
 
 class EncoderHarmonics(EncoderNonlinearity):
@@ -60,7 +49,3 @@ class EncoderHarmonics(EncoderNonlinearity):
     id = "sensor.encoder_inl.harmonics"
     amplitudes = harmonics_in("target")
     shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=16),)
-
-    def row(self, inputs: Inputs, shape: Shape) -> Row:
-        """Return one value or one array per amplitude."""
-        return harmonics(shape[0] * inputs["encoder"])

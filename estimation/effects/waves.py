@@ -1,0 +1,38 @@
+"""What the ripples share: sine and cosine of an order of an angle, and of its harmonics."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from estimation.effects.effect import Inputs, Parameter, Parameters, Pointwise, Row, Shape
+
+
+def waves_in(unit: str) -> Parameters:
+    """Return the amplitudes of a pure wave, in a unit."""
+    return tuple(Parameter(wave, unit, f"amplitude of the {wave}") for wave in ("sine", "cosine"))
+
+
+def harmonics_in(unit: str) -> Parameters:
+    """Return the amplitudes of a wave and its harmonics, in a unit."""
+    return tuple(
+        Parameter(f"{wave}_{n}", unit, f"amplitude of the {wave} at {n} times the order")
+        for n in (1, 2, 3)
+        for wave in ("sine", "cosine")
+    )
+
+
+class Waves(Pointwise):
+    """A periodic effect: the first role is its angle; a second one multiplies the waves.
+
+    The first shape parameter is the order, periods per turn.
+    """
+
+    amplitudes: ClassVar[Parameters] = waves_in("target")
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return sine and cosine of each harmonic, in the order of the amplitudes."""
+        angle, *load = (inputs[role] for role in self.roles)
+        phase = shape[0] * angle
+        phases = [phase, 2 * phase, 3 * phase][: len(self.amplitudes) // 2]
+        waves = [wave(x) for x in phases for wave in (np.sin, np.cos)]
+        return [load[0] * wave for wave in waves] if load else waves
