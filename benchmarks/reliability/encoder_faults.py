@@ -71,15 +71,15 @@ class SmallRig:
         self.angles.append(self.angle_rad)
 
 
-def frozen(*columns: int, since: int = FAULT_TICK) -> Fault:
-    """Return the fault of encoders that count no further."""
+def frozen(*columns: int, since: int = FAULT_TICK, counted_tenths: int = 0) -> Fault:
+    """Return the fault of encoders that count no further, or only some tenths of what moves."""
     kept: dict[int, int] = {}
 
     def fault(tick: int, counts: list[int]) -> list[int]:
         for column in columns:
             if tick < since:
                 kept[column] = counts[column]
-            counts[column] = kept[column]
+            counts[column] = kept[column] + (counts[column] - kept[column]) * counted_tenths // 10
         return counts
 
     return fault
@@ -87,16 +87,7 @@ def frozen(*columns: int, since: int = FAULT_TICK) -> Fault:
 
 def losing(*columns: int, since: int = FAULT_TICK) -> Fault:
     """Return the fault of encoders that lose every tenth count."""
-    kept: dict[int, int] = {}
-
-    def fault(tick: int, counts: list[int]) -> list[int]:
-        for column in columns:
-            if tick < since:
-                kept[column] = counts[column]
-            counts[column] = kept[column] + (counts[column] - kept[column]) * 9 // 10
-        return counts
-
-    return fault
+    return frozen(*columns, since=since, counted_tenths=9)
 
 
 def reversed_encoder(column: int) -> Fault:

@@ -17,72 +17,26 @@ _SILENT = {"stalls"}
 _UNANSWERED = {"gaps", "lost", "timeouts"}
 _ASKED_AGAIN = {"gaps", "lost", "timeouts", "retries"}
 
-_UNNUMBERED_STREAM = {
-    Fault.DROP: _DAMAGED,
-    Fault.CORRUPT: _DAMAGED,
-    Fault.DUPLICATE: _DAMAGED,
-    Fault.DELAY: _SILENT,
-    Fault.STALL: _SILENT,
-}
-_NUMBERED_STREAM = {
-    Fault.DROP: _DAMAGED_AND_MISSING,
-    Fault.CORRUPT: _DAMAGED_AND_MISSING,
-    Fault.DUPLICATE: _DAMAGED_AND_MISSING,
-    Fault.DELAY: _SILENT,
-    Fault.STALL: _SILENT,
-}
+_UNNUMBERED_STREAM = (_DAMAGED, _DAMAGED, _DAMAGED, _SILENT, _SILENT)
+_NUMBERED_STREAM = (*3 * (_DAMAGED_AND_MISSING,), _SILENT, _SILENT)
+_LATE = {"late"}
+_CHECKED_ANSWER = (*3 * (_ASKED_AGAIN | _DAMAGED,), _ASKED_AGAIN, _ASKED_AGAIN)
 
-SAID = {
-    "amt21": {
-        Fault.DROP: _ASKED_AGAIN | _DAMAGED,
-        Fault.CORRUPT: _ASKED_AGAIN | _DAMAGED,
-        Fault.DUPLICATE: _ASKED_AGAIN | _DAMAGED,
-        Fault.DELAY: _ASKED_AGAIN | _DAMAGED,
-        Fault.STALL: _ASKED_AGAIN | _DAMAGED,
-    },
-    "ati-can": {
-        Fault.DROP: _ASKED_AGAIN,
-        Fault.CORRUPT: _ASKED_AGAIN,
-        Fault.DUPLICATE: {"late"},
-        Fault.DELAY: _ASKED_AGAIN | {"late"},
-        Fault.STALL: _ASKED_AGAIN | {"late"},
-    },
-    "ati-net": {
-        Fault.DROP: _MISSING,
-        Fault.CORRUPT: _MISSING,
-        Fault.DUPLICATE: {"duplicates"},
-        Fault.DELAY: _MISSING | {"late"},
-        Fault.STALL: _SILENT,
-    },
+_BY_FAULT = {
+    "amt21": 5 * (_ASKED_AGAIN | _DAMAGED,),
+    "ati-can": (_ASKED_AGAIN, _ASKED_AGAIN, _LATE, _ASKED_AGAIN | _LATE, _ASKED_AGAIN | _LATE),
+    "ati-net": (_MISSING, _MISSING, {"duplicates"}, _MISSING | _LATE, _SILENT),
     "ati-serial": _UNNUMBERED_STREAM,
-    "dynamixel": {
-        Fault.DROP: _ASKED_AGAIN | _DAMAGED,
-        Fault.CORRUPT: _ASKED_AGAIN | _DAMAGED,
-        Fault.DUPLICATE: _ASKED_AGAIN | _DAMAGED,
-        Fault.DELAY: _ASKED_AGAIN,
-        Fault.STALL: _ASKED_AGAIN,
-    },
-    "epos4": {
-        Fault.DROP: _UNANSWERED,
-        Fault.CORRUPT: _UNANSWERED,
-        Fault.DUPLICATE: {"late"},
-        Fault.DELAY: _UNANSWERED | {"late"},
-        Fault.STALL: _UNANSWERED | {"late"},
-    },
+    "dynamixel": _CHECKED_ANSWER,
+    "epos4": (_UNANSWERED, _UNANSWERED, _LATE, _UNANSWERED | _LATE, _UNANSWERED | _LATE),
     "ft300": _UNNUMBERED_STREAM,
-    "moteus": {
-        Fault.DROP: _ASKED_AGAIN | _DAMAGED,
-        Fault.CORRUPT: _ASKED_AGAIN | _DAMAGED,
-        Fault.DUPLICATE: _ASKED_AGAIN | _DAMAGED,
-        Fault.DELAY: _ASKED_AGAIN,
-        Fault.STALL: _ASKED_AGAIN,
-    },
+    "moteus": _CHECKED_ANSWER,
     "qia128": _UNNUMBERED_STREAM,
     "teensy": _NUMBERED_STREAM,
     "teensy-master": _NUMBERED_STREAM,
-    "usb520": {
-        **_UNNUMBERED_STREAM,
-        Fault.DROP: _DAMAGED | _SILENT,
-        Fault.CORRUPT: _DAMAGED | _SILENT,
-    },
+    "usb520": (*2 * (_DAMAGED | _SILENT,), _DAMAGED, _SILENT, _SILENT),
 }
+"""By driver: what a frame that is missing, changed, twice there, late or stalled raises."""
+_FAULTS = (Fault.DROP, Fault.CORRUPT, Fault.DUPLICATE, Fault.DELAY, Fault.STALL)
+
+SAID = {driver: dict(zip(_FAULTS, said, strict=True)) for driver, said in _BY_FAULT.items()}
