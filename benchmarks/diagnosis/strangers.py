@@ -27,11 +27,11 @@ SIZES = {"strong": (6.0, 15.0), "weak": (2.0, 4.0), "outside": (6.0, 15.0), "cle
 CUTOFF_HZ = 50.0
 """Of the filter of a machine file."""
 
-SINGLE = """schema = "rig.machine/1"
+MACHINE = """schema = "rig.machine/1"
 
 [machine]
 name = "drawn"
-run_offsets = false
+run_offsets = {offsets}
 
 [[axis]]
 name = "{axis}"
@@ -49,23 +49,17 @@ reads = "position"
 [data]
 files = "*.csv"
 
+[data.runs]
+changes = ["run"]
+
 [data.columns]
 time_s = "t"
 {drive} = "u:{drive_unit}"
 {position} = "x:{position_unit}"
-
-[data.runs]
-changes = ["run"]
 """
 
-GEARED = """schema = "rig.machine/1"
-
-[machine]
-name = "drawn"
-
-[[axis]]
-name = "{axis}"
-unit = "rad"
+GEAR = """{other}_angle_rad = "y:deg"
+{other}_torque_n_m = "cell:N m"
 
 [[axis]]
 name = "{other}"
@@ -78,15 +72,6 @@ output = "{other}"
 ratio = {ratio!r}
 compliant = true
 
-[[actuator]]
-name = "{drive}"
-axis = "{axis}"
-
-[[sensor]]
-name = "{position}"
-axis = "{axis}"
-reads = "position"
-
 [[sensor]]
 name = "{other}_angle_rad"
 axis = "{other}"
@@ -96,21 +81,10 @@ reads = "position"
 name = "{other}_torque_n_m"
 axis = "{other}"
 reads = "effort"
-
-[data]
-files = "*.csv"
-
-[data.columns]
-time_s = "t"
-{drive} = "u:{drive_unit}"
-{position} = "x:{position_unit}"
-{other}_angle_rad = "y:deg"
-{other}_torque_n_m = "cell:N m"
-
-[data.runs]
-changes = ["run"]
 """
+"""What a transmission adds behind the columns of a single axis."""
 
+COLUMNS = ("run", "t", "u", "x", "y", "cell")
 AXES = ("table", "ram", "gantry", "wheel", "elbow", "drum", "stage", "shaft")
 OTHERS = ("link", "output", "arm", "head")
 JOINTS = ("belt", "gear", "harmonic", "reducer")
@@ -156,7 +130,7 @@ class Effect:
         enters: What it adds to: the `loss` of the drive, the `bend`, or the reading `x`, `y` or
             `cell`.
         of_gear: Whether it needs a transmission with a torque cell.
-        of_single: Whether it is hidden in a single axis.
+        of_single: Whether it is hidden in a single axis, if it enters the loss.
     """
 
     families: tuple[str, ...]
@@ -165,6 +139,10 @@ class Effect:
     enters: str = "loss"
     of_gear: bool = True
     of_single: bool = True
+
+    def fits(self, geared: bool) -> bool:
+        """Whether it is hidden in machines with a transmission, or in those without."""
+        return self.of_gear if geared else self.of_single and self.enters == "loss"
 
 
 @dataclass(frozen=True)
@@ -180,6 +158,9 @@ class Scale:
         last_s: Age at the end of the campaign.
         runs: How many.
         turns: Whether the driven axis is a shaft.
+        fastest_hz: Most periods of its motion a second.
+        rate_hz: Samples a second.
+        ratio: Of its transmission; 0 without one.
         drawn: Numbers between 0 and 1 that the forms choose their shapes by.
     """
 
@@ -191,6 +172,9 @@ class Scale:
     last_s: float
     runs: int
     turns: bool
+    fastest_hz: float
+    rate_hz: float
+    ratio: float
     drawn: FloatArray
 
 
@@ -267,29 +251,19 @@ NAMED = {
         ("transmission.backlash",),
         lambda s, run: np.tanh(run.load / (0.03 * s.load)),
         enters="bend",
-        of_single=False,
     ),
     "stiffening": Effect(
-        ("transmission.stiffening",),
-        lambda _, run: -run.load * np.abs(run.load),
-        enters="bend",
-        of_single=False,
+        ("transmission.stiffening",), lambda _, run: -run.load * np.abs(run.load), enters="bend"
     ),
-    "shaped gear": Effect(
-        ("ripple.output", "sensor.encoder_inl"), _wave, enters="bend", of_single=False
-    ),
-    "input encoder": Effect(("sensor.encoder_inl",), _wave, enters="x", of_single=False),
+    "shaped gear": Effect(("ripple.output", "sensor.encoder_inl"), _wave, enters="bend"),
+    "input encoder": Effect(("sensor.encoder_inl",), _wave, enters="x"),
     "cell": Effect(
-        ("sensor.gain_nonlinear",),
-        lambda _, run: run.load * np.abs(run.load),
-        enters="cell",
-        of_single=False,
+        ("sensor.gain_nonlinear",), lambda _, run: run.load * np.abs(run.load), enters="cell"
     ),
     "late cell": Effect(
         ("sensor.delay", "sensor.lag"),
         lambda s, run: -np.gradient(run.load, run.time_s) * 1e-3 * s.seconds,
         enters="cell",
-        of_single=False,
     ),
 }
 
@@ -325,9 +299,7 @@ class Stranger:
     def effect(self) -> tuple[str, Effect] | None:
         """What is hidden; nothing in a clean case."""
         chosen = UNNAMED if self.kind == "outside" else NAMED
-        fitting = {
-            n: e for n, e in chosen.items() if (e.of_gear if self.is_geared else e.of_single)
-        }
+        fitting = {n: e for n, e in chosen.items() if e.fits(self.is_geared)}
         name = list(fitting)[int(self.random.integers(len(fitting)))]
         return None if self.kind == "clean" else (name, fitting[name])
 
@@ -381,7 +353,7 @@ def draw(seed: int, kind: str, folder: Path) -> list[list[list[object]]]:
     speed = np.pi * fastest_hz * travel * 0.6
     scale = Scale(
         travel, speed, speed * over(0.01, 0.03), over(0.3, 50.0), seconds, runs * seconds, runs,
-        unit == "rad", random.random(4),
+        unit == "rad", fastest_hz, rate_hz, ratio if geared else 0.0, random.random(4),
     )  # fmt: skip
     friction = over(0.01, 100.0) if not geared else scale.load / ratio * over(0.05, 0.5)
     inertia = friction * over(0.2, 3.0) / (speed * 2.0 * np.pi * fastest_hz)
@@ -389,10 +361,7 @@ def draw(seed: int, kind: str, folder: Path) -> list[list[list[object]]]:
     noise = friction * over(0.004, 0.02) if not geared else scale.load / ratio * over(0.002, 0.01)
     cell_noise, stiffness = scale.load * over(0.001, 0.005), scale.load / over(0.002, 0.02)
     counts = travel / over(1e5, 1e7)
-    made = [
-        _run(k, scale, fastest_hz, rate_hz, ratio if geared else 0.0, stiffness, random)
-        for k in range(runs)
-    ]
+    made = [_run(k, scale, stiffness, random) for k in range(runs)]
     seen = np.sqrt(2.0 * CUTOFF_HZ / rate_hz)  # share of white noise that the filter passes
     jitter = inertia * _jitter(made[0].position, counts, rate_hz)
     loss = seen * np.hypot(noise, cell_noise / ratio if geared else 0.0) + jitter
@@ -417,25 +386,8 @@ def draw(seed: int, kind: str, folder: Path) -> list[list[list[object]]]:
             cell = run.load + extra["cell"] + random.normal(0.0, cell_noise, len(read))
             columns += [np.round(run.other / fine) * fine * DEGREES, cell]
         rows.append(np.column_stack(columns))
-    kind_of_drive = str(random.choice(list(DRIVES)))
-    drive_unit, drive_scale = _choice(DRIVES[kind_of_drive], random)
-    position_unit, position_scale = _choice(UNITS[unit], random)
-    table = np.concatenate(rows)
-    if kind_of_drive == "pwm_ratio":
-        drive_scale /= float(1.2 * np.max(np.abs(table[:, 2])))
-    table[:, 2] *= drive_scale
-    table[:, 3] *= position_scale
-    words = {
-        "axis": axis, "other": other, "joint": joint, "ratio": ratio, "unit": unit,
-        "drive": f"{axis}_{kind_of_drive}", "drive_unit": drive_unit,
-        "position": f"{axis}_{'position_m' if unit == 'm' else 'angle_rad'}",
-        "position_unit": position_unit,
-    }  # fmt: skip
-    (folder / MACHINE_FILE).write_text((GEARED if geared else SINGLE).format(**words))
-    with (folder / "table.csv").open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["run", "t", "u", "x", "y", "cell"][: table.shape[1]])
-        writer.writerows([[f"{value:.10g}" for value in row] for row in table])
+    names = {"axis": axis, "other": other, "joint": joint, "ratio": ratio, "unit": unit}
+    _hand_over(folder, names, np.concatenate(rows), random)
     if chosen is None:
         return []
     own = f"{axis}_{'position' if unit == 'm' else 'angle'}"
@@ -444,6 +396,33 @@ def draw(seed: int, kind: str, folder: Path) -> list[list[list[object]]]:
         sorted(place) if group == "position" else group.split() for group in chosen[1].variables
     ]
     return [[list(chosen[1].families), [axis, joint] if geared else [axis], groups]]
+
+
+def _hand_over(
+    folder: Path, names: Mapping[str, object], table: FloatArray, random: np.random.Generator
+) -> None:
+    """Write the machine's file and its table, the drive and the position in drawn units."""
+    axis, unit, geared = names["axis"], str(names["unit"]), table.shape[1] == len(COLUMNS)
+    kind_of_drive = str(random.choice(list(DRIVES)))
+    drive_unit, drive_scale = _choice(DRIVES[kind_of_drive], random)
+    position_unit, position_scale = _choice(UNITS[unit], random)
+    if kind_of_drive == "pwm_ratio":
+        drive_scale /= float(1.2 * np.max(np.abs(table[:, 2])))
+    table[:, 2] *= drive_scale
+    table[:, 3] *= position_scale
+    words = {
+        **names,
+        "drive": f"{axis}_{kind_of_drive}",
+        "drive_unit": drive_unit,
+        "position": f"{axis}_{'position_m' if unit == 'm' else 'angle_rad'}",
+        "position_unit": position_unit,
+        "offsets": "true" if geared else "false",
+    }
+    (folder / MACHINE_FILE).write_text((MACHINE + GEAR if geared else MACHINE).format(**words))
+    with (folder / "table.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS[: table.shape[1]])
+        writer.writerows([[f"{value:.10g}" for value in row] for row in table])
 
 
 def _jitter(position: FloatArray, count: float, rate_hz: float) -> float:
@@ -477,32 +456,17 @@ def _smooth(
     return np.asarray(size * whole / np.max(np.abs(whole)))
 
 
-def _run(
-    k: int,
-    scale: Scale,
-    fastest_hz: float,
-    rate_hz: float,
-    ratio: float,
-    stiffness: float,
-    random: np.random.Generator,
-) -> Run:
-    time_s = np.arange(0.0, scale.seconds, 1.0 / round(rate_hz))
+def _run(k: int, scale: Scale, stiffness: float, random: np.random.Generator) -> Run:
+    time_s = np.arange(0.0, scale.seconds, 1.0 / round(scale.rate_hz))
     size = 0.5 * scale.travel * random.uniform(0.6, 1.0)
-    position = _smooth(time_s, size, fastest_hz, random)
+    position = _smooth(time_s, size, scale.fastest_hz, random)
     load, other = np.zeros(len(time_s)), np.zeros(len(time_s))
-    if ratio:
-        load = scale.load * (0.4 + 0.3 * (k % 3)) * _smooth(time_s, 1.0, fastest_hz, random)
-        other = position / ratio
-        position = position + ratio * load / stiffness
-    return Run(
-        k,
-        time_s,
-        k * scale.seconds + time_s,
-        position,
-        np.gradient(position, time_s),
-        load,
-        other,
-    )
+    if scale.ratio:
+        load = scale.load * (0.4 + 0.3 * (k % 3)) * _smooth(time_s, 1.0, scale.fastest_hz, random)
+        other = position / scale.ratio
+        position = position + scale.ratio * load / stiffness
+    speed = np.gradient(position, time_s)
+    return Run(k, time_s, k * scale.seconds + time_s, position, speed, load, other)
 
 
 def _hidden(
