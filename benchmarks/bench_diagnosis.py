@@ -26,7 +26,7 @@ from estimation.causes.scoring import assessed
 from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import run_diagnosis
-from rig.diagnosis.subject import declared_models
+from rig.diagnosis.subject import Subject, declared_models
 from rig.simulation.campaign import simulate_reference_campaign
 from rig.simulation.hidden import HiddenEffect
 
@@ -84,7 +84,7 @@ def _whole() -> Ratio:
     with tempfile.TemporaryDirectory() as folder:
         ledger = Ledger(Path(folder) / "looks.jsonl")
         began = time.process_time()
-        answer, _ = run_diagnosis(campaign, models, ledger, quick=True)
+        answer, _ = run_diagnosis(Subject(campaign, models), ledger, quick=True)
         seconds = time.process_time() - began
     found = ", ".join(f.family for f in answer.diagnosis.findings) or "nothing"
     return Ratio(

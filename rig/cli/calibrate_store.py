@@ -179,9 +179,7 @@ def diagnose(
     asked = of_calibration(declared_by_record(_holding(record, store).get(record)))
     looks = Ledger(ledger or default_ledger())
     with stages() as on_stage:
-        done, look = run_diagnosis(
-            asked.campaign, asked.models, looks, seed=seed, on_stage=on_stage
-        )
+        done, look = run_diagnosis(asked, looks, seed=seed, on_stage=on_stage)
     looks.enter(look)
     data = done.diagnosis.to_json() if json else None
     present(json, data, *sentences(done.diagnosis), *done.diagnosis.notes)

@@ -68,6 +68,7 @@ def demo(
     from rig.configuration.config import load_config
     from rig.diagnosis.ledger import Ledger
     from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.subject import Subject
     from rig.diagnosis.traces import written_models
     from rig.importers.registry import open_campaign
     from rig.reports.diagnosis import write
@@ -98,9 +99,8 @@ def demo(
         held_out = held_out_error(declared, discover, FOLDS, number)
         say(held_out_sentence(declared, held_out))
         looks = Ledger(ledger)
-        done, look = run_diagnosis(
-            campaign, [declared], looks, seed=number, quick=True, on_stage=say
-        )
+        asked = Subject(campaign, [declared])
+        done, look = run_diagnosis(asked, looks, seed=number, quick=True, on_stage=say)
     model_file.write_all(written_models(done), model)
     kept = logs / DIAGNOSIS
     report = write(done, number, kept.with_suffix(".html"), kept)

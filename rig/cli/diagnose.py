@@ -1,7 +1,7 @@
 """`rig diagnose`: what does the declared model lack?"""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
@@ -22,6 +22,9 @@ from rig.cli.options import (
     say_left_out,
 )
 from rig.output.console import JsonFlag, present
+
+if TYPE_CHECKING:
+    from estimation.causes.verdict import Answer
 
 
 def diagnose(
@@ -60,14 +63,12 @@ def diagnose(
         _plan(path, model, balance, machine, json_)
         return
 
-    from estimation import model_file
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
     from rig.diagnosis.durations import timed_stages
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import subject
-    from rig.diagnosis.traces import with_cost_of_causal_filters, written_models
     from rig.diagnosis.work import engine
     from rig.reports.diagnosis import write
     from rig.reports.diagnosis_words import sentences
@@ -84,27 +85,27 @@ def diagnose(
         say_left_out(path, asked.campaign)
         with timed_stages(asked, quick) as on_stage:
             done, look = run_diagnosis(
-                asked.campaign,
-                asked.models,
-                looks,
-                seed=seed,
-                executor=executor,
-                quick=quick,
-                on_stage=on_stage,
+                asked, looks, seed=seed, executor=executor, quick=quick, on_stage=on_stage
             )
     # files first, then the ledger, then the screen: held-out runs are not used up by a diagnosis
     # that left nothing, and nobody sees a result that the ledger does not hold
-    written = []
-    if model_out is not None:
-        done = with_cost_of_causal_filters(done)
-        model_file.write_all(written_models(done), model_out)
-        written += [f"Model: {model_out}", f"To estimate with it: rig model use {model_out}"]
+    done, written = _with_models(done, model_out) if model_out else (done, [])
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))
     written += write(done, seed, page_file, json_out)
     looks.enter(look)
     said = (*sentences(done.diagnosis), *done.diagnosis.notes, *written)
     present(json_, done.diagnosis.to_json(), *said)
+
+
+def _with_models(done: "Answer", model_out: Path) -> "tuple[Answer, list[str]]":
+    """Write the models; return the diagnosis with their errors as they run live, and the lines."""
+    from estimation import model_file
+    from rig.diagnosis.traces import with_cost_of_causal_filters, written_models
+
+    done = with_cost_of_causal_filters(done)
+    model_file.write_all(written_models(done), model_out)
+    return done, [f"Model: {model_out}", f"To estimate with it: rig model use {model_out}"]
 
 
 def _kept_with(path: Path) -> Path | None:

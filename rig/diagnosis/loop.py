@@ -20,6 +20,7 @@ from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import run_diagnosis
+from rig.diagnosis.subject import Subject
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 from rig.protocols.protocol import Protocol, load_protocol, protocol_toml
@@ -133,8 +134,7 @@ def run_loop(
         runs = _record(_with_noise_of(config, number), protocol, place, on_progress)
         write_text_atomic(folder / f"round-{number}.protocol.toml", protocol_toml(protocol))
         done, look = run_diagnosis(
-            open_campaign(folder / "runs"),
-            models,
+            Subject(open_campaign(folder / "runs"), models),
             ledger,
             seed=seed,
             executor=executor,

@@ -13,21 +13,19 @@ import numpy as np
 
 from estimation.arm.balances import declared_arm
 from estimation.arm.shared import laid_out
-from estimation.campaign import Campaign
 from estimation.causes.equations import on_one_clock
 from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.audit import steady
 from estimation.diagnosis.split import claim, cut_and_split, path_of
-from estimation.model import Model
 from estimation.recording import FloatArray, Recording
 from rig.diagnosis.ledger import Ledger, Look, look_at
 from rig.diagnosis.propose import propose
+from rig.diagnosis.subject import Subject
 
 
 def run_diagnosis(
-    campaign: Campaign,
-    models: Sequence[Model],
+    asked: Subject,
     ledger: Ledger,
     *,
     seed: int = 0,
@@ -38,8 +36,7 @@ def run_diagnosis(
     """Diagnose declared models on a campaign.
 
     Args:
-        campaign: The recordings.
-        models: Declared models, one an equation.
+        asked: The recordings and the models that are declared of them.
         ledger: Log of the runs that earlier diagnoses used; it is not written here.
         seed: Seed of the split and of intervals.
         executor: Plays the experiments that may be proposed in parallel.
@@ -57,18 +54,18 @@ def run_diagnosis(
     """
     ledger.check()
     on_stage("reading the recordings")
-    whole, lost = steady(list(campaign.evidence))
+    whole, lost = steady(list(asked.campaign.evidence))
     for reason in lost:
         on_stage(reason)
     known = ledger.known(whole)
     recordings, sealed = cut_and_split(whole, seed, known)
     seen = [name for name in sealed.confirm if path_of(name) in known]
-    arm = declared_arm(models, recordings)
+    arm = declared_arm(asked.models, recordings)
     if arm is not None:
         on_stage("fitting the links that all joints share")
         recordings = laid_out(arm, recordings, sealed.discover)
     recordings = on_one_clock(recordings)
-    found = answer(recordings, models, sealed, on_stage=on_stage)
+    found = answer(recordings, asked.models, sealed, on_stage=on_stage)
     proposed = None
     if not quick:
         on_stage("choosing the experiment that separates the alternatives")

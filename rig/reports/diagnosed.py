@@ -81,7 +81,7 @@ def diagnose_folder(ledger: Path, folder: Path) -> FolderDiagnosis:
     """Return the diagnosis of a folder's campaign, or why it could not be made."""
     try:
         asked = subject(folder, skip_bad=True)
-        done, look = run_diagnosis(asked.campaign, asked.models, Ledger(ledger), quick=True)
+        done, look = run_diagnosis(asked, Ledger(ledger), quick=True)
     except (EstimationError, RigError) as error:
         return FolderDiagnosis(failed=str(error))
     return FolderDiagnosis(

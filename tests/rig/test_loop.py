@@ -36,8 +36,8 @@ def diagnosed(monkeypatch):
     """What the diagnoses say, one a round, and the names of the runs each was given."""
     told = SimpleNamespace(answers=[], seen=[])
 
-    def stand_in(campaign, models, ledger, **_):
-        told.seen.append(campaign.names)
+    def stand_in(asked, ledger, **_):
+        told.seen.append(asked.campaign.names)
         return SimpleNamespace(diagnosis=told.answers[len(told.seen) - 1]), {}
 
     monkeypatch.setattr(looping, "run_diagnosis", stand_in)

@@ -15,6 +15,7 @@ from estimation.errors import EstimationError
 from estimation.model import Model
 from rig.diagnosis.ledger import Ledger
 from rig.diagnosis.run import run_diagnosis
+from rig.diagnosis.subject import Subject
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
 from rig.machines.recordings import with_motion
@@ -124,9 +125,8 @@ def _rows(case: Case, campaign: Campaign, seed: int) -> list[Row]:
     models = [model for model in whole if case.equation in ("", model.balance)]
     campaign = with_motion(campaign, models)
     with tempfile.TemporaryDirectory(prefix="study-") as place:
-        answer, _ = run_diagnosis(
-            campaign, models, Ledger(Path(place) / "looks.jsonl"), seed=seed, quick=True
-        )
+        looks = Ledger(Path(place) / "looks.jsonl")
+        answer, _ = run_diagnosis(Subject(campaign, models), looks, seed=seed, quick=True)
     return [_row(case, model, answer) for model in models if model.balance in answer.refits.of]
 
 
