@@ -210,10 +210,10 @@ class Clocked(Protocol):
         """Let go of it."""
 
 
-class LinkedDevice:
+class LinkedDevice(Device):
     """What every driver of a device on one link has.
 
-    A driver gives `channels`, `identify` and `stop`.
+    A driver gives `channels`, `identify`, `start`, `read` and `stop`.
 
     Args:
         way: The way to the device, closed with it.
@@ -227,22 +227,9 @@ class LinkedDevice:
         self._identified = self._closed = False
 
     @property
-    def channels(self) -> tuple[Channel, ...]:
-        """What a sample has."""
-        raise NotImplementedError
-
-    @property
     def counters(self) -> dict[str, int]:
         """What happened on the way."""
         return self._counters.as_dict()
-
-    def identify(self) -> DeviceIdentity:
-        """Ask who is there."""
-        raise NotImplementedError
-
-    def stop(self) -> None:
-        """Let no more samples come."""
-        raise NotImplementedError
 
     def let_go(self) -> None:
         """Close the way to the device."""

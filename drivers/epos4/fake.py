@@ -231,7 +231,8 @@ class Epos4Fake:
             stored = {at: value for at, value in stored.items() if at[0] < 0x2000}
         else:
             self.state = State.SWITCH_ON_DISABLED
-        self._store_all(stored)
+        for (index, subindex), value in stored.items():
+            self._store(index, subindex, value)
         self._needs_communication_reset = False
         self._host_node = self._host_limit_ms = 0
         self._host_silent_ms = None
@@ -260,10 +261,6 @@ class Epos4Fake:
             size = (entry & 0xFF) // 8
             self._node.set_data(entry >> 16, entry >> 8 & 0xFF, data[:size])
             data = data[size:]
-
-    def _store_all(self, objects: dict[tuple[int, int], int]) -> None:
-        for (index, subindex), value in objects.items():
-            self._store(index, subindex, value)
 
     def _store(self, index: int, subindex: int, value: int) -> None:
         variable = self._node.object_dictionary.get_variable(index, subindex)
