@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.errors import LinkLostError
-from drivers.link import FramedLink
+from drivers.framing import FrameStream
 from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import TRIP_SHIFT, Trip
@@ -117,8 +116,8 @@ def _run(
     board: FirmwareBoard, profile: Profile, commands: list[tuple[int, bytes]], last_us: int
 ) -> NDArray[np.void]:
     """Return every sample that the board sends."""
-    output = _Output()
-    link = FramedLink(output, profile.sample.itemsize)
+    stream = FrameStream(profile.sample.itemsize)
+    sent = [np.empty((0, profile.sample.itemsize), np.uint8)]
     tick = 0
 
     def advance(until: int) -> None:
@@ -127,8 +126,7 @@ def _run(
             step = min(STEP_TICKS, until - tick)
             board.advance(step)
             tick += step
-            output.data += board.transmit()
-            link.poll(0.0)
+            sent.append(stream.feed(board.transmit()).payloads)
 
     for tick_us, data in commands:
         advance(round(tick_us / profile.tick_us))
@@ -137,27 +135,7 @@ def _run(
     behind_us = (last_us - tick * profile.tick_us) % 2**32
     if behind_us < 2**31:
         advance(tick + behind_us // profile.tick_us + 1)
-    return link.take_stream().view(profile.sample)[:, 0]
-
-
-class _Output:
-    """What a board sent, as a transport."""
-
-    url = "sim://"
-    now_s = 0.0
-
-    def __init__(self) -> None:
-        self.data = b""
-
-    def read(self, timeout_s: float) -> bytes:
-        data, self.data = self.data, b""
-        return data
-
-    def write(self, data: bytes) -> None:
-        raise LinkLostError("A replay sends nothing.")
-
-    def close(self) -> None:
-        """Do nothing."""
+    return np.concatenate(sent).view(profile.sample)[:, 0]
 
 
 def _compared(logged: NDArray[np.void], again: NDArray[np.void]) -> tuple[int, str]:
