@@ -36,7 +36,7 @@ class Continuity:
         if not len(samples):
             return samples, np.empty(0, np.int64)
         before = self._last_sequence
-        steps = _steps(samples["sequence"], before)
+        steps = wrapped_steps(samples["sequence"], before)
         if (steps == 1).all():
             self._last_sequence = before + len(samples)
             return samples, self._unwrap(samples["tick_us"])
@@ -58,12 +58,12 @@ class Continuity:
         if not len(wrapped_us):
             return np.empty(0, np.int64)
         last_us = int(wrapped_us[0]) if self._last_tick_us is None else self._last_tick_us
-        tick_us = last_us + np.cumsum(_steps(wrapped_us, last_us))
+        tick_us = last_us + np.cumsum(wrapped_steps(wrapped_us, last_us))
         self._last_tick_us = int(tick_us[-1])
         return tick_us
 
 
-def _steps(wrapped: NDArray[np.uint32], before: int) -> NDArray[np.int64]:
+def wrapped_steps(wrapped: NDArray[np.uint32], before: int) -> NDArray[np.int64]:
     """Return how far a 32-bit count went with each value, 0 to 2^32 - 1, from `before` on."""
     count = np.empty(len(wrapped) + 1, np.uint32)
     count[0] = before % _WRAP

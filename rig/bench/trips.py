@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
 from drivers.errors import DriverError
 from drivers.teensy import protocol
+from drivers.teensy.continuity import wrapped_steps
 from drivers.teensy.core import CoreGuard, firmware_library
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.profile import ArmLimits
@@ -170,22 +170,15 @@ class HostWatch:
         samples = reading.counts[armed]
         names = self._machine.profile.input_names
         rows = np.stack([samples[name].astype(np.int32) for name in names], axis=1)
-        row, code, channel, value, limit, late_us = self._guard.first_crossing(
-            rows, self._ticks(samples["tick_us"])
-        )
+        before = int(samples["tick_us"][0]) if self._newest_us is None else self._newest_us
+        self._newest_us = int(samples["tick_us"][-1])
+        ticks = wrapped_steps(samples["tick_us"], before) / self._machine.profile.tick_us
+        row, code, channel, value, limit, late_us = self._guard.first_crossing(rows, ticks)
         if code == Trip.NONE:
             return None
         tick_us = int(samples["tick_us"][row])
         named = names + self._machine.profile.further_names
         return TripReport(Trip(code), named[channel], value, limit, tick_us, late_us)
-
-    def _ticks(self, tick_us: NDArray[np.uint32]) -> NDArray[np.float64]:
-        """Return the ticks between each sample and the one before it, by the board's clock."""
-        before = int(tick_us[0]) if self._newest_us is None else self._newest_us
-        self._newest_us = int(tick_us[-1])
-        clock = np.concatenate(([before], tick_us)).astype(np.uint32)
-        steps = (clock[1:] - clock[:-1]).astype(np.float64)  # it wraps
-        return steps / self._machine.profile.tick_us
 
 
 class BoardResetError(RigError):
