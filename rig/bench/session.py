@@ -9,7 +9,6 @@ import gc
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
-from time import sleep
 from typing import Any, Self
 
 import numpy as np
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
 from calibration.zero import MINIMUM_SAMPLES, SensorZero, measure_zeros
-from drivers.clock import ClockFit
 from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import Identity, Result, Trip, TripReport
@@ -26,12 +24,13 @@ from rig.bench.companions import Companion, open_companions
 from rig.bench.device_logger import logger_on, raw_stream, with_channels
 from rig.bench.flight import FlightRecorder
 from rig.bench.holding import holding
+from rig.bench.intake import Intake
 from rig.bench.interrupts import leaving_safely
 from rig.bench.logger import is_real_time
 from rig.bench.sensor_logger import SensorWay
 from rig.bench.trips import HostWatch, require_same_start, trip_error, tripped
 from rig.configuration.config import Config
-from rig.errors import ExitCode, RigError, SafetyTripError, UsageError
+from rig.errors import SafetyTripError, UsageError
 from rig.log.schema import Stream
 from rig.logic.link import LogicLink
 from rig.machines.choose import machine_of
@@ -44,28 +43,9 @@ LEAD_S = 0.3
 UNENDING = 2**62
 """Number of setpoints while it is not known how many there will be."""
 
-READ_TIMEOUT_S = 0.2
-"""Longest wait for the next samples, s; shorter than the logger's watchdog, fed in between."""
-
-GATHER_S = 0.01
-"""In real time samples gather this long between two readings, s: a block costs as much as one."""
-
-CLOCK_EVERY_S = 0.25
-"""How often a reading follows the one before at once, so that the clock's answer is not kept, s."""
-
-STALL_S = 1.0
-"""With no sample for this long, the logger is taken for dead, s."""
-
-
 COOLING_STEP_S = 0.25
 COOLING_S = 60.0
 """How long a board whose motors are too warm to be armed is waited for, s, and in which steps."""
-
-
-class LoggerStalledError(RigError):
-    """The logger sends nothing although it should stream."""
-
-    exit_code = ExitCode.DEVICE
 
 
 class Session:
@@ -97,11 +77,11 @@ class Session:
         self.here: tuple[float, ...] = ()
         """Where it stood in the newest sample: what its setpoints ask for, rad."""
         self._watch: HostWatch | None = None
-        self._gathers = is_real_time(config)
-        self._read_s = self._clock_due_s = -np.inf
-        self.companions: list[Companion] = []
-        self.clock = ClockFit()
+        self._is_real_time = is_real_time(config)
+        self._intake = Intake(self._logger, transport, self._is_real_time)
+        self.clock = self._intake.clock
         """The logger's clock against this computer's; its line states the residual of the fit."""
+        self.companions: list[Companion] = []
 
     def __enter__(self) -> Self:
         with ExitStack() as ways_out:
@@ -253,7 +233,7 @@ class Session:
         if self._watch is not None:
             self.safe()  # the motion before this one is over
         gains = self.machine.gains(self.config)
-        if is_real_time(self.config):
+        if self._is_real_time:
             gc.collect()
             gc.freeze()  # collecting all that was imported takes longer than a board waits
         self._arm(gains, board)
@@ -302,36 +282,11 @@ class Session:
 
     def _tick_us(self) -> int:
         """Return the board's clock now; exact where time is virtual."""
-        virtual = self.config.is_simulated and not self._gathers
+        virtual = self.config.is_simulated and not self._is_real_time
         return round(self._transport.now_s * 1e6) if virtual else self.newest_tick_us
 
-    def _gather(self) -> None:
-        """Let samples gather where time is real and the board runs by itself."""
-        now_s = self._transport.now_s
-        if now_s >= self._clock_due_s:
-            self._clock_due_s = now_s + CLOCK_EVERY_S
-        elif self._gathers:
-            sleep(max(0.0, self._read_s + GATHER_S - now_s))
-        self._read_s = self._transport.now_s
-
     def _read(self) -> Reading:
-        self._gather()
-        self._logger.heartbeat()
-        give_up_s = self._transport.now_s + STALL_S
-        while True:
-            batch = self._logger.read(READ_TIMEOUT_S)
-            if len(batch.samples):
-                break
-            if self._transport.now_s > give_up_s:
-                require_same_start(self._logger, self.identity.boot)
-                raise LoggerStalledError(
-                    f"The logger has sent nothing for {STALL_S:g} s.",
-                    "Its cable was pulled, it was reset, or its program stopped.",
-                    "Check the cable and its supply, then start again; nothing recorded is lost.",
-                )
-        exchange = self._logger.last_exchange
-        if exchange is not None:
-            self.clock.add(exchange.sent_s, exchange.received_s, exchange.tick_us)
+        batch = self._intake.next(self.identity.boot)
         for companion in self.companions:
             companion.poll(self._transport.now_s)
         if self._first_tick_us is None:

@@ -15,7 +15,8 @@ from drivers.teensy.protocol import (
 )
 from drivers.transport.simulated import SimulatedTransport
 from estimation.recording import Flag
-from rig.bench.session import LoggerStalledError, Session
+from rig.bench.intake import LoggerStalledError
+from rig.bench.session import Session
 from rig.errors import SafetyTripError
 from rig.machines.reading import reading_of, with_setpoints
 from tests.rig.simulated import behind, is_armed, session, simulated, transport
