@@ -199,11 +199,7 @@ def _fault(path: Path, line: int, what: str, expected: str) -> DataError:
 
 def _files(path: Path) -> list[Path]:
     entries = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [entry for entry in entries if entry.is_file() and _is_named_so(entry)]
-
-
-def _is_named_so(path: Path) -> bool:
-    return path.name.lower().endswith(SUFFIXES)
+    return [e for e in entries if e.is_file() and e.name.lower().endswith(SUFFIXES)]
 
 
 def _stem(path: Path) -> str:

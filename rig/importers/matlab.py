@@ -178,10 +178,6 @@ def _finite(path: Path, name: str, values: NDArray[np.generic]) -> FloatArray:
     return array
 
 
-def _listing(values: Values) -> str:
-    return ", ".join(f"{name} {_kind(value)}" for name, value in values.items()) or "nothing"
-
-
 def _kind(value: Value) -> str:
     if isinstance(value, dict):
         return f"(struct of {', '.join(value)})"
@@ -193,10 +189,11 @@ def _kind(value: Value) -> str:
 
 
 def _unknown(path: Path, values: Values, wrong: list[str]) -> DataError:
+    found = ", ".join(f"{name} {_kind(value)}" for name, value in values.items()) or "nothing"
     return DataError(
         f"{path}: no run could be made of its variables"
         + (f"; not understood: {', '.join(wrong)}." if wrong else "."),
-        f"Found: {_listing(values)}. Expected time_s and vectors of its length named as channels "
+        f"Found: {found}. Expected time_s and vectors of its length named as channels "
         f"with units ({', '.join(CHANNELS)}), at the top or in scalar structs.",
         "Rename them, or map them: rig import FILE --column motor_angle_rad=NAME:deg.",
     )

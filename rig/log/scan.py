@@ -18,7 +18,7 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
 from rig.errors import DataError
-from rig.log.container import CHUNK_HEAD, MAGIC
+from rig.log.container import MAGIC
 
 T = TypeVar("T", mcap.Schema, mcap.Channel)
 
@@ -189,11 +189,6 @@ class _Body(io.BytesIO):
 
 def _parse_chunk(buffer: memoryview, start: int) -> ChunkRef | None:
     """Return the chunk a place states, whether or not the file holds all of it."""
-    if start + CHUNK_HEAD.size <= len(buffer):
-        head = CHUNK_HEAD.unpack_from(buffer, start)
-        if head[6:8] == (4, b"zstd"):  # ours, the quick way
-            first = start + CHUNK_HEAD.size
-            return ChunkRef(start, range(first, first + head[8]), "zstd", head[4], head[5])
     first = start + _HEAD.size
     try:
         _, _, unpacked, crc, name_length = _CHUNK.unpack_from(buffer, first)
@@ -202,7 +197,7 @@ def _parse_chunk(buffer: memoryview, start: int) -> ChunkRef | None:
         (packed,) = struct.unpack_from("<Q", buffer, name_stop)
     except struct.error:
         return None
-    if name not in (b"", b"lz4"):
+    if len(name) != name_length or name not in (b"", b"lz4", b"zstd"):
         return None
     data = range(name_stop + 8, name_stop + 8 + packed)
     return ChunkRef(start, data, name.decode(), unpacked, crc)

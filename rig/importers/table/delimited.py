@@ -68,7 +68,8 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
         has_head = any(not _is_number(cell, decimal) for cell in rows[0][1])
         if not has_head:
             remarks.append("the first line holds numbers, so columns are named 1, 2, 3 and so on")
-    names = _unique([c.strip() for c in rows[0][1]]) if has_head else _numbered(len(rows[0][1]))
+    first = [cell.strip() for cell in rows[0][1]]
+    names = _unique(first) if has_head else [str(k + 1) for k in range(len(first))]
     body = rows[1:] if has_head else rows
     if has_head and _holds_units(body, decimal):
         line, cells = body.pop(0)
@@ -238,10 +239,6 @@ def _holds_units(body: list[tuple[int, list[str]]], decimal: str) -> bool:
     """Return whether the first line below the head has no number and the second one has."""
     has_number = [any(_is_number(cell, decimal) for cell in cells) for _, cells in body[:2]]
     return has_number == [False, True]
-
-
-def _numbered(count: int) -> list[str]:
-    return [str(k + 1) for k in range(count)]
 
 
 def _unique(names: list[str]) -> list[str]:
