@@ -59,9 +59,14 @@ class PolledDevice(LinkedDevice):
         way: The way to the device, closed with it.
         rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
         late_s: How late a question may be and still be asked; later ones are lost.
+
+    Raises:
+        ValueError: The rate is not above 0.
     """
 
     def __init__(self, way: Clocked, rate_hz: float, late_s: float = 0.0) -> None:
+        if not rate_hz > 0:
+            raise ValueError(f"a rate is above 0 Hz, not {rate_hz}")
         super().__init__(way, rate_hz)
         self._late_s = late_s
         self._schedule = PollSchedule(rate_hz, self._counters)

@@ -46,8 +46,6 @@ class AtiCan(PolledDevice):
             raise ValueError(f"a base identifier lies in 0..127, not {base}")
         if not 0 <= calibration <= 15:
             raise ValueError(f"a calibration has a number 0..15, not {calibration}")
-        if not rate_hz > 0:
-            raise ValueError(f"a rate is above 0 Hz, not {rate_hz}")
         super().__init__(bus, rate_hz)
         self._bus = bus
         self._base = base

@@ -6,6 +6,7 @@ reading the bus, which also serves whoever subscribed to a frame that comes mean
 
 import logging
 from collections.abc import Callable
+from typing import TypeVar
 
 import canopen
 from canopen.sdo.client import SdoClient
@@ -16,6 +17,7 @@ from drivers.epos4.dictionary import object_dictionary
 from drivers.errors import CodedError, DriverError, LinkTimeoutError
 from drivers.transport.can_bus import CanBus, CanFrame
 
+T = TypeVar("T")
 REPLY_TIMEOUT_S = 0.1
 
 logging.getLogger("canopen").addHandler(logging.NullHandler())  # its complaints are our errors
@@ -86,12 +88,12 @@ class CanopenLink:
             LinkTimeoutError: It does not answer.
         """
         data = self._variable(index, subindex).encode_raw(value)
-
-        def download() -> bytes:
-            self._sdo.download(index, subindex, data)
-            return b""
-
-        self._transfer(f"write {value} to", index, subindex, download)
+        self._transfer(
+            f"write {value} to",
+            index,
+            subindex,
+            lambda: self._sdo.download(index, subindex, data),
+        )
 
     def _variable(self, index: int, subindex: int) -> canopen.objectdictionary.ODVariable:
         variable = self._sdo.od.get_variable(index, subindex)
@@ -99,9 +101,7 @@ class CanopenLink:
             raise DriverError(f"Object {index:#06x}:{subindex} is not in the dictionary.")
         return variable
 
-    def _transfer(
-        self, verb: str, index: int, subindex: int, attempt: Callable[[], bytes]
-    ) -> bytes:
+    def _transfer(self, verb: str, index: int, subindex: int, attempt: Callable[[], T]) -> T:
         for _ in self._counters.attempts():
             try:
                 return attempt()

@@ -46,8 +46,6 @@ class Epos4(PolledDrive):
     ) -> None:
         if not 1 <= node_id < HOST_NODE:
             raise ValueError(f"a drive's node number lies in 1..{HOST_NODE - 1}, not {node_id}")
-        if not rate_hz > 0:
-            raise ValueError(f"a rate is above 0 Hz, not {rate_hz}")
         if not 0 <= host_timeout_ms <= 65535:
             raise ValueError(f"a host time-out lies in 0..65535 ms, not {host_timeout_ms}")
         super().__init__(

@@ -1,5 +1,7 @@
 """The network of the fake: `canopen`'s server in virtual time, its frames kept to be fetched."""
 
+from dataclasses import dataclass
+
 import canopen
 
 from drivers.transport.can_bus import CanFrame
@@ -11,7 +13,7 @@ class FrameNetwork(canopen.Network):
     def __init__(self) -> None:
         super().__init__()
         self.out: list[CanFrame] = []
-        self._tasks: list[Periodic] = []
+        self.tasks: list[Periodic] = []
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         """Keep a frame."""
@@ -22,40 +24,36 @@ class FrameNetwork(canopen.Network):
     ) -> "Periodic":
         """Send a frame every `period` seconds from now on."""
         task = Periodic(self, can_id, data, round(period * 1000))
-        self._tasks.append(task)
+        self.tasks.append(task)
         return task
-
-    def drop(self, task: "Periodic") -> None:
-        """End a periodic frame."""
-        self._tasks.remove(task)
 
     def advance(self) -> None:
         """Let 1 ms pass."""
-        for task in self._tasks:
+        for task in self.tasks:
             task.advance()
 
 
+@dataclass(eq=False)
 class Periodic:
     """A frame that is sent again and again."""
 
-    def __init__(self, network: FrameNetwork, can_id: int, data: bytes, period_ms: int) -> None:
-        self._network = network
-        self._can_id = can_id
-        self._data = data
-        self._period_ms = period_ms
-        self._elapsed_ms = 0
+    network: FrameNetwork
+    can_id: int
+    data: bytes
+    period_ms: int
+    elapsed_ms: int = 0
 
     def advance(self) -> None:
         """Let 1 ms pass."""
-        self._elapsed_ms += 1
-        if self._elapsed_ms >= self._period_ms:
-            self._elapsed_ms = 0
-            self._network.send_message(self._can_id, self._data)
+        self.elapsed_ms += 1
+        if self.elapsed_ms >= self.period_ms:
+            self.elapsed_ms = 0
+            self.network.send_message(self.can_id, self.data)
 
     def update(self, data: bytes) -> None:
         """Change what is sent."""
-        self._data = data
+        self.data = data
 
     def stop(self) -> None:
         """Send it no more."""
-        self._network.drop(self)
+        self.network.tasks.remove(self)

@@ -148,6 +148,7 @@ class FaultyTransport:
         instant_s: float = 0.0,
     ) -> None:
         self.url = inner.url
+        self.close = inner.close
         self._inner = inner
         self.faults = faults or Faults()
         self._packets = packets
@@ -186,10 +187,6 @@ class FaultyTransport:
         changed = self.outgoing(data)
         if changed:
             self._inner.write(changed)
-
-    def close(self) -> None:
-        """Close the inner transport."""
-        self._inner.close()
 
     def _wait(self, wait_s: float) -> float:
         return wait_s if wait_s > self._instant_s else 0.0
