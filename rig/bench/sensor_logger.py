@@ -1,16 +1,13 @@
 """A device without motors where a session expects a logger: it gives its samples as they are."""
 
-from collections.abc import Sequence
 from time import monotonic
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.counters import LinkCounters
 from drivers.device import Channel, Device
 from drivers.teensy.driver import ClockExchange, SampleBatch
-from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import Identity, Trip, TripReport
 from drivers.transport.simulated import Pace
 from rig.errors import UsageError
@@ -39,6 +36,7 @@ class SensorWay:
         self.device = device
         self.is_simulated = is_simulated
         self.pace = Pace(pace)
+        self.close = device.close
         self.now_s = 0.0 if is_simulated else monotonic()
         """Time of the newest reading."""
 
@@ -47,24 +45,15 @@ class SensorWay:
         self.now_s = self.now_s + seconds if self.is_simulated else monotonic()
         self.pace.keep(self.now_s)
 
-    def read(self, timeout_s: float) -> NoReturn:
-        """Refuse: it has no motors."""
-        self._refuse()
-
-    def write(self, data: bytes) -> NoReturn:
-        """Refuse: it has no motors."""
-        self._refuse()
-
-    def close(self) -> None:
-        """Stop the device and let go of it."""
-        self.device.close()
-
-    def _refuse(self) -> NoReturn:
+    def refuse(self, *_: object) -> NoReturn:
+        """Refuse what a device without motors cannot do."""
         raise UsageError(
             f"The {self.device.name} at {self.url} has no motors to arm, stop or test.",
             'The configuration has [logger] profile = "sensor".',
             "Use `rig live` or `rig record` with it.",
         )
+
+    read = write = refuse
 
 
 class SensorLogger:
@@ -77,6 +66,8 @@ class SensorLogger:
     def __init__(self, way: SensorWay) -> None:
         self._way = way
         self._device = way.device
+        self.start, self.stop, self.close = way.device.start, way.device.stop, way.close
+        self.arm = self.queue = way.refuse
         self._first_s: float | None = None
         self._next = 0
         self.channels: tuple[Channel, ...] = ()
@@ -95,18 +86,6 @@ class SensorLogger:
         serial = " ".join(part for part in (found.model, found.serial) if part)
         return Identity(serial, found.firmware, 0)
 
-    def start(self) -> None:
-        """Let samples come."""
-        self._device.start()
-
-    def stop(self) -> None:
-        """Let no more samples come."""
-        self._device.stop()
-
-    def close(self) -> None:
-        """Let go of the device."""
-        self._way.close()
-
     def disarm(self) -> None:
         """Do nothing: it has no motors."""
 
@@ -116,14 +95,6 @@ class SensorLogger:
     def trip(self) -> TripReport:
         """Return that nothing tripped."""
         return TripReport(Trip.NONE, "", 0, 0, 0, 0)
-
-    def arm(self, gains: Sequence[Any] | NDArray[np.float64], limits: ArmLimits) -> None:
-        """Refuse: it has no motors."""
-        self._way.write(b"")
-
-    def queue(self, *columns: NDArray[np.integer]) -> int:
-        """Refuse: it has no motors."""
-        self._way.write(b"")
 
     def read(self, timeout_s: float) -> SampleBatch:
         """Return the samples that have come, waiting at most `timeout_s` for the first.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.procedure import Step
-from calibration.torque import weight_torque_n_m
+from calibration.torque import STANDARD_GRAVITY_M_S2, weight_torque_n_m
 from drivers.ati_net.driver import AtiNet
 from drivers.ati_net.fake import RdtFake, fake_calibration
 from drivers.teensy.fake import PythonBoard
@@ -93,7 +93,6 @@ class LoadedRdt(RdtFake):
         self.press, self._pressed = force_n, 0
 
 
-GRAVITY_M_S2 = 9.80665
 TOOL_KG = 0.215
 TOOL_CENTRE_M = np.array([0.004, -0.002, 0.031])
 """Mass and centre of mass of the simulated tool, which are unknown to a session."""
@@ -137,7 +136,7 @@ class SimulatedHands:
             self._press(step)
         if "gravity_x_ratio" in said:
             down = np.array([float(said[f"gravity_{axis}_ratio"]) for axis in "xyz"])
-            force = float(said.get("tool_ratio", 1.0)) * TOOL_KG * GRAVITY_M_S2 * down
+            force = float(said.get("tool_ratio", 1.0)) * TOOL_KG * STANDARD_GRAVITY_M_S2 * down
             self._rdt.wrench = np.concatenate([force, np.cross(TOOL_CENTRE_M, force)])
 
     def _press(self, step: Step) -> None:
