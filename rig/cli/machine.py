@@ -139,6 +139,6 @@ def new(
     require_new(out)
     words = {"axis": axis, "transmission": transmission, "actuator": actuator, "sensor": sensor}
     stated = {kind: given or [] for kind, given in words.items()}
-    plant = plant_of(name or out.stem, stated if any(stated.values()) else asked())
+    plant = plant_of(name or out.stem, stated if any(stated.values()) else asked(from_))
     write(plant, out, data_text(from_, plant) if from_ else "")
     present(json_, {"machine": out}, f"Machine: {out}. Next: rig machine check {out} DATA")

@@ -34,8 +34,11 @@ READS: Mapping[str, Reads] = {
 """Unit of a channel to the quantity that its sensor reads."""
 
 
-def asked() -> dict[str, list[str]]:
+def asked(table: Path | None) -> dict[str, list[str]]:
     """Ask for the parts of a machine on a terminal.
+
+    Args:
+        table: Its data, if any; without a terminal the error states how to see their columns.
 
     Raises:
         UsageError: Standard input is not a terminal.
@@ -44,7 +47,8 @@ def asked() -> dict[str, list[str]]:
         raise UsageError(
             "Nothing states what the machine is.",
             "There is no terminal to ask on.",
-            "Give --axis NAME:rad, --actuator AXIS:CHANNEL and --sensor AXIS:CHANNEL.",
+            "Give --axis NAME:rad, --actuator AXIS:CHANNEL and --sensor AXIS:CHANNEL."
+            + (f" `rig import {table} --preview` lists the columns." if table else ""),
         )
     found: dict[str, list[str]] = {kind: [] for kind in PARTS}
     for kind, (form, example) in PARTS.items():

@@ -169,6 +169,8 @@ def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_te
     monkeypatch.setattr("sys.stdin", io.StringIO())
     out = tmp_path / "new.toml"
     assert "--axis NAME:rad" in said("machine new", out, code=2).err
+    refused = said("machine new", out, "--from slide.csv", code=2).err
+    assert "rig import slide.csv --preview" in refused
     assert not out.exists()
     words = "--axis carriage:m --actuator carriage:drive_force_n"
     words += " --sensor carriage:carriage_position_m --from"
