@@ -14,7 +14,7 @@ from drivers.errors import CommandRefusedError
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import STATUS_ARMED, TOP, Trip
 from drivers.teensy.reference import Limits
-from rig.bench.logger import held_logger
+from rig.bench.logger import held_logger, read_for
 from rig.bench.trips import WORDS
 from rig.configuration.config import Config
 from rig.errors import UsageError
@@ -65,7 +65,7 @@ def drive_to_stop(config: Config, closing: bool) -> float:
     with held_logger(config) as logger:
         logger.identify()
         logger.start()
-        here = int(_read(logger, COLD_S)["spindle"][-1])
+        here = int(read_for(logger, COLD_S).samples["spindle"][-1])
         logger.arm(gains, _gentle(limits, here, reach))
         armed = _follow(logger, here, step, reach)
         logger.disarm()
@@ -118,16 +118,8 @@ def _follow(logger: TeensyLogger, here: int, step: float, reach: int) -> NDArray
             if logger.trip().code is Trip.NONE:
                 raise
             break
-        parts.append(_read(logger, BLOCK * 1e-3))
+        parts.append(read_for(logger, BLOCK * 1e-3).samples)
         if first and not (parts[-1]["status"][-1] & STATUS_ARMED):
             break
     samples = np.concatenate(parts)
     return np.asarray(samples[(samples["status"] & STATUS_ARMED) != 0])
-
-
-def _read(logger: TeensyLogger, duration_s: float) -> NDArray[np.void]:
-    """Read about so many seconds of samples."""
-    parts = [logger.read(1.0).samples]
-    while sum(map(len, parts)) < duration_s * 1e3 and len(parts[-1]):
-        parts.append(logger.read(1.0).samples)
-    return np.concatenate(parts)

@@ -7,10 +7,10 @@ wrist as it was built:
     contact = k (q - q0) where q is beyond q0, of each joint
     tip = q - contact / cable stiffness
 
-It complements `grasper_plant`, which it cannot replace: there the axes are apart, their friction
-has the memory that the paper's force estimates show, and a board is in the loop; here the axes act
-on one another and stiff friction suffices, since only kinematics are studied. One plant of both
-would need another choice of the hidden friction (decision 41), and every table with it.
+It complements `rig.grasper.plant`, which it cannot replace: there the axes are apart, their
+friction has the memory that the paper's force estimates show, and a board is in the loop; here the
+axes act on one another and stiff friction suffices, since only kinematics are studied. One plant of
+both would need another choice of the hidden friction (decision 41), and every table with it.
 
 The controller uses the designed geometry of the wrist. Where the two differ, as with a wrong pulley
 ratio (equation 5 of Zhao and Nelson 2016), turning one joint moves another.

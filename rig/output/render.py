@@ -22,7 +22,7 @@ def render(template: str, context: Mapping[str, Any]) -> str:
     """Fill a template of this package.
 
     Args:
-        template: File name in `rig/reports/templates`, such as `study.html`.
+        template: File name in `rig/output/templates`, such as `study.html`.
         context: Names the template uses. Text is escaped; figures from `rig.output.figures` are
             markup already and are not.
 

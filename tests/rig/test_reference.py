@@ -9,6 +9,7 @@ import pytest
 
 from drivers.errors import CommandRefusedError
 from drivers.teensy.core import BoardStart, FirmwareBoard
+from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.protocol import STATUS_REFERENCED, Kind, Result
 from drivers.teensy.reference import Limits
 from drivers.transport.simulated import SimulatedTransport
@@ -72,6 +73,13 @@ def test_a_gentle_drive_finds_the_same_stop_from_two_places(library, monkeypatch
     assert abs(found_rad[0] - found_rad[1]) < 0.02
     stands = -0.05 if stop == "open" else 1.45
     assert abs(bench.state[JAW_ANGLE] - stands) < 0.05
+
+
+def test_a_board_that_sends_nothing_is_not_driven_to_a_stop(restarted, monkeypatch, said):
+    nothing = SampleBatch(np.empty(0), np.empty(0, np.int64), 0)
+    monkeypatch.setattr(TeensyLogger, "read", lambda self, timeout_s: nothing)
+    err = said("reference --sim --yes --hard-stop closed", code=3).err
+    assert "The logger sends nothing" in err
 
 
 def test_a_shaft_that_does_not_turn_is_no_stop(restarted, said):
