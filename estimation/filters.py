@@ -37,8 +37,7 @@ class LowPass:
         Raises:
             FilterError: The cutoff is not between 0 and half the sample rate.
         """
-        # a rate worked out from time stamps is rounded: half of it is no cutoff either way
-        if not 0 < self.cutoff_hz < 0.4999 * sample_rate_hz or self.order < 1:
+        if not 0 < self.cutoff_hz < sample_rate_hz / 2 or self.order < 1:
             raise FilterError(
                 f"A {self.cutoff_hz} Hz low-pass of order {self.order} cannot be made at"
                 f" {sample_rate_hz:.6g} samples a second.",
