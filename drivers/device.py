@@ -4,6 +4,7 @@ A driver is made from an open link, controls one device, and does nothing in the
 passes in `read`. Simulation swaps the link and nothing else.
 """
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
@@ -115,6 +116,7 @@ class Device(Protocol):
         """Short name of the kind of device, as registered."""
 
     @property
+    @abstractmethod
     def channels(self) -> tuple[Channel, ...]:
         """What `read` returns; complete once `identify` or `start` has been called."""
 
@@ -125,6 +127,7 @@ class Device(Protocol):
         `frames` counts what came well; every other counter is a trouble, and 0 on a good link.
         """
 
+    @abstractmethod
     def identify(self) -> DeviceIdentity:
         """Ask who is there.
 
@@ -133,9 +136,11 @@ class Device(Protocol):
             DriverError: Somebody else answers.
         """
 
+    @abstractmethod
     def start(self) -> None:
         """Let samples come; sequence numbers begin at 0."""
 
+    @abstractmethod
     def read(self, timeout_s: float) -> Batch:
         """Return the samples that have come, waiting at most `timeout_s` for the first.
 
@@ -143,6 +148,7 @@ class Device(Protocol):
             LinkLostError: The link is gone.
         """
 
+    @abstractmethod
     def stop(self) -> None:
         """Let no more samples come."""
 

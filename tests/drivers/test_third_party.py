@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.device import LinkedDevice
 from drivers.errors import DriverError
 from drivers.registry import UnknownDriverError, drivers, open_device
 from rig.bench.devices import open_section
@@ -63,3 +64,11 @@ def test_a_broken_one_names_its_package(tmp_path, monkeypatch, entry):
     install(tmp_path, monkeypatch, entry)
     with pytest.raises(UnknownDriverError, match=r"acme"):
         drivers()
+
+
+def test_a_driver_that_cannot_stop_its_device_cannot_be_made():
+    class Scale(LinkedDevice):
+        name, channels, identify, start, read = "acme-scale", (), None, None, None
+
+    with pytest.raises(TypeError, match="stop"):
+        Scale(None, 10.0)
