@@ -33,6 +33,7 @@ class Waves(Pointwise):
         """Return sine and cosine of each harmonic, in the order of the amplitudes."""
         angle, *load = (inputs[role] for role in self.roles)
         phase = shape[0] * angle
-        phases = [phase, 2 * phase, 3 * phase][: len(self.amplitudes) // 2]
+        count = len(self.amplitudes) // 2
+        phases = [phase, *(n * phase for n in range(2, count + 1))]
         waves = [wave(x) for x in phases for wave in (np.sin, np.cos)]
         return [load[0] * wave for wave in waves] if load else waves

@@ -45,7 +45,7 @@ class SensorWay:
         self.now_s = self.now_s + seconds if self.is_simulated else monotonic()
         self.pace.keep(self.now_s)
 
-    def refuse(self, *_: object) -> NoReturn:
+    def refuse(self, *_: object, **__: object) -> NoReturn:
         """Refuse what a device without motors cannot do."""
         raise UsageError(
             f"The {self.device.name} at {self.url} has no motors to arm, stop or test.",

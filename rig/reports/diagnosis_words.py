@@ -72,8 +72,8 @@ def _named(finding: Finding) -> str:
     if finding.family in WORDS:
         term = _first_line(finding.family).partition(": ")[0].lower()
         return f"declared term that differs between runs: {term} [{finding.family}]{size}"
-    claim = "identified" if finding.verdict == "identified" else "of several possible, likeliest"
-    return f"unmodelled effect {claim}: {plain or finding.family} [{finding.family}]{size}"
+    claim = " identified" if finding.verdict == "identified" else ", most likely"
+    return f"unmodelled effect{claim}: {plain or finding.family} [{finding.family}]{size}"
 
 
 def meaning(family: str) -> str:
