@@ -18,6 +18,10 @@ class FilterError(EstimationError):
     """A signal is too short, too coarse or too broken for the requested filter."""
 
 
+SHARE = 0.2
+"""Usual cutoff, share of the sample rate."""
+
+
 @dataclass(frozen=True, slots=True)
 class LowPass:
     """A Butterworth low-pass filter.
@@ -37,18 +41,23 @@ class LowPass:
         Raises:
             FilterError: The cutoff is not between 0 and half the sample rate.
         """
-        if not 0 < self.cutoff_hz < sample_rate_hz / 2 or self.order < 1:
+        # a rate worked out from time stamps is rounded: half of it is not a cutoff either way
+        if not 0 < self.cutoff_hz < 0.4999 * sample_rate_hz or self.order < 1:
             raise FilterError(
                 f"A {self.cutoff_hz} Hz low-pass of order {self.order} cannot be made at"
                 f" {sample_rate_hz:.6g} samples a second.",
                 "The cutoff must lie between 0 and half the sample rate, the order at 1 or more.",
-                f"Write, for example, cutoff_hz = {sample_rate_hz / 5:.3g} under [machine] of the"
-                " machine's file, or under [processing] of the model's.",
+                f"Write, for example, cutoff_hz = {SHARE * sample_rate_hz:.3g} under [machine] of"
+                " the machine's file, or under [processing] of the model's.",
             )
         sections: FloatArray = signal.butter(
             self.order, self.cutoff_hz, fs=sample_rate_hz, output="sos"
         )
         return sections
+
+    def for_rate(self, sample_rate_hz: float) -> "LowPass":
+        """Return the filter with a cutoff of at most a fifth of a sample rate."""
+        return replace(self, cutoff_hz=min(self.cutoff_hz, SHARE * sample_rate_hz))
 
     @property
     def reach_s(self) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from calibration.procedure import Measurement, Step
 from calibration.quality import BadDataError
 from calibration.regression import Regression
-from estimation.filters import zero_phase
+from estimation.filters import PAPER, zero_phase
 from estimation.recording import FloatArray
 
 RATE_HZ = 1000.0
@@ -49,8 +49,9 @@ def steady(measurement: Measurement, names: Sequence[str]) -> dict[str, FloatArr
     recording = measurement.recording
     rate_hz = recording.sample_rate_hz
     columns = np.column_stack([recording[name] for name in (*names, "spindle_angle_rad")])
-    smooth = zero_phase(columns, rate_hz)
-    velocity = np.gradient(zero_phase(smooth[:, -1], rate_hz)) * rate_hz
+    low_pass = PAPER.for_rate(rate_hz)
+    smooth = zero_phase(columns, rate_hz, low_pass)
+    velocity = np.gradient(zero_phase(smooth[:, -1], rate_hz, low_pass)) * rate_hz
     step = max(1, round(rate_hz / KEPT_HZ))
     kept = (~stands(velocity, rate_hz) & recording.valid)[::step]
     if kept.sum() < 20:

@@ -76,6 +76,8 @@ def test_filter_names_what_it_cannot_do():
         zero_phase(np.zeros(10), RATE_HZ)
     with pytest.raises(FilterError, match="half the sample rate"):
         zero_phase(np.zeros(100), 80.0)
+    with pytest.raises(FilterError, match="half the sample rate"):
+        zero_phase(np.zeros(100), np.nextafter(100.0, 101.0))  # of rounded time stamps
 
 
 def run_of(n: int = 3000, keep: np.ndarray | None = None, **flags: object) -> Recording:

