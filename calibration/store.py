@@ -49,16 +49,20 @@ class Choice:
     by: str
 
 
+def own_folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """Return the folder of a person's configurations: `$XDG_CONFIG_HOME/rig` or `~/.config/rig`."""
+    base = environment.get("XDG_CONFIG_HOME")
+    return (Path(base) if base else Path.home() / ".config") / "rig"
+
+
 def default_folder(environment: Mapping[str, str] = os.environ) -> Path:
     """Return the store's folder where none is named.
 
-    It is `$RIG_CALIBRATIONS`, else `calibrations` in the rig's configuration folder, which is
-    `$XDG_CONFIG_HOME/rig` or `~/.config/rig`.
+    It is `$RIG_CALIBRATIONS`, else `calibrations` in the folder of a person's configurations.
     """
     if named := environment.get(ENVIRONMENT):
         return Path(named)
-    base = environment.get("XDG_CONFIG_HOME")
-    return (Path(base) if base else Path.home() / ".config") / "rig" / "calibrations"
+    return own_folder(environment) / "calibrations"
 
 
 def simulated_folder(folder: Path) -> Path:

@@ -6,12 +6,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.counters import LinkCounters
+from drivers.counters import TRIES, LinkCounters
 from drivers.errors import LinkTimeoutError
 from drivers.framing import DELIMITER, FrameStream, encode_frame
 from drivers.transport.transport import Transport
 
-TRIES = 3
 REPLY_TIMEOUT_S = 0.1
 """Time for one answer. A full queue of a USB port is emptied in a fraction of it."""
 

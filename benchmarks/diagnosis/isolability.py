@@ -63,7 +63,7 @@ def main() -> int:
         f" the curve of reported over expected confusion is {area:.3f}.",
     ]
     table = TextTable("", ("case", "reported besides the effect", "expected first"), tuple(rows))
-    write_text_atomic(options.page, to_page(paragraphs, [table], Provenance.now(None)))
+    write_text_atomic(options.page, to_page(paragraphs, [table], Provenance.now(0)))
     sys.stderr.write(f"area {area:.3f} over {len(pairs)} pairs; {options.page} written\n")
     return 0
 

@@ -54,7 +54,7 @@ class UdpTransport(HostLink):
         self._socket.close()
 
     def _gone(self, error: OSError) -> LinkLostError:
-        return LinkLostError(
+        return self._lose(
             f"The link to {self.url} is gone.",
             f"{error}.",
             "Check that the device is powered and in this computer's network.",

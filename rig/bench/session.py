@@ -80,7 +80,6 @@ class Session:
         self._is_real_time = is_real_time(config)
         self._intake = Intake(self._logger, transport, self._is_real_time)
         self.clock = self._intake.clock
-        """The logger's clock against this computer's; its line states the residual of the fit."""
         self.companions: list[Companion] = []
 
     def __enter__(self) -> Self:

@@ -7,8 +7,8 @@ the real one. So a rig is looked for in three places, and the simulated one must
 import os
 from pathlib import Path
 
+from calibration.store import own_folder
 from rig.configuration.config import SIMULATED, Config, load_config
-from rig.configuration.model_in_use import own_folder
 from rig.errors import UsageError
 
 ENVIRONMENT = "RIG_CONFIG"

@@ -6,11 +6,11 @@ name, which its recordings carry.
 """
 
 import json
-import os
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from calibration.store import own_folder
 from estimation.files import OutputError, write_bytes_atomic
 
 CHOICES = "in-use.jsonl"
@@ -37,12 +37,6 @@ class Choice:
     def path(self) -> Path | None:
         """The copy."""
         return None if self.model is None else models_folder() / self.model
-
-
-def own_folder() -> Path:
-    """Return the folder of a person's configurations, `~/.config/rig`."""
-    base = os.environ.get("XDG_CONFIG_HOME")
-    return (Path(base) if base else Path.home() / ".config") / "rig"
 
 
 def models_folder() -> Path:

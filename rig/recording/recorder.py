@@ -7,6 +7,7 @@ from pathlib import Path
 
 from estimation.recording import Mark
 from rig.bench.session import Session
+from rig.log.recalibrate import ZERO_SUFFIX
 from rig.log.run import RunEnd, RunInfo
 from rig.log.streams import COUNTS, SAMPLE
 from rig.machines.reading import Reading
@@ -59,7 +60,7 @@ class LiveRecorder:
             name=self.path.stem,
             conditions={"trajectory": self._kind},
             started_at_ns=time.time_ns(),
-            zeros_before={f"{name}_counts": zero for name, zero in self._session.zeros.items()},
+            zeros_before={n + ZERO_SUFFIX: zero for n, zero in self._session.zeros.items()},
         )
         self._log = SessionLog(self._session, self.path, info, further=self._further)
         self._samples = self._marks = 0

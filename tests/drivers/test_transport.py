@@ -118,6 +118,19 @@ def test_an_unplugged_cable_is_a_lost_link_from_then_on(pty):
     transport.close()
 
 
+def test_an_unreachable_address_is_a_lost_link_from_then_on():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        transport = open_transport(f"udp:127.0.0.1:{taken.getsockname()[1]}")
+    transport.write(b"x")  # nobody is there any more
+    for _ in range(2):
+        with pytest.raises(LinkLostError, match="gone"):
+            transport.read(1.0)
+    with pytest.raises(LinkLostError):
+        transport.write(b"x")
+    transport.close()
+
+
 def test_a_missing_port_names_those_that_are_there(monkeypatch):
     present(monkeypatch, ("/dev/ttyACM3", 0x16C0, 0x0483, "1234567"))
     with pytest.raises(PortNotFoundError, match=r"ttyACM3.*usb:16c0:0483:1234567"):
