@@ -9,13 +9,13 @@ from typer import Option
 
 from estimation.channels import unit_of
 from rig.cli.options import (
+    DECLARED_MODEL,
     FormatOption,
     MachineOption,
     RecordingsArgument,
     SeedOption,
     SkipBad,
     complete_model,
-    model_names,
     require_new,
     say_left_out,
 )
@@ -109,7 +109,7 @@ def fit(
         Option(
             "--model",
             "-m",
-            help=f"Declared model: a file, or one of {', '.join(model_names())}; `states` for"
+            help=f"Declared model: {DECLARED_MODEL}; `states` for"
             " products of physical states, `network` for a network with some of them as inputs. If"
             " none: grip, or with --machine all equations of the machine.",
             autocompletion=complete_model,

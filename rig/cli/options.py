@@ -87,6 +87,13 @@ complete_effect = _completed(_effect_names)
 complete_recordings = _completed(lambda: list(map(str, _campaigns())), "*")
 complete_campaign = _completed(lambda: [str(f.relative_to("logs")) for f in _campaigns()])
 
+# the equations are not worked out here: every command would read the machine's file for it
+DECLARED_MODEL = (
+    f"a file, one of {', '.join(_names(DECLARED / 'models'))}, or an equation of the reference rig,"
+    " such as motor"
+)
+"""What names a declared model, for helps."""
+
 ConfigOption = Annotated[
     Path | None,
     Option(
@@ -112,7 +119,7 @@ ModelOption = Annotated[
     Option(
         "--model",
         "-m",
-        help=f"Declared model: a file, or one of {', '.join(model_names())}.",
+        help=f"Declared model: {DECLARED_MODEL}.",
         autocompletion=complete_model,
     ),
 ]
