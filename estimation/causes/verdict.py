@@ -156,24 +156,31 @@ def _judged(
     found: Found, held_out: HeldOut, refits: Refits
 ) -> tuple[list[Kept], list[Finding], list[str]]:
     """Return the causes that the test runs confirm, their findings, and notes on the others."""
-    kept, findings = list[Kept](), list[Finding]()
     confirmed, notes = _confirmed(found, held_out, refits.numbers)
-    for one in confirmed:
-        candidate = one.scored.candidate
-        opened = _opened(one, kept, held_out, refits)
-        if opened is None:
+    opened: dict[int, tuple[Kept, Finding]] = {}
+    # each equation is refitted on its own, where a cause of several ones could stand in for another
+    for k in sorted(range(len(confirmed)), key=lambda k: len(_entered(confirmed[k]))):
+        one, candidate = confirmed[k], confirmed[k].scored.candidate
+        added = _opened(one, [kept for kept, _ in opened.values()], held_out, refits)
+        if added is None:
             notes.append(
                 f"{candidate.cause.family} ({candidate.cause.place.name}) was found in the training"
                 " runs and does not lower the error on the test runs."
             )
             continue
-        findings.append(_with_errors(named(one, refits.sealed.may_name), opened))
         part = refits.parts[candidate.cause.place.home][-1]
-        kept.append(replace(one, part=part))
-        notes += opened.notes
+        finding = _with_errors(named(one, refits.sealed.may_name), added)
+        opened[k] = replace(one, part=part), finding
+        notes += added.notes
         if not part.is_written:
             notes.append(_unwritten(candidate))
-    return kept, findings, notes
+    in_order = [opened[k] for k in sorted(opened)]
+    return [kept for kept, _ in in_order], [finding for _, finding in in_order], notes
+
+
+def _entered(one: Kept) -> list[str]:
+    """Return the equations that a cause enters."""
+    return list(dict.fromkeys(e.equation for e in one.scored.candidate.cause.place.enters))
 
 
 def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) -> _Opened | None:
@@ -191,7 +198,7 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
             f" {candidate.cause.family} acts there; "
             + ("these test runs themselves do." if counted else "not counted in the errors.")
         )
-    entered = dict.fromkeys(e.equation for e in candidate.cause.place.enters)
+    entered = _entered(one)
     before = {name: refits.test_errors(name) for name in entered}
     refits.add(candidate, acts_in)
     after = {name: refits.test_errors(name) for name in entered}

@@ -364,6 +364,19 @@ def test_a_gear_and_its_sensors_are_kept_apart(fault: dict[str, float], family: 
 
 
 @pytest.mark.long
+def test_a_cause_of_several_equations_does_not_stand_in_for_one_of_a_single_equation() -> None:
+    runs = [
+        r.with_columns(
+            proximal_torque_n_m=r["proximal_torque_n_m"] + 5e-4 * r["motor_angle_rad"],
+            motor_current_a=r["motor_current_a"] + 1e-3 * r["motor_angle_rad"],
+        )
+        for r in geared()
+    ]
+    diagnosis = diagnose(runs, [motor(), gearbox()], split(runs))
+    assert {f.family for f in diagnosis.findings} == {"sensor.crosstalk", "spring.position"}
+
+
+@pytest.mark.long
 def test_a_pulley_that_is_not_round_is_one_cause_and_holds_in_both_equations() -> None:
     runs = cabled(wave=0.05)
     found = answer(runs, cable(), split(runs))
