@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.causes.folds import Folds
 from estimation.causes.joint import Joint, Next, Part
-from estimation.causes.laid import Laid
+from estimation.causes.laid import Columns, Laid, products
 from estimation.recording import FloatArray
 
 
@@ -84,19 +84,19 @@ def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
         name, kind = p
         if name not in laid.inner:
             continue
-        columns = laid.inner[name] if kind == "within" else laid.means[name][:, :, None]
-        table, places = joint.tables[p], [*joint.at[p]]
+        columns: Columns = laid.inner[name] if kind == "within" else laid.means[name][:, :, None]
+        table, places = joint.tables[p].astype(columns.dtype), [*joint.at[p]]
         base[p] = np.zeros((runs, len(laid), joint.size, k))
         if known is None:
-            product = table.transpose(0, 2, 1)[:, None] @ columns
+            product = products(table[:, None], columns)
             base[p][:, :, places] = product[:, :, :-1]
-            target[p], own[p] = product[:, :, -1], columns.transpose(0, 1, 3, 2) @ columns
+            target[p], own[p] = product[:, :, -1], products(columns, columns)
             continue
         before = known.base[p].shape[2]
         base[p][:, :, :before] = known.base[p]
         new = [i for i, place in enumerate(places) if place >= before]
         if new:
-            added = table[:, :, new].transpose(0, 2, 1)[:, None] @ columns
+            added = products(table[:, None, :, new], columns)
             base[p][:, :, [places[i] for i in new]] = added
         target[p], own[p] = known.target[p], known.own[p]
     return Block(laid, base, own, target, joint.taken_off(laid) if known is None else known.taken)

@@ -11,9 +11,9 @@ import numpy as np
 from estimation.causes.blocks import Block, block_of
 from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.functions import MOST_VARIABLES, Function, functions_at
-from estimation.causes.instruments import signal
+from estimation.causes.instruments import noisy_bands, signal
 from estimation.causes.joint import Joint
-from estimation.causes.laid import NOTHING, Laid, Scale
+from estimation.causes.laid import NOTHING, Columns, Laid, Scale
 from estimation.causes.places import places_of
 from estimation.causes.sources import Source, sources_at
 from estimation.recording import FloatArray
@@ -183,7 +183,7 @@ def skews(joint: Joint) -> list[Claim]:
         )
     ]
     found = [one for group in groups_of(joint, late) for one in group.candidates]
-    delays = with_skews(joint, found).left_out([[]]).base[0][joint.size :]
+    delays = _with_delays(joint, found).left_out([[]]).base[0][joint.size :]
     return [
         Claim(one.cause)
         for one, delay in zip(found, delays, strict=True)
@@ -192,7 +192,29 @@ def skews(joint: Joint) -> list[Claim]:
 
 
 def with_skews(joint: Joint, late: Sequence[Claim]) -> Joint:
-    """Return a regression with short delays of readings in its base."""
+    """Return a regression with short delays and noisy bands of readings in its base."""
+    return _with_delays(_with_bands(joint), late)
+
+
+def _with_bands(joint: Joint) -> Joint:
+    """Return a regression in which the noisy bands of a channel have amplitudes of their own.
+
+    With one amplitude a noisy channel's parameter comes out too small, and the same channel with
+    less noise, such as by a lag of its sensor, passes for a cause.
+    """
+    layout = joint.layout
+    for equation in layout.equations.values():
+        columns, shaken = (
+            [{equation.name: band} for band in noisy_bands(equation, layout, runs)]
+            for runs in (layout.runs, layout.shaken)
+        )
+        if columns[0][equation.name].size:
+            laid = _without_declared(joint, [columns], [shaken] if shaken else [], "each")
+            joint = joint.with_cause(laid, np.full(laid.size.shape[1], 4.0 / joint.power))
+    return joint
+
+
+def _with_delays(joint: Joint, late: Sequence[Claim]) -> Joint:
     for group in groups_of(joint, late):
         for one in group.candidates:
             joint = joint.with_cause(one.laid, 1.0 / one.size**2)
@@ -247,9 +269,9 @@ def _columns(one: Claim, runs: Sequence[RunSignals]) -> list[Mapping[str, FloatA
 
 def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
     first = held[0][0]
-    columns = _stacked(joint, [raw[1] for raw in held])
-    shaken = _stacked(joint, [raw[2] for raw in held if raw[2] is not None])
-    laid = joint.projection.laid(columns, shaken, _unit(first.cause), first.has_means)
+    shaken = [raw[2] for raw in held if raw[2] is not None]
+    columns = [raw[1] for raw in held]
+    laid = _without_declared(joint, columns, shaken, _unit(first.cause), first.has_means)
     shown = np.flatnonzero(laid.size.min(axis=1) >= NOTHING)
     if len(shown) < len(held):
         laid = laid.only(shown)
@@ -272,15 +294,43 @@ def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
         yield Group(whole, laid, precision)
 
 
-def _stacked(joint: Joint, columns: Sequence[OfRuns]) -> dict[str, FloatArray]:
-    """Return equation to the columns of causes, shape (runs, causes, samples, k)."""
+def _without_declared(
+    joint: Joint,
+    columns: Sequence[OfRuns],
+    shaken: Sequence[OfRuns],
+    unit: Scale,
+    has_means: bool = True,
+) -> Laid:
+    """Return causes' columns, with those of the shaken runs or none, less the declared ones."""
+    pairs = zip(shaken, columns, strict=False)
+    followed = _stacked(joint, [_apart(one, own) for one, own in pairs])
+    noise = {name: inner for name, (inner, _) in followed.items()}
+    return joint.projection.laid(_stacked(joint, columns), noise, unit, has_means)
+
+
+def _apart(shaken: OfRuns, columns: OfRuns) -> OfRuns:
+    """Return by how much columns differ."""
+    return [
+        {name: x - own[name] for name, x in one.items()}
+        for one, own in zip(shaken, columns, strict=True)
+    ]
+
+
+def _stacked(joint: Joint, columns: Sequence[OfRuns]) -> dict[str, tuple[Columns, FloatArray]]:
+    """Return equation to the columns of causes less each run's mean, and the means.
+
+    Shapes (runs, causes, samples, k) and (runs, causes, k).
+    """
     out = {}
     for name in columns[0][0] if columns else ():
         most, k = int(joint.samples[name, "within"].max()), columns[0][0][name].shape[1]
-        out[name] = np.zeros((len(joint.runs), len(columns), most, k))
+        inner = np.zeros((len(joint.runs), len(columns), most, k), dtype=np.float32)
+        means = np.zeros((len(joint.runs), len(columns), k))
         for c, runs in enumerate(columns):
             for r, own in enumerate(runs):
-                out[name][r, c, : len(own[name])] = own[name]
+                means[r, c] = own[name].mean(axis=0)
+                inner[r, c, : len(own[name])] = own[name] - means[r, c]
+        out[name] = inner, means
     return out
 
 

@@ -10,11 +10,16 @@ import numpy as np
 from estimation.causes.candidates import Candidate, Claim, laid_out, with_skews
 from estimation.causes.equations import Layout
 from estimation.causes.joint import Joint, Part
+from estimation.causes.laid import TINY
 from estimation.causes.numbers import Numbers
 from estimation.causes.sources import Source
 from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.split import Sealed
 from estimation.recording import FloatArray
+
+ALIKE, FACTOR = 0.7, 2.0
+"""Correlation from which a run follows the prediction of the others, and the factor from which it
+is remarked on."""
 
 OPEN = 0.05
 """Probability of acting, or of not acting, below which the training runs decide."""
@@ -75,6 +80,25 @@ class HeldOut:
         self.joint = with_skews(Joint(layout, numbers), late)
         self._last: tuple[tuple[Candidate, ...], Joint, Mapping[Part, FloatArray]] | None = None
         self.at = [k for k, run in enumerate(layout.runs) if run.name in set(sealed.confirm)]
+
+    def apart(self) -> list[tuple[str, str, float]]:
+        """Return equation, run and factor where a run's target is not what the others predict.
+
+        The factor is the slope of the target over the prediction of the other runs: -1 where a sign
+        is swapped, 57 where degrees were taken for radians.
+        """
+        fits, found = self.joint.left_out([[k] for k in range(len(self.layout.runs))]), []
+        for name in self.layout.equations:
+            gram = self.joint.gram[name, "within"]
+            both = np.einsum("rb,rb->r", fits.base, gram[:, :-1, -1])
+            predicted = np.einsum("rb,rbc,rc->r", fits.base, gram[:, :-1, :-1], fits.base) + TINY
+            alike = np.abs(both) / np.sqrt(predicted * gram[:, -1, -1] + TINY)
+            for run, slope, agrees in zip(
+                self.layout.runs, both / predicted, alike > ALIKE, strict=True
+            ):
+                if agrees and not 1.0 / FACTOR < slope < FACTOR:
+                    found.append((name, run.name, float(slope)))
+        return found
 
     def acts_in(
         self, before: Sequence[Candidate], cause: Candidate

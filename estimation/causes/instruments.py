@@ -5,12 +5,20 @@ that an equation reads (a torque, a force, a current) is therefore replaced by i
 through the other declared equations: an instrumental variable. Angles are used as measured.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from estimation.causes.equations import ANGLES, Equation, Layout, RunSignals
+from estimation.filters import FilterError, zero_phase
 from estimation.recording import FloatArray
+
+NOISY = 0.1
+"""Share of a channel that may be noise: the parameter comes out too small by its square."""
+
+BAND, MOST_BANDS = 4.0, 3
+"""Ratio of the cutoffs of neighbouring bands, and how many bands may be noisy."""
 
 
 def instrumented(channel: str, equation: str) -> str:
@@ -54,6 +62,86 @@ def signal(run: RunSignals, channel: str, equation: str) -> str:
     """Return the channel that stands for another one in an equation: its prediction if any."""
     name = instrumented(channel, equation)
     return name if name in run.channels else channel
+
+
+def declared_of(equation: Equation, run: RunSignals) -> FloatArray:
+    """Return the declared columns with efforts predicted from other sensors, (n, declared)."""
+    return _declared(equation, run)[run.grid[run.used[equation.name]]]
+
+
+def noise_share(runs: Sequence[RunSignals], channel: str, cutoff_hz: float = np.inf) -> float:
+    """Return the noise of a channel over all that it holds, the median over runs.
+
+    Args:
+        runs: The runs.
+        channel: The channel.
+        cutoff_hz: Of a further filter of both.
+    """
+    sizes = [
+        [_below(x[channel], run, cutoff_hz)[run.grid].std() for x in (run.noise, run.channels)]
+        for run in runs
+        if channel in run.noise
+    ]
+    return float(np.median([noise / (size or 1.0) for noise, size in sizes] or [0.0]))
+
+
+def noisy_bands(equation: Equation, layout: Layout, runs: Sequence[RunSignals]) -> list[FloatArray]:
+    """Return the noisy bands of the columns that are a channel times a constant.
+
+    Args:
+        equation: The equation.
+        layout: Its runs decide which bands are noisy.
+        runs: Runs, shaken ones or not.
+
+    Returns:
+        Shape (n, bands) of every run.
+    """
+    bands = [
+        (k, cutoff_hz)
+        for k, channel in enumerate(equation.of_channel)
+        if channel
+        for cutoff_hz in _cutoffs(layout.runs, channel)
+    ]
+    return [_above(equation, run, bands) for run in runs]
+
+
+def _cutoffs(runs: Sequence[RunSignals], channel: str) -> Iterator[float]:
+    """Yield the cutoffs above which a channel is noisy, from the highest on."""
+    above = np.inf
+    for step in range(1, MOST_BANDS + 1):
+        if noise_share(runs, channel, above) <= NOISY:
+            return
+        above = runs[0].low_pass.cutoff_hz / BAND**step
+        yield above
+
+
+def _above(equation: Equation, run: RunSignals, bands: Sequence[tuple[int, float]]) -> FloatArray:
+    """Return declared columns less what is below a cutoff, shape (n, bands)."""
+    columns = _declared(equation, run)
+    found = [columns[:, k] - _below(columns[:, k], run, cutoff_hz) for k, cutoff_hz in bands]
+    used = run.grid[run.used[equation.name]]
+    return np.column_stack([x[used] for x in found]) if found else np.zeros((len(used), 0))
+
+
+def _below(values: FloatArray, run: RunSignals, cutoff_hz: float) -> FloatArray:
+    """Return values filtered at a cutoff; as they are where there are too few of them."""
+    if not np.isfinite(cutoff_hz):
+        return values
+    try:
+        return zero_phase(values, run.rate_hz, replace(run.low_pass, cutoff_hz=cutoff_hz))
+    except FilterError:
+        return values
+
+
+def _declared(equation: Equation, run: RunSignals) -> FloatArray:
+    seen = dict(run.channels)
+    for channel in equation.channels:
+        seen[channel] = run.channels[signal(run, channel, equation.name)]
+        if "_rate_" in channel:
+            source = channel.replace("_rate_n_m_s", "_n_m")
+            read = run.channels[signal(run, source, equation.name)]
+            seen[channel] = np.gradient(read) * run.rate_hz
+    return equation.columns(seen)
 
 
 def _efforts(equation: Equation) -> list[str]:

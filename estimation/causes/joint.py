@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.causes.equations import SHAPE_STEP, Equation, Layout, RunSignals
+from estimation.causes.equations import SHAPE_STEP, Layout
 from estimation.causes.folds import Folds
-from estimation.causes.instruments import signal
-from estimation.causes.laid import TINY, Laid, Projection, Stacks, inverse
+from estimation.causes.instruments import declared_of
+from estimation.causes.laid import TINY, Columns, Laid, Projection, Stacks, inverse
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.recording import FloatArray
 
@@ -98,7 +98,7 @@ class Joint:
         weights = self.weights
         self.projection = Projection(
             stacks,
-            {e.name: [_instrumented(e, r) for r in self.runs] for e in layout.equations.values()},
+            {e.name: [declared_of(e, r) for r in self.runs] for e in layout.equations.values()},
             noise,
             {n: (weights[n, "within"], weights[n, "between"]) for n in layout.equations},
             {name: self._precision[[*at]] for name, at in self._equations_at.items()},
@@ -501,24 +501,12 @@ def _places(layout: Layout) -> Mapping[str, range]:
     return out
 
 
-def _columns(laid: Laid, part: Part) -> FloatArray | None:
+def _columns(laid: Laid, part: Part) -> Columns | None:
     """Return causes' columns of a part, (runs, causes, samples, k); None where they have none."""
     name, kind = part
     if name not in laid.inner:
         return None
     return laid.inner[name] if kind == "within" else laid.means[name][:, :, None]
-
-
-def _instrumented(equation: Equation, run: RunSignals) -> FloatArray:
-    """Return the declared columns with efforts predicted from other sensors, (n, declared)."""
-    seen = dict(run.channels)
-    for channel in equation.channels:
-        seen[channel] = run.channels[signal(run, channel, equation.name)]
-        if "_rate_" in channel:
-            source = channel.replace("_rate_n_m_s", "_n_m")
-            read = run.channels[signal(run, source, equation.name)]
-            seen[channel] = np.gradient(read) * run.rate_hz
-    return equation.columns(seen)[run.grid[run.used[equation.name]]]
 
 
 def _at_most(noise: FloatArray, gram: FloatArray) -> FloatArray:

@@ -2,13 +2,16 @@
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.causes.equations import Layout
 from estimation.recording import FloatArray
+
+Columns = NDArray[np.floating[Any]]
+"""Columns of causes; of 32 bits within runs: there are thousands, and the noise is far larger."""
 
 Scale = Literal["each", "first", "none"]
 """Of which columns the norm is one: of each, of the first, or of none."""
@@ -34,7 +37,7 @@ class Laid:
         own_noise: Equation to the products of that noise with itself, (runs, causes, k, k).
     """
 
-    inner: Mapping[str, FloatArray]
+    inner: Mapping[str, Columns]
     means: Mapping[str, FloatArray]
     taken: Mapping[str, FloatArray]
     size: FloatArray
@@ -57,10 +60,10 @@ class Laid:
 
     def within(self, equations: Container[str]) -> "Laid":
         """Return the same causes as if they entered some of the equations only."""
-        parts = (self.inner, self.means, self.taken, self.noise, self.own_noise)
-        inner, means, taken, noise, own_noise = (
-            {name: x for name, x in part.items() if name in equations} for part in parts
-        )
+        inner = {name: x for name, x in self.inner.items() if name in equations}
+        parts = (self.means, self.taken, self.noise, self.own_noise)
+        kept = [{name: x for name, x in part.items() if name in equations} for part in parts]
+        means, taken, noise, own_noise = kept
         return Laid(inner, means, taken, self.size, noise, own_noise)
 
 
@@ -121,43 +124,39 @@ class Projection:
         weights: Mapping[str, tuple[float, float]],
         precision: Mapping[str, FloatArray],
     ) -> None:
-        self.samples, self.noise, self.weights = samples, noise, weights
-        self._inner, self._means, self._inverse = {}, {}, {}
+        self.weights = weights
+        self._inner, self._means, self._inverse = dict[str, Columns](), {}, {}
+        self._noise = {name: x.astype(np.float32) for name, x in noise.items()}
         for name, columns in declared.items():
-            stacked = samples.stacked(name, columns)
-            inner, means = samples.centred(name, stacked)
+            inner, means = samples.centred(name, samples.stacked(name, columns))
             means = np.column_stack([means, np.ones(len(means))])
             within, between = weights[name]
             gram = between * means.T @ means
             gram[:-1, :-1] += within * np.tensordot(inner, inner, ([0, 1], [0, 1]))
             gram[:-1, :-1] += np.diag(precision[name])
-            self._inner[name], self._means[name] = inner, means
+            self._inner[name], self._means[name] = inner.astype(np.float32), means
             self._inverse[name] = inverse(gram)
 
     def laid(
         self,
-        columns: Mapping[str, FloatArray],
-        shaken: Mapping[str, FloatArray],
+        columns: Mapping[str, tuple[Columns, FloatArray]],
+        followed: Mapping[str, Columns],
         unit: Scale,
         has_means: bool = True,
     ) -> Laid:
         """Return causes without what the declared columns explain.
 
         Args:
-            columns: Equation to the causes' columns, shape (runs, causes, samples, k), changed in
-                place.
-            shaken: The same with each reading's noise added a second time, changed in place.
+            columns: Equation to the causes' columns less each run's mean, shape
+                (runs, causes, samples, k), changed in place, and the means, (runs, causes, k).
+            followed: Equation to the noise of readings that the columns follow, changed in place.
             unit: Which weighted norm is scaled to one, for amplitudes of one prior width.
             has_means: Whether the causes have an effect on the means of runs.
         """
         inners, middles, taken = {}, {}, {}
         norm: FloatArray = np.zeros(())
-        for name, stacked in shaken.items():
-            stacked -= columns[name]
-            self.samples.centred(name, stacked)
-        for name, stacked in columns.items():
+        for name, (inner, means) in columns.items():
             within, between = self.weights[name]
-            inner, means = self.samples.centred(name, stacked)
             if not has_means:
                 means = np.zeros_like(means)
             if unit != "none":
@@ -165,14 +164,14 @@ class Projection:
                 norm = norm + between * np.einsum("rck,rck->ck", means, means)
             base, middle = self._inner[name], self._means[name]
             right = between * np.einsum("ri,rck->cik", middle, means)
-            right[:, :-1] += within * (base.transpose(0, 2, 1)[:, None] @ inner).sum(axis=0)
+            right[:, :-1] += within * products(base[:, None], inner).sum(axis=0)
             slope = self._inverse[name] @ right
-            inner -= base[:, None] @ slope[None, :, :-1]
+            inner -= times(base[:, None], slope[None, :, :-1].astype(np.float32))
             inners[name], taken[name] = inner, slope[:, :-1]
             middles[name] = means - np.einsum("ri,cik->rck", middle, slope)
         if unit == "none":
-            first = next(iter(columns.values()))
-            size = np.ones((first.shape[1], first.shape[3]))
+            _, means = next(iter(columns.values()))
+            size = np.ones((means.shape[1], means.shape[2]))
         else:
             size = np.sqrt(norm) + TINY
         if unit == "first":
@@ -182,11 +181,22 @@ class Projection:
                 inner /= size[:, None]
                 middles[name] /= size
                 taken[name] = taken[name] / size[:, None]
-        for noise in shaken.values():
+        for noise in followed.values():
             noise /= np.maximum(size, NOTHING)[:, None]
-        across = {n: self.noise[n].transpose(0, 2, 1)[:, None] @ x for n, x in shaken.items()}
-        own = {n: x.transpose(0, 1, 3, 2) @ x for n, x in shaken.items()}
+        across = {n: products(self._noise[n][:, None], x) for n, x in followed.items()}
+        own = {n: products(x, x) for n, x in followed.items()}
         return Laid(inners, middles, taken, size, across, own)
+
+
+def products(one: Columns, other: Columns) -> FloatArray:
+    """Return the products of columns, shape (..., k, l)."""
+    return times(one.swapaxes(-1, -2), other).astype(np.float64)
+
+
+def times(one: Columns, other: Columns) -> Columns:
+    """Return a product of matrices."""
+    with np.errstate(invalid="ignore"):  # single-precision kernels raise the flag for padding
+        return one @ other
 
 
 def inverse(gram: FloatArray) -> FloatArray:

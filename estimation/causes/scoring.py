@@ -24,6 +24,9 @@ ByRun = tuple[FloatArray, FloatArray, FloatArray]
 MOST_CHANGE = 2.0
 """Factor by which the largest linear term of an equation may change next to a cause."""
 
+DIGITS = 4
+"""Decimals of a score and of a probability: causes with the same columns tie."""
+
 AMPLIFIED = ("_n_m", "_n", "_a")
 """Endings of readings with an amplifier's noise; that of an encoder is known by its counts."""
 
@@ -90,7 +93,7 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
             amplitudes = outcome.amplitudes[k]
             if replaces[k] or _is_impossible(candidate, amplitudes):
                 continue
-            gain, price = float(gains[k]), _price(candidate, joint)
+            gain, price = round(float(gains[k]), DIGITS), _price(candidate, joint)
             score = gain - price.score(joint.numbers)
             by_run = outcome.cross[:, k], outcome.own[:, k], outcome.base[:, k]
             out.append(Scored(candidate, score, gain, price, amplitudes, by_run))

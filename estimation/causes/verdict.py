@@ -23,12 +23,12 @@ from estimation.causes.findings import (
 from estimation.causes.folds import unvaried
 from estimation.causes.functions import Function
 from estimation.causes.held_out import HeldOut
-from estimation.causes.instruments import add_instruments
+from estimation.causes.instruments import add_instruments, noise_share
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.refit import Errors
 from estimation.causes.refits import Refits
-from estimation.causes.scoring import probabilities
+from estimation.causes.scoring import DIGITS, probabilities
 from estimation.causes.search import Found, search
 from estimation.causes.unsteady import unsteady
 from estimation.diagnosis.audit import audit
@@ -121,6 +121,11 @@ def answer(
             f"{changing.equation}: the level of {changing.effect} changes within runs, at times"
             " that no recorded signal predicts."
         )
+    notes += [
+        f"{run}: {layout.equations[name].target} is {factor:.2g} times what the other runs predict"
+        " for it. Check its sign and unit in this run, or exclude the run."
+        for name, run, factor in held_out.apart()
+    ]
     diagnosis = Diagnosis(
         findings=tuple(findings),
         errors=refits.errors(),
@@ -267,7 +272,7 @@ def _tested(
     weights = probabilities(gains - prices, gains, numbers.sharpness)
     found = sorted(
         (
-            replace(p, share=float(w), gain=float(g))
+            replace(p, share=round(float(w), DIGITS), gain=float(g))
             for p, w, g in zip(known, weights, gains, strict=True)
         ),
         key=lambda p: -p.share,
@@ -327,9 +332,7 @@ def _noisy(layout: Layout) -> list[str]:
     found = []
     for equation in layout.equations.values():
         for channel in equation.channels:
-            runs = [r for r in layout.runs if channel in r.noise]
-            sizes = [(r.noise[channel][r.grid].std(), r.on_grid(channel).std()) for r in runs]
-            share = float(np.median([noise / (size or 1.0) for noise, size in sizes] or [0.0]))
+            share = noise_share(layout.runs, channel)
             cutoff = equation.model.low_pass.cutoff_hz
             if share > MOST_NOISE:
                 found.append(

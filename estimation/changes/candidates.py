@@ -53,7 +53,8 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
         )
         yield Claim(changed, later, given=True)
     for place in places:
-        if place.kind in ("torque sensor", "angle sensor"):
+        is_drive = place.name == f"actuator {layout.equations[place.home].target}"
+        if place.kind in ("torque sensor", "angle sensor") or is_drive:
             gain, reading = SensorGain(), (("reading", place.roles["reading"][0]),)
             changed = Changed(place, gain, reading, (), (0,), key=f"gain of {place.name}")
             yield Claim(changed, later, given=True)

@@ -90,6 +90,26 @@ def test_a_parameter_that_moved_is_named_with_its_size(changed, name, parameter,
     assert found.before[parameter] == pytest.approx(known, rel=0.15)
 
 
+def test_a_drive_that_gives_another_torque_an_ampere_is_named_where_it_is_the_target():
+    def currents(seed: int, ratio: float) -> list[Recording]:
+        return [
+            Recording(
+                run.name,
+                run.time_s,
+                {
+                    "axis_position_m": run["axis_position_m"],
+                    "drive_current_a": ratio * run["drive_force_n"],
+                },
+            )
+            for run in record(seed)
+        ]
+
+    model = replace(axis(), target="drive_current_a")
+    (found,) = compare(currents(1, 1.0), currents(2, 1.06), [model]).changes
+    assert found.name == "gain of actuator drive_current_a"
+    assert found.parameters["gain"] == pytest.approx(-0.057, abs=0.01)  # less torque an ampere
+
+
 def test_an_effect_that_came_and_one_that_went():
     worn = record(2, asymmetry=2.0)
     (came,) = compare(record(1), worn, [axis()]).changes

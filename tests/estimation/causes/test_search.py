@@ -302,6 +302,31 @@ def _coarse(seed: int, count_rad: float = 0.01) -> list[Recording]:
     ]
 
 
+def _noisy() -> list[Recording]:
+    """Return runs of one axis whose acceleration is mostly noise of the encoder."""
+    random, runs = np.random.default_rng(5), []
+    for k in range(12):
+        time = np.arange(5000) / 250.0
+        angle = sum(
+            random.uniform(0.5, 2.0)
+            * np.sin(random.uniform(1.0, 6.0) * time + random.uniform(0, 6))
+            for _ in range(4)
+        )
+        speed = np.gradient(angle, time)
+        torque = 0.02 * np.gradient(speed, time) + 0.1 * speed + 0.2 * np.tanh(speed / 0.05)
+        torque += random.normal(0.0, 0.1, len(time))
+        angle = angle + random.normal(0.0, 8e-3, len(time))
+        columns = {"crank_torque_n_m": torque, "crank_angle_rad": angle}
+        runs.append(Recording(f"{k:02d}", time, columns))
+    return runs
+
+
+def test_a_noisy_encoder_is_no_slow_one() -> None:
+    """The inertia comes out too small, and a lag of the angle would make up for it."""
+    runs = _noisy()
+    assert diagnose(runs, [axis()], split(runs)).verdict == "nothing_missing"
+
+
 @pytest.mark.parametrize(
     "made",
     [
@@ -314,6 +339,14 @@ def _coarse(seed: int, count_rad: float = 0.01) -> list[Recording]:
 def test_nothing_is_found_where_nothing_is_missing(made: Callable[[], list[Recording]]) -> None:
     runs = made()
     assert diagnose(runs, [motor()], split(runs)).verdict == "nothing_missing"
+
+
+def test_a_run_with_a_swapped_sign_is_remarked_on() -> None:
+    runs = recordings()
+    assert not any("times what" in note for note in diagnose(runs, [motor()], split(runs)).notes)
+    runs[4] = runs[4].with_columns(proximal_torque_n_m=-runs[4]["proximal_torque_n_m"])
+    (note,) = (n for n in diagnose(runs, [motor()], split(runs)).notes if "times what" in n)
+    assert note.startswith("04: proximal_torque_n_m is -")
 
 
 @pytest.mark.parametrize(
