@@ -28,6 +28,7 @@ UNIT_BY_SUFFIX: dict[str, str] = {
     "s": "s",
     "a": "A",
     "v": "V",
+    "pa": "Pa",
     "k": "K",
     "kg": "kg",
 }

@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Mapping as Names
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -168,7 +169,7 @@ def _check_source(mapping: Mapping, part: str, name: str, source: Source) -> Non
             f"{where}: the name {name!r} has no unit at its end.",
             "Channels are in SI units, and their names end in the unit: "
             f"{', '.join(f'_{suffix}' for suffix in UNIT_BY_SUFFIX)}.",
-            f"Rename it, for example {name}_rad.",
+            f"Rename it, {_example(name, source.unit)}.",
         ) from error
     if source.unit in ("", DATE) and (name == TIME or source.unit == ""):
         return
@@ -192,8 +193,23 @@ def _check_source(mapping: Mapping, part: str, name: str, source: Source) -> Non
 
 def _renamed(name: str, unit: str) -> str:
     """Return a name like this one that a unit fits, or an example."""
+    suffix = _suffix_of(unit)
     stem = name.rsplit("_", 1)[0]
-    for suffix in sorted(UNIT_BY_SUFFIX, key=len):
-        if conversion(unit, f"{stem}_{suffix}") is not None:
-            return f"{stem}_{suffix}"
-    return "one of the suffixes of docs/signs-and-units.md"
+    return f"{stem}_{suffix}" if suffix else "one of the suffixes of docs/signs-and-units.md"
+
+
+def _example(name: str, unit: str) -> str:
+    """Return an example of a name with a unit at its end, for one without."""
+    suffix = _suffix_of(unit) if unit and unit != DATE else ""
+    if suffix:
+        return f"for example {name}_{suffix}"
+    return f"such as {name}_rad of an angle or {name}_a of a current"
+
+
+def _suffix_of(unit: str) -> str:
+    """Return the suffix of channels that a unit fits; nothing where none does."""
+    with suppress(NotAUnitError):
+        for suffix in sorted(UNIT_BY_SUFFIX, key=len):
+            if conversion(unit, f"_{suffix}") is not None:
+                return suffix
+    return ""

@@ -41,14 +41,18 @@ BASE: dict[str, tuple[float, dict[str, int]]] = {
     "lb": (0.45359237, {"kg": 1}),
     "A": (1.0, {"A": 1}),
     "V": (1.0, {"V": 1}),
+    "Pa": (1.0, {"N": 1, "m": -2}),
+    "bar": (1e5, {"N": 1, "m": -2}),
+    "psi": (4.4482216152605 / 0.0254**2, {"N": 1, "m": -2}),
     "K": (1.0, {"K": 1}),
     "Nm": (1.0, {"N": 1, "m": 1}),
     "Ncm": (1e-2, {"N": 1, "m": 1}),
 }
 """Symbol to its factor to SI and its powers of base symbols; `BASE` without `PREFIXES`."""
 
-PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3}
-PREFIXED = ("s", "m", "N", "Nm", "g", "gf", "A", "V", "Hz", "rad", "deg")
+MICRO = dict.fromkeys("uµμ", 1e-6)
+PREFIXES = {"": 1.0, "n": 1e-9, **MICRO, "m": 1e-3, "c": 1e-2, "h": 1e2, "k": 1e3, "M": 1e6}
+PREFIXED = ("s", "m", "N", "Nm", "g", "gf", "A", "V", "Hz", "Pa", "bar", "rad", "deg")
 
 SHIFTED = {"degC": (1.0, 273.15), "°C": (1.0, 273.15), "degF": (5 / 9, 459.67 * 5 / 9)}
 """Temperatures whose zero is not that of kelvin: K = factor * value + shift."""

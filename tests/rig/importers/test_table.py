@@ -226,6 +226,20 @@ def test_a_formula_is_of_channels_and_conditions_in_si(tmp_path, machine):
     np.testing.assert_allclose(run["weight_n_m"], expected)
 
 
+def test_the_force_of_a_cylinder_follows_from_its_pressures(tmp_path, machine):
+    text_table(tmp_path / "run.csv", {"t": [0.0, 0.1], "pa": [10.0, 20.0], "pb": [1.0, 2.0]})
+    text = """
+        [data.columns]
+        time_s = "t"
+        cap_pressure_pa = "pa:bar"
+        rod_pressure_pa = "pb:bar"
+        [data.formulas]
+        rod_force_n = "12e-4 * cap_pressure_pa - 9e-4 * rod_pressure_pa"
+        """
+    (run,) = open_table(tmp_path / "run.csv", machine(text))
+    np.testing.assert_allclose(run["rod_force_n"], [1110.0, 2220.0])
+
+
 def test_dates_are_a_clock_and_the_start_of_the_run(tmp_path, machine):
     path = tmp_path / "run.csv"
     path.write_text(

@@ -50,6 +50,14 @@ MAPPINGS = {
         *(5, "'furlong'"),
     ),
     "a channel without a unit": (ANGLE, "motor_angle", 5, ANGLE),
+    "a channel of another unit without one": (
+        *(f'{ANGLE} = "angle:deg"', 'cap_pressure = "angle:bar"'),
+        *(5, "for example cap_pressure_pa."),
+    ),
+    "a channel without a unit in any": (
+        *(f'{ANGLE} = "angle:deg"', 'cap = "angle"'),
+        *(5, "such as cap_rad of an angle or cap_a of a current"),
+    ),
     "one channel twice": ("\n$", f'\n{ANGLE} = "current"\n', 6, "twice"),
     "an unknown key": ("\n$", "\n[data.runs]\ngaps = 1\n", 7, "'gap_s'"),
     "no time": ('time_s = "time"\n', "", None, "nothing states the time"),

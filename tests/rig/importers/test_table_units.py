@@ -27,6 +27,13 @@ from rig.importers.table.units import NotAUnitError, conversion, read_unit
         ("deg/s^2", "motor_acceleration_rad_s2", math.pi / 180),
         ("1/s", "rate_hz", 1.0),
         ("kHz", "rate_hz", 1e3),
+        ("bar", "cap_pressure_pa", 1e5),
+        ("mbar", "cap_pressure_pa", 1e2),
+        ("MPa", "cap_pressure_pa", 1e6),
+        ("kPa", "cap_pressure_pa", 1e3),
+        ("N/mm^2", "cap_pressure_pa", 1e6),
+        ("psi", "cap_pressure_pa", 6894.757),
+        ("bar 9.42 cm^2", "rod_force_n", 94.2),
     ],
 )
 def test_a_unit_in_si(unit, name, factor):
