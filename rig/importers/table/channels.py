@@ -1,8 +1,6 @@
 """From the columns of a file to channels and conditions in SI units."""
 
-import re
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
@@ -16,10 +14,7 @@ from rig.importers.table.delimited import bad_cell
 from rig.importers.table.formula import FormulaError, evaluate, names_in
 from rig.importers.table.mapping import Mapping
 from rig.importers.table.raw import Raw, Values
-from rig.importers.table.units import BASE, NotAUnitError, conversion
-
-IN_NAME = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
-"""A unit at the end of a column's name: `speed (rpm)`, `q [deg]`."""
+from rig.importers.table.units import BASE, conversion, stated_in_name
 
 DAY_S, NO_DATE = 86_400.0, date(1970, 1, 1)
 
@@ -182,21 +177,17 @@ def _in_si(
 
 def _check_name(mapping: Mapping, path: tuple[str, str], name: str, column: str) -> None:
     """Refuse a column whose name states another unit than the channel's, where none is stated."""
-    found = IN_NAME.search(column)
-    if found is None:
-        return
-    for stated in (found[1], found[1].lower()):
-        with suppress(NotAUnitError, UnknownUnitError):
-            unit = conversion(stated, name)
-            if unit is not None and (unit.factor, unit.shift) != (1.0, 0.0):
-                break
-    else:
+    stated = stated_in_name(column, name)
+    if not stated:
         return
     raise DataError(
-        f"{mapping.where(*path)}: the name of the column {column!r} states {found[1]}, and the"
+        f"{mapping.where(*path)}: the name of the column {column!r} states {stated}, and the"
         f" mapping states no unit for {name}.",
         "Without one, values are taken as SI units.",
-        f"Write {name} = '{column}:{stated}'; if they are in SI units, that unit in its place.",
+        f"Write {name} = '{column}:{stated}'; if they are in SI units, that unit in its place."
+        if conversion(stated, name)
+        else f"Correct the name {name}; if they are in SI units, write {name} ="
+        f" '{column}:{unit_of(name)}'.",
     )
 
 

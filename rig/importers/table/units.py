@@ -8,9 +8,11 @@ counts for radians, and revolutions per minute for hertz.
 
 import math
 import re
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
-from estimation.channels import unit_of
+from estimation.channels import UnknownUnitError, unit_of
 
 TURN = 2 * math.pi
 G_M_S2 = 9.80665
@@ -47,6 +49,7 @@ BASE: dict[str, tuple[float, dict[str, int]]] = {
     "K": (1.0, {"K": 1}),
     "Nm": (1.0, {"N": 1, "m": 1}),
     "Ncm": (1e-2, {"N": 1, "m": 1}),
+    "Nmm": (1e-3, {"N": 1, "m": 1}),
 }
 """Symbol to its factor to SI and its powers of base symbols; `BASE` without `PREFIXES`."""
 
@@ -61,6 +64,28 @@ FACTOR = re.compile(r"(?P<symbol>[^\W\d]+|[%°]C?)(?:\^?(?P<power>-?\d+))?")
 NUMBER = re.compile(r"\d+(\.\d*)?([eE][-+]?\d+)?|\.\d+")
 SIZE = re.compile(rf"(?P<size>-?(?:{NUMBER.pattern}))(?:/(?P<parts>{NUMBER.pattern}))?(?:\s+|$)")
 """A number, or a ratio of two, at the beginning of a unit."""
+
+
+IN_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
+"""A unit in brackets at the end of a column's name: `speed (rpm)`, `q [deg]`."""
+
+UNMISTAKABLE = (
+    *("deg", "°", "mdeg", "mrad", "rpm", "rev", "%", "degC", "°C", "degF", "us", "ms", "ns"),
+    *("um", "µm", "mm", "cm", "uA", "mA", "mV", "kV", "mN", "kN", "kgf", "lbf"),
+    *("ozf", "mNm", "Nmm", "Ncm", "kNm", "bar", "mbar", "psi", "kPa", "MPa", "kHz"),
+)
+"""Units that are one at the end of a column's name without brackets, too: `angle_deg`, `I/mA`.
+
+Single letters and words, such as `a`, `g`, `in` and `min`, are not: most of them mean a part, an
+input or a least value."""
+
+ALONE = ("deg", "°", "rpm", "mNm", "degC", "°C")
+"""Those that a channel of another dimension is refused for, too: no part is called so."""
+
+PLAIN = {"rad": "rad", "s": "s", "m": "m", "min": "min", "n": "N"}
+"""What may stand with one of them: `v_mm_s`, `speed deg/s`."""
+
+IN_WORDS = {unit.lower(): unit for unit in UNMISTAKABLE} | PLAIN
 
 
 class NotAUnitError(ValueError):
@@ -136,3 +161,34 @@ def conversion(unit: str, name: str) -> Unit | None:
     wanted = read_unit(unit_of(name))
     same = given.powers == wanted.powers
     return Unit(given.factor / wanted.factor, given.powers, given.shift) if same else None
+
+
+def stated_in_name(column: str, name: str) -> str:
+    """Return the unit at the end of a column's name, where it is not the unit of its channel.
+
+    Args:
+        column: Name of the column, such as `angle_deg`, `I/mA` or `speed (rpm)`.
+        name: Name of the channel, such as `motor_angle_rad`.
+
+    Returns:
+        The unit; nothing where the name ends in none, in that of the channel, or in one of another
+        dimension that may be a word.
+    """
+    for stated in _candidates(column):
+        with suppress(NotAUnitError, UnknownUnitError):
+            unit = conversion(stated, name)
+            if stated in ALONE if unit is None else (unit.factor, unit.shift) != (1.0, 0.0):
+                return stated
+    return ""
+
+
+def _candidates(column: str) -> Iterator[str]:
+    """Yield the units that the end of a column's name may state."""
+    if found := IN_BRACKETS.search(column):
+        yield from (found[1], found[1].lower())
+        return
+    words = [word for word in re.split(r"[_/ ]+", column) if word.lower() != "per"]
+    for first in range(1, len(words)):
+        units = [IN_WORDS.get(word.lower(), "") for word in words[first:]]
+        if all(units) and set(units) - set(PLAIN.values()):
+            yield from ("/".join(units), " ".join(units))

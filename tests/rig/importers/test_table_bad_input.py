@@ -160,7 +160,7 @@ def test_a_velocity_that_contradicts_its_angle(refused):
     assert "motor_velocity_rad_s" in said
 
 
-@pytest.mark.parametrize("column", ["q [deg]", "angle (DEG)"])
+@pytest.mark.parametrize("column", ["q [deg]", "angle (DEG)", "angle_deg", "angle/deg"])
 def test_a_unit_in_the_name_of_a_column_is_not_passed_over(refused, tmp_path, column):
     table, mapping = TABLE.replace("angle", column), GOOD.replace("angle:deg", column)
     said = refused(table, mapping)
@@ -169,6 +169,12 @@ def test_a_unit_in_the_name_of_a_column_is_not_passed_over(refused, tmp_path, co
     (tmp_path / "bench.toml").write_text(mapping.replace(column, f"{column}:rad"))
     (run,) = open_table(tmp_path / "run.csv", read_mapping(tmp_path / "bench.toml", []))
     assert run["motor_angle_rad"][-1] == 19.0
+
+
+def test_a_unit_of_another_quantity_in_the_name_of_a_column(refused):
+    said = refused(TABLE.replace("angle", "angle_rpm"), GOOD.replace("angle:deg", "angle_rpm"))
+    assert "the name of the column 'angle_rpm' states rpm" in said
+    assert "if they are in SI units, write motor_angle_rad = 'angle_rpm:rad'" in said
 
 
 @pytest.mark.parametrize("column", ["angle (rad)", "angle (raw)", "angle (mm)", "angle (left)"])

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rig.importers.table.units import NotAUnitError, conversion, read_unit
+from rig.importers.table.units import NotAUnitError, conversion, read_unit, stated_in_name
 
 
 @pytest.mark.parametrize(
@@ -66,3 +66,70 @@ def test_a_unit_of_another_dimension_does_not_fit(unit, name):
 def test_what_is_not_a_unit(text):
     with pytest.raises(NotAUnitError):
         read_unit(text)
+
+
+@pytest.mark.parametrize(
+    ("column", "name", "unit"),
+    [
+        ("speed (rpm)", "motor_velocity_rad_s", "rpm"),
+        ("Pos [mm]", "carriage_position_m", "mm"),
+        ("Winkel (DEG)", "motor_angle_rad", "deg"),
+        ("angle_deg", "motor_angle_rad", "deg"),
+        ("angle/deg", "motor_angle_rad", "deg"),
+        ("angle deg", "motor_angle_rad", "deg"),
+        ("ANGLE_DEG", "motor_angle_rad", "deg"),
+        ("angle_°", "motor_angle_rad", "°"),
+        ("motor_rpm", "motor_velocity_rad_s", "rpm"),
+        ("speed_deg_s", "motor_velocity_rad_s", "deg/s"),
+        ("speed deg/s", "motor_velocity_rad_s", "deg/s"),
+        ("v_mm_per_s", "carriage_velocity_m_s", "mm/s"),
+        ("axis.z_mm", "carriage_position_m", "mm"),
+        ("current_mA", "motor_current_a", "mA"),
+        ("I/mA", "motor_current_a", "mA"),
+        ("current_ma", "motor_current_a", "mA"),
+        ("torque_mNm", "jaw_torque_n_m", "mNm"),
+        ("torque mN m", "jaw_torque_n_m", "mN m"),
+        ("torque_N_mm", "jaw_torque_n_m", "N mm"),
+        ("force_kN", "rod_force_n", "kN"),
+        ("P_A_bar", "cap_pressure_pa", "bar"),
+        ("p kPa", "cap_pressure_pa", "kPa"),
+        ("t_ms", "time_s", "ms"),
+        ("time/us", "time_s", "us"),
+        ("duty_%", "drive_ratio", "%"),
+        ("temp_degC", "motor_temperature_k", "degC"),
+        ("angle_rpm", "motor_angle_rad", "rpm"),
+    ],
+)
+def test_a_unit_at_the_end_of_the_name_of_a_column(column, name, unit):
+    assert stated_in_name(column, name) == unit
+
+
+@pytest.mark.parametrize(
+    ("column", "name"),
+    [
+        ("motor_m", "carriage_position_m"),
+        ("pos_a", "motor_current_a"),
+        ("time_s", "time_s"),
+        ("run_a", "motor_angle_rad"),
+        ("angle_rad", "motor_angle_rad"),
+        ("speed_rad_s", "motor_velocity_rad_s"),
+        ("joint_g", "motor_angle_rad"),
+        ("load_g", "load_mass_kg"),
+        ("pos_in", "carriage_position_m"),
+        ("pos_min", "carriage_position_m"),
+        ("speed min", "motor_velocity_rad_s"),
+        ("angle_raw", "motor_angle_rad"),
+        ("angle_mm", "motor_angle_rad"),
+        ("torque_nm", "jaw_torque_n_m"),
+        ("mass_kg", "load_mass_kg"),
+        ("deg", "motor_angle_rad"),
+        ("rpm_motor", "motor_velocity_rad_s"),
+        ("deg_of_freedom_1", "motor_angle_rad"),
+        ("run_1", "drive_ratio"),
+        ("operator_ms", "operator"),
+        ("torque_rev", "jaw_torque_n_m"),
+        ("pos_ms", "carriage_position_m"),
+    ],
+)
+def test_an_ordinary_word_or_the_own_unit_of_a_channel_is_not_another_unit(column, name):
+    assert stated_in_name(column, name) == ""
