@@ -14,6 +14,7 @@ from rig.importers.table.channels import Samples, find
 from rig.importers.table.formula import FormulaError, evaluate
 from rig.importers.table.mapping import Mapping
 from rig.importers.table.raw import Remark
+from rig.output.table import counted
 
 SPARSE = 0.1
 """Share of samples with an empty cell from which the rate of a channel may be the reason."""
@@ -101,17 +102,23 @@ def _run(
     time_s = samples.time_s[part]
     channels = {key: values[part] for key, values in samples.channels.items()}
     twice = _is_twice(time_s, channels)
-    _check_clock(samples, part, time_s, twice)
+    interpolated = mapping.data.even_rate_hz is not None  # each channel from its own samples
+    _check_clock(samples, part, time_s, twice, interpolated)
     if twice.any():
         remarks.append((name, f"{int(twice.sum())} samples that are there twice left out"))
         time_s = time_s[~twice]
         channels = {key: values[~twice] for key, values in channels.items()}
+    again = np.diff(time_s, prepend=-np.inf) == 0
+    if again.any():
+        count = counted(int(again.sum()), "sample")
+        remarks.append((name, f"{count} with the time of the one before it left out"))
+        channels = {key: _first_of_each(values, again) for key, values in channels.items()}
+        time_s = time_s[~again]
     conditions = {
         key: _constant(samples, mapping, key, value, part, name)
         for key, value in samples.conditions.items()
     }
     empty = ~np.all([np.isfinite(values) for values in channels.values()], axis=0)
-    interpolated = mapping.data.even_rate_hz is not None  # each channel from its own samples
     start_ns = samples.started_at_ns
     if start_ns is not None:
         start_ns += round(float(time_s[0] - samples.time_s[0]) * 1e9)
@@ -156,9 +163,19 @@ def _is_twice(time_s: FloatArray, channels: dict[str, FloatArray]) -> NDArray[np
     return np.concatenate([[False], same.all(axis=1)])
 
 
+def _first_of_each(values: FloatArray, again: NDArray[np.bool_]) -> FloatArray:
+    """Return the first value at each time; a table may have a row for each channel's reading."""
+    known = np.flatnonzero(np.isfinite(values))
+    places, first = np.unique(np.cumsum(~again)[known] - 1, return_index=True)
+    kept = np.full(int((~again).sum()), np.nan)
+    kept[places] = values[known[first]]
+    return kept
+
+
 def _check_clock(
-    samples: Samples, part: slice, time_s: FloatArray, twice: NDArray[np.bool_]
+    samples: Samples, part: slice, time_s: FloatArray, twice: NDArray[np.bool_], repeats: bool
 ) -> None:
+    """Refuse a time that is empty, goes back or, unless repeats may be there, stands still."""
     where, is_there = part.start or 0, np.isfinite(time_s)
     if not is_there.all():
         raise DataError(
@@ -166,15 +183,33 @@ def _check_clock(
             " empty.",
             fix="Correct the file, or state a sample rate in place of the time column.",
         )
-    is_back = (np.diff(time_s) <= 0) & ~twice[1:]
-    if not is_back.any():
+    steps = np.diff(time_s)
+    is_back, is_again = steps < 0, (steps == 0) & ~twice[1:]
+    wrong = is_back if repeats else is_back | is_again
+    if not wrong.any():
         return
-    back = int(np.argmax(is_back)) + 1
-    before, after = float(time_s[back - 1]), float(time_s[back])
+    at = int(np.argmax(wrong)) + 1
+    what = (
+        f"{samples.raw.path}, {samples.raw.row(where + at)}: time goes from"
+        f" {float(time_s[at - 1]):.6g} s to {float(time_s[at]):.6g} s."
+    )
+    if not is_back.any():
+        count, even = int(is_again.sum()), ""
+        if (steps > 0).any():
+            rate_hz = float(f"{1 / np.median(steps[steps > 0]):.3g}")
+            even = (
+                f"Write even_rate_hz = {rate_hz:g} under [data]: the first sample of each time"
+                " counts, and an even clock is interpolated. "
+            )
+        raise DataError(
+            what,
+            f"{counted(count, 'sample')} {'has' if count == 1 else 'have'} the time of the one"
+            " before it.",
+            f"{even}If the column is not a clock, state --rate HZ.",
+        )
     raise DataError(
-        f"{samples.raw.path}, {samples.raw.row(where + back)}: time goes from {before:.6g} s to"
-        f" {after:.6g} s.",
-        f"{int(is_back.sum())} samples do not come after the one before them.",
+        what,
+        f"{int(is_back.sum())} samples come before the one above them.",
         "If the clock starts again with each trial, write resets = true under [data.runs]"
         " (--runs resets=true); if the column is not a clock, state --rate HZ.",
     )

@@ -337,6 +337,29 @@ def test_channels_of_two_rates_in_one_table_are_each_interpolated(tmp_path, mach
     np.testing.assert_allclose(run["motor_angle_rad"], np.radians(90 * run.time_s), atol=1e-9)
 
 
+def test_repeated_times_are_left_out_where_the_clock_is_made_even(tmp_path, machine):
+    columns = {"t": [0.0, 10.0, 10.0, 30.0, 40.0], "enc": [0.0, 1.0, 9.0, 3.0, 4.0]}
+    text_table(tmp_path / "run.csv", columns)
+    text = '[data]\n{}\n[data.columns]\ntime_s = "t:ms"\nmotor_angle_rad = "enc"\n'
+    with pytest.raises(DataError) as error:
+        open_table(tmp_path / "run.csv", machine(text.format("")))
+    assert "1 sample has the time of the one before it" in error.value.why
+    assert "even_rate_hz = 100 under [data]" in error.value.fix
+    assert "resets" not in error.value.fix
+    remarks = []
+    (run,) = read_runs(tmp_path / "run.csv", machine(text.format("even_rate_hz = 100")), remarks)
+    np.testing.assert_allclose(run["motor_angle_rad"], [0.0, 1.0, 2.0, 3.0, 4.0])
+    assert ("run", "1 sample with the time of the one before it left out") in remarks
+    assert run.valid.all()
+
+
+def test_rows_of_one_time_each_with_another_channel_are_one_sample(tmp_path, machine):
+    (tmp_path / "run.csv").write_text("t,enc,i\n0,1,\n0,,5\n10,2,\n10,,6\n20,3,\n20,,7\n")
+    (run,) = open_table(tmp_path / "run.csv", machine("[data]\neven_rate_hz = 100\n" + MAPPED))
+    np.testing.assert_allclose(run["motor_angle_rad"], np.radians([1.0, 2.0, 3.0]))
+    np.testing.assert_allclose(run["motor_current_a"], [0.005, 0.006, 0.007])
+
+
 def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path, machine):
     path = tmp_path / "run.csv"
     time_s = np.cumsum(np.random.default_rng(0).uniform(0.008, 0.012, 300))
