@@ -238,11 +238,18 @@ def filter_recording(recording: Recording, low_pass: LowPass = PAPER) -> Recordi
     rate_hz = recording.sample_rate_hz
     names = list(recording.columns)
     ticks = recording.ticks
-    if ticks[-1] > 10 * len(recording) or np.any(np.diff(ticks) < 1):
+    short = int(np.count_nonzero(np.diff(ticks) < 1))
+    if short or ticks[-1] > 10 * len(recording):
+        period, even_hz = f"of {1e3 / rate_hz:.4g} ms", float(f"{rate_hz:.3g}")
         raise FilterError(
             f"The clock of run {recording.name!r} does not tick evenly.",
-            f"{len(recording)} samples span {ticks[-1] + 1} periods of {1e3 / rate_hz:.4g} ms.",
-            "Split the run at the jump.",
+            f"{short} steps are shorter than half a period {period}."
+            if short
+            else f"{len(recording)} samples span {ticks[-1] + 1} periods {period}.",
+            f"Write even_rate_hz = {even_hz:g} under [data] of the machine's file: each channel is"
+            " interpolated onto an even clock."
+            if short
+            else "Split the run at the jump.",
         )
     rows = np.column_stack([recording[name] for name in names])
     if not np.isfinite(rows).all():

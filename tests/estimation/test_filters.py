@@ -127,8 +127,18 @@ def test_lost_and_missing_samples_are_bridged():
 
 def test_a_clock_that_jumps_is_named():
     time_s = np.concatenate([np.arange(100), 1e6 + np.arange(100)]) * PERIOD_S
-    with pytest.raises(FilterError, match="does not tick evenly"):
+    with pytest.raises(FilterError, match="does not tick evenly") as error:
         filter_recording(Recording("r", time_s, {"fsr_v": np.zeros(200)}))
+    assert error.value.fix == "Split the run at the jump."
+
+
+def test_a_clock_that_jitters_too_much_is_made_even_not_cut():
+    time_s = np.arange(200) * 0.004
+    time_s[50:150:7] += 0.0025
+    with pytest.raises(FilterError, match="does not tick evenly") as error:
+        filter_recording(Recording("r", time_s, {"fsr_v": np.zeros(200)}))
+    assert "15 steps are shorter than half a period of 4 ms" in error.value.why
+    assert "even_rate_hz = 250 under [data]" in error.value.fix
 
 
 @pytest.mark.parametrize("seed", range(4))

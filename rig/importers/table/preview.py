@@ -3,6 +3,7 @@
 Each remark is a question to the person who knows the machine; nothing is corrected here.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from estimation.channels import unit_of
 from estimation.recording import FloatArray, Recording
 from rig.importers.derivatives import fault, pairs
 from rig.importers.table.raw import Remark
+from rig.output.table import counted
 
 PLAUSIBLE: dict[str, tuple[float, str]] = {
     "rad": (200.0, "degrees or counts"),
@@ -35,11 +37,20 @@ GAP_PERIODS = 1.5
 JITTER = 0.2
 """Median deviation of the steps of time, in median steps, that is remarked on."""
 
+LEAST_STEP = 0.5
+"""Step of time, in median steps, below which no filter counts a period: it rounds to none."""
+
 FAR = 10.0
 """Deviations of a step of time from the median beyond which no jitter reaches."""
 
+LONG_PERIODS = 20.0
+"""Step of time, in median steps, from which a gap is a pause between runs, not lost samples."""
+
 PLATEAU = 3
 """Equal samples in a row that make a plateau."""
+
+NUMBER = re.compile(r"(?<![\w.])\d[\d.]*(e[-+]?\d+)?(?!\w)")
+"""A number in a sentence; not one in the name of a channel."""
 
 CLIPPED = 0.005
 """Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
@@ -104,8 +115,8 @@ class Preview:
     def questions(self) -> list[str]:
         """Everything that may be wrong, in words, each with the channel or run it is about."""
         found = [f"{c.name}: {text}" for c in self.channels for text in c.wrong]
-        found += [f"{r.name}: {text}" for r in self.runs for text in r.wrong]
-        return [*found, *self.wrong]
+        of_runs = [(r.name, text) for r in self.runs for text in r.wrong]
+        return [*found, *_grouped(of_runs, "runs"), *self.wrong]
 
 
 def preview(recordings: Sequence[Recording], remarks: Sequence[Remark], rows: int = 5) -> Preview:
@@ -123,29 +134,36 @@ def preview(recordings: Sequence[Recording], remarks: Sequence[Remark], rows: in
         views.append(_channel(name, parts))
     first = recordings[0]
     shown = {n: np.asarray(first[n])[:rows].tolist() for n in ("time_s", *first.columns)}
-    together = dict.fromkeys(text for r in recordings for text in _contradictions(r))
+    together = [(r.name, text) for r in recordings for text in _contradictions(r)]
     return Preview(
         tuple(_run(recording) for recording in recordings),
         tuple(views),
         shown,
-        tuple(together),
-        tuple(_grouped(remarks)),
+        tuple(_grouped(together, "runs")),
+        tuple(_grouped(remarks, "files")),
     )
 
 
-def _grouped(remarks: Sequence[Remark]) -> Iterator[str]:
-    """Yield remarks with the file or run each is about; the same on several once."""
-    about: dict[str, list[str]] = {}
+def _grouped(remarks: Sequence[Remark], noun: str) -> Iterator[str]:
+    """Yield remarks with the file or run each is about; the same on several once.
+
+    Those that differ in their numbers alone are the same.
+    """
+    about: dict[str, list[Remark]] = {}
     for place, text in remarks:
-        about.setdefault(text, []).append(place)
-    for text, places in about.items():
-        yield f"{places[0]}: {text}" if len(places) == 1 else f"{text} ({len(places)} files)"
+        about.setdefault(NUMBER.sub("", text), []).append((place, text))
+    for same in about.values():
+        place, text = same[0]
+        if len(same) == 1:
+            yield f"{place}: {text}"
+        elif len({one for _, one in same}) == 1:
+            yield f"{text} ({len(same)} {noun})"
+        else:
+            yield f"{place}: {text} ({counted(len(same) - 1, 'other')} alike)"
 
 
 def _contradictions(recording: Recording) -> Iterator[str]:
-    for name, slope in pairs(recording):
-        if found := fault(recording, name, slope):
-            yield f"{recording.name}: {found}"
+    return filter(None, (fault(recording, name, slope) for name, slope in pairs(recording)))
 
 
 def _run(recording: Recording) -> RunView:
@@ -167,17 +185,26 @@ def _clock(time_s: FloatArray) -> Iterator[str]:
         return
     usual = float(np.median(steps))
     spread = float(np.median(np.abs(steps - usual))) / usual
-    gaps = steps > (GAP_PERIODS + FAR * spread) * usual
-    if gaps.any():
-        count = int(gaps.sum())
+    gaps = steps[steps > (GAP_PERIODS + FAR * spread) * usual]
+    pauses, lost = gaps[gaps > LONG_PERIODS * usual], gaps[gaps <= LONG_PERIODS * usual]
+    rate_hz = float(f"{1 / usual:.3g}")
+    even = f"even_rate_hz = {rate_hz:g} under [data] interpolates"
+    if pauses.size:
         yield (
-            f"{count} gap{'s' if count > 1 else ''} in time, the longest of"
-            f" {float(steps.max()):.4g} s; gap_s under [data.runs] cuts runs there"
+            f"{counted(pauses.size, 'gap')} in time, the longest of {float(pauses.max()):.4g} s;"
+            " gap_s under [data.runs] cuts runs there"
         )
-    if spread > JITTER:
+    if spread > JITTER or float(steps.min()) <= LEAST_STEP * usual:
+        rest = steps[steps <= LONG_PERIODS * usual]
         yield (
-            f"the steps of time vary by {100 * spread:.0f} %; even_rate_hz interpolates onto an"
-            " even clock"
+            f"the steps of time are between {1e3 * float(rest.min()):.3g} and"
+            f" {1e3 * float(rest.max()):.3g} ms, {1e3 * usual:.3g} ms is usual; {even} onto an even"
+            " clock"
+        )
+    elif lost.size:
+        yield (
+            f"{counted(lost.size, 'short gap')} in time, the longest of {float(lost.max()):.4g} s;"
+            f" {even} over lost samples"
         )
 
 

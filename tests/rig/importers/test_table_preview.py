@@ -66,6 +66,32 @@ def test_a_gap_and_an_uneven_clock_are_asked(tmp_path):
     assert "even_rate_hz" in question
 
 
+def test_lost_samples_here_and_there_are_not_cut_out(tmp_path):
+    kept = np.random.default_rng(0).uniform(size=TIME.size) > 0.05
+    (question,) = questions(tmp_path, time_s=TIME[kept], motor_angle_rad=WAVE[kept])
+    assert "short gaps in time" in question
+    assert "even_rate_hz = 100 under [data]" in question
+    assert "gap_s" not in question
+
+
+def test_a_step_that_no_filter_counts_is_asked(tmp_path):
+    jitter = TIME.copy()
+    jitter[100] += 0.006
+    (question,) = questions(tmp_path, time_s=jitter, motor_angle_rad=WAVE)
+    assert "steps of time are between 4 and 16 ms, 10 ms is usual" in question
+    assert "even_rate_hz = 100 under [data]" in question
+
+
+def test_the_same_question_about_several_runs_is_asked_once(tmp_path):
+    for number in range(3):
+        gap = np.where(TIME > 4, TIME + 1 + number, TIME)
+        csv(tmp_path / f"run{number}.csv", time_s=gap, motor_angle_rad=WAVE)
+    recordings = list(read_runs(tmp_path, read_mapping(None, []), []))
+    (question,) = preview(recordings, []).questions
+    assert question.startswith("run0: 1 gap in time, the longest of 1.01 s;")
+    assert question.endswith("(2 others alike)")
+
+
 def test_a_velocity_that_contradicts_its_angle_is_asked(tmp_path):
     columns = {"motor_angle_rad": WAVE, "motor_velocity_rad_s": 20 * np.cos(2 * TIME)}
     (question,) = questions(tmp_path, time_s=TIME, **columns)
