@@ -18,7 +18,7 @@ from estimation.opposed import FIX, opposed, size_of_target
 from estimation.plant import Plant
 from estimation.plant_equations import Missing, missing, unused
 from estimation.plant_models import declared
-from estimation.recording import Recording, shared_columns
+from estimation.recording import Recording, move_condition, shared_columns
 from estimation.signals import Reading
 from estimation.travel import FOLLOWS, slope
 
@@ -143,8 +143,11 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
     needed = measured_channels([*model.channels, model.target], model.signals)
     absent = [name for name in needed if name not in (*columns, "time_s")]
     if absent:
+        what = f"{', '.join(absent)} was not recorded"
+        if move := move_condition(absent, campaign.evidence):
+            return replace(plain, trouble=f"{what} as a channel: {move}")
         near = nearest(absent[0], list(columns)) if columns else "There are no runs."
-        return replace(plain, trouble=f"{', '.join(absent)} was not recorded. {near}")
+        return replace(plain, trouble=f"{what}. {near}")
     try:
         fitted = fit(model, campaign, bootstrap=0)
     except EstimationError as error:

@@ -190,7 +190,7 @@ class Recording:
             raise MissingChannelError(
                 f"Run {self.name!r} has no channel {name!r}.",
                 f"It has: {', '.join(self.columns) or 'none'}.",
-                f"Did you mean {near[0]!r}?" if near else "",
+                move_condition([name], [self]) or (f"Did you mean {near[0]!r}?" if near else ""),
             ) from None
 
     @property
@@ -246,6 +246,14 @@ class Recording:
     def exclude(self, reason: str) -> "Recording":
         """Return the recording marked as left out of evidence, with the reason."""
         return replace(self, excluded=reason)
+
+
+def move_condition(absent: Iterable[str], recordings: Iterable[Recording]) -> str:
+    """Return how to make channels of conditions that an equation needs; nothing for others."""
+    conditions = {name for recording in recordings for name in recording.conditions}
+    for name in sorted(conditions.intersection(absent)):
+        return f"{name} is a condition: move its line from [data.conditions] to [data.columns]."
+    return ""
 
 
 def shared_columns(recordings: Iterable[Recording]) -> list[str]:

@@ -31,7 +31,7 @@ from estimation.model import Model, Term, balance_channels
 from estimation.noise import white_noise
 from estimation.opposed import FIX, opposed
 from estimation.predicted import with_prediction
-from estimation.recording import FloatArray, Recording, shared_columns
+from estimation.recording import FloatArray, Recording, move_condition, shared_columns
 from estimation.rest import in_motion
 from estimation.signals import Signals
 from estimation.travel import off_ratio
@@ -278,7 +278,8 @@ def lay_out(
                 raise LayoutError(
                     f"Some run has no {', '.join(sorted(lacking))}.",
                     f"The equation {model.balance} needs it. Every run has {', '.join(measured)}.",
-                    "Record it, or declare an equation of channels that were recorded.",
+                    move_condition(lacking, timed)
+                    or "Record it, or declare an equation of channels that were recorded.",
                 )
             if contradicted := off_ratio(model, list(campaign.evidence)):
                 raise LayoutError(

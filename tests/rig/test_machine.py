@@ -122,6 +122,18 @@ def test_without_a_drive_and_without_a_reading_of_effort_both_are_named(tmp_path
     assert "An [[actuator]], or a [[sensor]] that reads an effort" in printed
 
 
+def test_a_load_that_is_a_condition_is_named(slide, said):
+    file, table = slide
+    text = SLIDE.replace("[data]", '[[load]]\nname = "weight_n"\naxis = "carriage"\n[data]', 1)
+    file.write_text(text + "[data.conditions]\nweight_n = { value = 3.0 }\n")
+    move = "weight_n is a condition: move its line from [data.conditions] to [data.columns]."
+    printed = said("machine check", file, table, code=1).out
+    assert f"weight_n was not recorded as a channel: {move}" in " ".join(printed.split())
+    for command in ("fit", "diagnose"):
+        printed = said(f"{command}", table, "--machine", file, code=5).err
+        assert move in " ".join(printed.split())
+
+
 def test_a_column_that_was_not_recorded_is_named(slide, said):
     file, table = slide
     file.write_text(SLIDE.replace('drive_force_n = "volts:35 N"', 'motor_force_n = "volts:35 N"'))
