@@ -18,10 +18,23 @@ from scipy.signal import correlate
 from estimation.channels import unit_or_none
 from estimation.recording import FloatArray, Recording
 from rig.errors import DataError
+from rig.importers.table.units import conversion
 
 DERIVATIVE = {"rad": "rad/s", "rad/s": "rad/s^2", "m": "m/s", "m/s": "m/s^2", "N m": "N m/s"}
 """Unit of the derivative of a channel, by the channel's unit."""
 QUANTITIES = ("angle", "position", "velocity", "speed", "rate", "acceleration", "torque")
+
+CONFUSED = {
+    "rad": ("deg", "rev"),
+    "rad/s": ("rpm", "deg/s", "rev/s"),
+    "rad/s^2": ("deg/s^2",),
+    "m": ("mm", "cm", "in"),
+    "m/s": ("mm/s", "cm/s", "m/min"),
+    "m/s^2": ("mm/s^2",),
+    "N m": ("mN m",),
+    "N m/s": ("mN m/s",),
+}
+"""Unit of a channel to those that its values are often in instead."""
 
 SPANS_S = (0.05, 0.2, 0.6)
 """Spans that are tried; the one with the highest correlation counts."""
@@ -95,11 +108,24 @@ def fault(recording: Recording, name: str, slope_name: str) -> str:
     if found.ratio < 0:
         return f"{slope_name} has the opposite sign of the motion of {name}"
     if found.ratio_is_wrong:
+        units = "".join(f"{unit}, or " for unit in _units(found, name, slope_name))
         return (
-            f"{name} changes {found.ratio:.2f} times as fast as {slope_name} states; a sample rate "
-            f"that is wrong by this factor would explain it"
+            f"{name} changes {found.ratio:.3g} times as fast as {slope_name} states; {units}a"
+            " sample rate that is wrong by this factor would explain it"
         )
     return ""
+
+
+def _units(found: Relation, name: str, slope_name: str) -> Iterator[str]:
+    """Yield the wrong units that would explain a ratio, as the channel and its unit."""
+    for channel, way in ((slope_name, 1), (name, -1)):
+        for unit in CONFUSED.get(unit_or_none(channel) or "", ()):
+            size = conversion(unit, channel)
+            factor = size.factor**way if size else 1.0
+            if found.allows(factor):
+                yield f"{channel} in {unit}"
+            elif found.allows(1 / factor):
+                yield f"{channel} stated in {unit} without being so"
 
 
 def pairs(recording: Recording) -> Iterator[tuple[str, str]]:
