@@ -22,6 +22,7 @@ from estimation.recording import FloatArray, Recording
 from rig.diagnosis.ledger import Ledger, Look, look_at
 from rig.diagnosis.propose import propose
 from rig.diagnosis.subject import Subject
+from rig.output.table import counted
 
 
 def run_diagnosis(
@@ -74,7 +75,9 @@ def run_diagnosis(
     if limit := claim(sealed):
         notes.insert(0, limit)
     if seen:
-        notes.append(f"Exploratory: used by an earlier diagnosis: {', '.join(seen)}.")
+        share = f"{len(seen)} of the {counted(len(sealed.confirm), 'test run')}"
+        was = "was" if len(seen) == 1 else "were"
+        notes.append(f"Exploratory: {share} {was} used by an earlier diagnosis: {', '.join(seen)}.")
     diagnosis = replace(
         found.diagnosis,
         exploratory=bool(seen),

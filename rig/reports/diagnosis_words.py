@@ -21,7 +21,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
             " runs."
         ]
     else:
-        which = "test runs used before" if diagnosis.exploratory else "held-out test runs"
+        which = "test runs (exploratory)" if diagnosis.exploratory else "held-out test runs"
         runs = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)
         lines = [
             _sentence(f, diagnosis.unit[f.balance], which) + _where(f, runs)

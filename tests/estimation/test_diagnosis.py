@@ -1,13 +1,15 @@
 """Diagnosis on an analytic rig whose missing effect is known."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from estimation import model_file
 from estimation.campaign import Campaign
-from estimation.causes.verdict import Answer, answer
+from estimation.causes.places import Entry
+from estimation.causes.verdict import Answer, _unwritten, answer
 from estimation.diagnosis.split import split
 from estimation.fitting import evidence_of
 from estimation.recording import Flag, Stretch
@@ -86,6 +88,17 @@ def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found(
     (written,) = found.models
     assert len(written.terms) == len(MOTOR.terms)
     assert any("not added to the model file" in note for note in found.diagnosis.notes)
+
+
+@pytest.mark.parametrize(
+    ("order", "why"), [(0, "the quantity that the model estimates"), (1, "the rate of change")]
+)
+def test_a_cause_that_no_model_holds_is_reported_with_the_reason(order, why):
+    place = SimpleNamespace(home="motor", enters=[Entry("motor", 1.0, order)])
+    cause = SimpleNamespace(family="sensor.gain", place=place)
+    note = _unwritten(SimpleNamespace(acts=None, cause=cause))
+    assert note.startswith("motor: sensor.gain is reported and not added to the model file; ")
+    assert why in note
 
 
 def test_an_effect_of_some_runs_is_named_with_the_runs_that_have_it():

@@ -222,6 +222,10 @@ def test_two_paths_are_diagnosed_by_their_periods_and_the_claim_reports_it(monke
     assert len(found["runs"]["discover"]) == len(found["runs"]["confirm"]) == 6
     assert "Two recorded paths only" in found["notes"][0]
     assert found["exploratory"] is True
+    assert any(
+        note.startswith("Exploratory: 6 of the 6 test runs were used by an earlier diagnosis: ")
+        for note in found["notes"]
+    )
 
 
 def test_a_protocol_shows_which_effects_its_runs_distinguish(answered):
