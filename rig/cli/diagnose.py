@@ -89,7 +89,7 @@ def diagnose(
             )
     # files first, then the ledger, then the screen: held-out runs are not used up by a diagnosis
     # that left nothing, and nobody sees a result that the ledger does not hold
-    done, written = _with_models(done, model_out) if model_out else (done, [])
+    done, written = _with_models(done, model_out, path, machine) if model_out else (done, [])
     if protocol_out is not None:
         written.append(write_protocol(done.diagnosis, protocol_out))
     written += write(done, seed, page_file, json_out)
@@ -98,14 +98,21 @@ def diagnose(
     present(json_, done.diagnosis.to_json(), *said)
 
 
-def _with_models(done: "Answer", model_out: Path) -> "tuple[Answer, list[str]]":
+def _with_models(
+    done: "Answer", model_out: Path, path: Path, machine: Path | None
+) -> "tuple[Answer, list[str]]":
     """Write the models; return the diagnosis with their errors as they run live, and the lines."""
     from estimation import model_file
+    from rig.cli.extras import as_typed
     from rig.diagnosis.traces import with_cost_of_causal_filters, written_models
 
     done = with_cost_of_causal_filters(done)
     model_file.write_all(written_models(done), model_out)
-    return done, [f"Model: {model_out}", f"To estimate with it: rig model use {model_out}"]
+    # a model in use is one of a configured rig, which a machine of a file alone has not
+    use = ["rig", "model", "use", str(model_out)]
+    if machine is not None:
+        use = ["rig", "replay", str(path), "--machine", str(machine), "--model", str(model_out)]
+    return done, [f"Model: {model_out}", f"To estimate with it: {as_typed(use)}"]
 
 
 def _kept_with(path: Path) -> Path | None:

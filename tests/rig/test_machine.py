@@ -86,6 +86,17 @@ def test_a_table_in_millimetres_and_volts_is_fitted_in_metres_and_newtons(
     assert "drive_force_n" in said(*words, "--speed 0 --json").out
 
 
+def test_a_diagnosis_ends_with_the_replay_of_its_model(slide, tmp_path, said, monkeypatch):
+    monkeypatch.setenv("RIG_STATE_DIR", str(tmp_path / "state"))
+    file, table = slide
+    model = tmp_path / "found.toml"
+    printed = said("diagnose", table, "--quick --machine", file, "--model-out", model).out
+    command = f"rig replay {table} --machine {file} --model {model}"
+    assert command in " ".join(printed.split())
+    assert "model use" not in printed
+    assert "estimate against sensor" in said(command.removeprefix("rig "), "--speed 0").out
+
+
 LOADED = SLIDE.replace(
     "[data]\n",
     """[[sensor]]
