@@ -15,10 +15,13 @@ if TYPE_CHECKING:
     from estimation.recording import Recording
     from rig.importers.table.mapping import Mapping
     from rig.importers.table.preview import Preview
+    from rig.importers.table.raw import Raw
 
 MOST_RUNS = 12
 """Runs listed on the screen; more are counted."""
 
+FIRST, MOST_CELL = 5, 30
+"""Values shown of a column that is not mapped, and characters of each."""
 
 ColumnOption = Annotated[
     list[str] | None,
@@ -75,6 +78,7 @@ def import_(
     The mapping is `[data]` of a machine file or options of this command, which come first. Nothing
     is guessed: a column without a unit is in the SI unit that the channel's name ends in.
     """
+    from rig.importers.table.channels import NotMappedError
     from rig.importers.table.mapping import read_mapping
     from rig.importers.table.open import read_runs
     from rig.importers.table.preview import preview as look
@@ -91,7 +95,13 @@ def import_(
         flags.append((("sample_rate_hz",), rate, f"--rate {rate:g}"))
     mapping = read_mapping(None if machine is None else place_of(machine), flags)
     said: list[Remark] = []
-    recordings = list(read_runs(path, mapping, said))
+    try:
+        recordings = list(read_runs(path, mapping, said))
+    except NotMappedError as error:
+        if not preview:
+            raise
+        present_columns(error.raw, path, json)
+        return
     if not recordings:
         raise UsageError(f"No run of {path} is long enough.", fix="Change least_s or the cuts.")
     found = look(recordings, said)
@@ -110,6 +120,34 @@ def import_(
         remarks().print(f"Check: {line}")
     data = {"preview": found, "written": written, "plots": plots}
     present(json, data, *_tables(found, mapping), *lines)
+
+
+def present_columns(raw: "Raw", path: Path, json: bool) -> None:
+    """Show the columns of a table of which nothing is mapped, and how they are mapped."""
+    from rig.cli.extras import as_typed
+
+    first = {name: values[:FIRST].tolist() for name, values in raw.columns.items()}
+    cells = [(name, *map(_cell, values)) for name, values in first.items()]
+    numbers = map(str, range(1, 1 + max(map(len, first.values()))))
+    new = as_typed(["rig", "machine", "new", "FILE", "--axis", "motor:rad", "--from", str(path)])
+    lines = [f"Single value {name}: {_cell(value)}" for name, value in raw.fields.items()]
+    lines += [f"Note: {remark}." for remark in raw.remarks]
+    lines += [
+        "Nothing is mapped yet. Write a line for each channel into a machine file"
+        f" ({new}), or --column CHANNEL=COLUMN:UNIT:",
+        "[data.columns]",
+        'time_s = "COLUMN:UNIT"',
+        'motor_angle_rad = "COLUMN:UNIT"',
+        "The name of a channel ends in its SI unit. UNIT is that of the column, such as ms, deg or"
+        " mA; without :UNIT the column is in SI units. See docs/your-own-machine.md.",
+    ]
+    table = TextTable(f"Columns of {raw.path.name}", ("column", *numbers), cells)
+    found = {"columns": first, "single_values": raw.fields, "remarks": raw.remarks}
+    present(json, {"preview": None, "written": [], "plots": None, **found}, table, *lines)
+
+
+def _cell(value: float | str) -> str:
+    return value[:MOST_CELL] if isinstance(value, str) else f"{value:.10g}"
 
 
 def _flags(

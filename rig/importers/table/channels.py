@@ -19,6 +19,23 @@ from rig.importers.table.units import BASE, conversion, stated_in_name
 DAY_S, NO_DATE = 86_400.0, date(1970, 1, 1)
 
 
+class NotMappedError(DataError):
+    """Nothing states which column of a table is which channel.
+
+    Attributes:
+        raw: The file.
+    """
+
+    def __init__(self, raw: Raw) -> None:
+        self.raw = raw
+        super().__init__(
+            f"Nothing states which column of {raw.path} is which channel.",
+            raw.listing(),
+            "Map them: --column motor_angle_rad=COLUMN:deg, or [data.columns] in --machine FILE."
+            f" `rig import {raw.path} --preview` lists them with their first values.",
+        )
+
+
 @dataclass(frozen=True)
 class Samples:
     """One file in SI units.
@@ -114,11 +131,7 @@ def _by_name(raw: Raw, mapping: Mapping) -> dict[str, Source]:
     }
     used = {one for formula in mapping.data.formulas.values() for one in names_in(formula)}
     if not set(found) - {TIME} and not used:
-        raise DataError(
-            f"Nothing states which column of {raw.path} is which channel.",
-            raw.listing(),
-            "Map them: --column motor_angle_rad=COLUMN:deg, or [data.columns] in --machine FILE.",
-        )
+        raise NotMappedError(raw)
     return found
 
 

@@ -125,3 +125,17 @@ def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, capsys):
     assert "motor_current_a: it is constant" in answer.err
     assert "motor angle" in page.read_text()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.csv", "p.html"]
+
+
+def test_a_table_of_which_nothing_is_mapped_is_listed(tmp_path, said, answered):
+    table = csv(tmp_path / "bench.csv", t=1e3 * TIME, **{"q [deg]": 90 * WAVE})
+    printed = said("import", table, "--preview").out
+    assert "Columns of bench.csv" in printed
+    (row,) = [line for line in printed.splitlines() if "q [deg]" in line and "│" in line]
+    assert "1.79988" in row
+    assert 'time_s = "COLUMN:UNIT"' in printed
+    assert f"rig machine new FILE --axis motor:rad --from {table}" in " ".join(printed.split())
+    shown = answered("import", table, "--preview")
+    assert shown["columns"]["t"][:2] == [0.0, 10.0]
+    refused = said("import", table, "--out", tmp_path / "logs", code=5).err
+    assert f"rig import {table} --preview" in " ".join(refused.split())
