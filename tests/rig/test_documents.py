@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from estimation.channels import CHANNELS, UNIT_BY_SUFFIX
+from estimation.plant import ACCELERATION, POSITION, SPEED
 from estimation.recording import Flag
 from rig.errors import ExitCode
 
@@ -24,6 +25,15 @@ def rows(document, heading):
 
 
 SIGNS = "signs-and-units.md"
+OF_AN_AXIS = [
+    [quantity, f"`{endings['rad']}`", f"`{endings['m']}`"]
+    for quantity, endings in (
+        ("position", POSITION),
+        ("speed", SPEED),
+        ("acceleration, derived", ACCELERATION),
+        ("effort, load", {"rad": "_n_m", "m": "_n"}),
+    )
+]
 
 
 @pytest.mark.parametrize(
@@ -32,9 +42,10 @@ SIGNS = "signs-and-units.md"
         ("exit-codes.md", "code", [[str(int(c)), c.name.lower()] for c in ExitCode]),
         (SIGNS, "channel", [[f"`{c.name}`", c.unit, c.description] for c in CHANNELS.values()]),
         (SIGNS, "suffix", [[f"`_{suffix}`", unit] for suffix, unit in UNIT_BY_SUFFIX.items()]),
+        ("your-own-machine.md", "quantity of an axis", OF_AN_AXIS),
         (SIGNS, "bit", [[str(int(f)), f.name.lower()] for f in Flag if f]),
     ],
-    ids=["exit codes", "channels", "suffixes", "flags"],
+    ids=["exit codes", "channels", "suffixes", "an axis", "flags"],
 )
 def test_a_table_is_that_of_the_code(document, heading, expected):
     assert [row[: len(expected[0])] for row in rows(document, heading)] == expected
