@@ -137,6 +137,7 @@ class Evidence:
             single run was fitted or the file does not contain it.
         target_range: Least and greatest value of the target in the fit; None where the file does
             not contain it.
+        sample_rate_hz: Median rate of the runs, Hz; None where the file does not contain it.
         made_at: When it was fitted, ISO 8601 with offset from UTC; empty if unknown.
     """
 
@@ -147,6 +148,7 @@ class Evidence:
     seed: int
     run_spread: float | None = None
     target_range: tuple[float, float] | None = None
+    sample_rate_hz: float | None = None
     made_at: str = ""
 
 

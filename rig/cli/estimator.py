@@ -24,6 +24,9 @@ from rig.output.table import TextTable, to_page
 if TYPE_CHECKING:
     from rig.models.adapt import Adaptation
 
+USUAL_HZ = 1000.0
+"""Rate of a header whose estimator's file contains none."""
+
 estimator_app = group("estimator", "Compare estimators.")
 
 
@@ -141,7 +144,10 @@ def export(
     equation: Annotated[
         str | None, Option(help="Equation of a file of several models; the first if none.")
     ] = None,
-    rate: Annotated[float, Option(help="Call rate, Hz.")] = 1000.0,
+    rate: Annotated[
+        float | None,
+        Option(help="Call rate, Hz; that of the fitted recordings, or 1000 where not known."),
+    ] = None,
     json: JsonFlag = False,
 ) -> None:
     """Write an estimator as a self-contained C header, for firmware.
@@ -169,5 +175,9 @@ def export(
             "Models, state estimators and networks can.",
             "Fit one: rig fit PATH --out FILE.toml.",
         )
+    fitted = estimator.model.evidence if isinstance(estimator, ModelEstimator) else None
+    if rate is None:
+        rate = (fitted and fitted.sample_rate_hz) or USUAL_HZ
     write_text_atomic(out, header(estimator, out.stem.replace("-", "_").lower(), rate))
-    present(json, {"header": out}, f"Header: {out}")
+    said = f"Header: {out}, for {rate:g} calls a second"
+    present(json, {"header": out, "rate_hz": rate}, said)

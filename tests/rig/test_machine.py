@@ -84,6 +84,12 @@ def test_a_table_in_millimetres_and_volts_is_fitted_in_metres_and_newtons(
     said("fit", table, "--machine", file, "--out", model)
     words = ("replay", table, "--machine", file, "--model", model)
     assert "drive_force_n" in said(*words, "--speed 0 --json").out
+    header = tmp_path / "slide.h"
+    assert "500 calls a second" in said("export", model, "--out", header).out
+    assert "then every 1 / 500.0 s" in header.read_text()
+    assert "opening" not in header.read_text()
+    said("export", model, "--out", header, "--rate 1000")
+    assert "then every 1 / 1000.0 s" in header.read_text()
 
 
 def test_a_diagnosis_ends_with_the_replay_of_its_model(slide, tmp_path, said, monkeypatch):
