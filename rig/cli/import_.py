@@ -90,9 +90,7 @@ def import_(
             "Nothing states where the recordings are to be written.",
             fix="Add --out FOLDER, or look at the table first with --preview.",
         )
-    flags = _flags(column or [], condition or [], runs or [], set_ or [])
-    if rate is not None:
-        flags.append((("sample_rate_hz",), rate, f"--rate {rate:g}"))
+    flags = _flags(column or [], condition or [], runs or [], set_ or [], rate)
     mapping = read_mapping(None if machine is None else place_of(machine), flags)
     said: list[Remark] = []
     try:
@@ -106,20 +104,24 @@ def import_(
         raise UsageError(f"No run of {path} is long enough.", fix="Change least_s or the cuts.")
     found = look(recordings, said)
     written = [] if preview or out is None else write_logs(recordings, out)
-    if plots is not None:
-        from estimation.campaign import Campaign
-        from rig.output.provenance import Provenance
-        from rig.reports.recordings import page
-
-        write_text_atomic(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
     lines = [f"Note: {line}." for line in found.remarks]
     lines += [] if found.questions else ["Nothing looks wrong."]
-    lines += [] if plots is None else [f"Plots: {plots}"]
+    lines += [] if plots is None else [_plotted(recordings, plots)]
     lines += [f"wrote {len(written)} recordings to {out}"] if written else []
     for line in found.questions:
         remarks().print(f"Check: {line}")
     data = {"preview": found, "written": written, "plots": plots}
     present(json, data, *_tables(found, mapping), *lines)
+
+
+def _plotted(recordings: "list[Recording]", plots: Path) -> str:
+    """Write the page of every channel, and return the line that names it."""
+    from estimation.campaign import Campaign
+    from rig.output.provenance import Provenance
+    from rig.reports.recordings import page
+
+    write_text_atomic(plots, page(Campaign.of(recordings), "Imported table", Provenance.now(0)))
+    return f"Plots: {plots}"
 
 
 def present_columns(raw: "Raw", path: Path, json: bool) -> None:
@@ -151,7 +153,11 @@ def _cell(value: float | str) -> str:
 
 
 def _flags(
-    columns: list[str], conditions: list[str], runs: list[str], others: list[str]
+    columns: list[str],
+    conditions: list[str],
+    runs: list[str],
+    others: list[str],
+    rate: float | None,
 ) -> list[tuple[tuple[str, ...], Any, str]]:
     """Return the options as entries of a mapping, each with the words that state it."""
     found: list[tuple[tuple[str, ...], Any, str]] = []
@@ -170,6 +176,8 @@ def _flags(
             entry = _rule(name, value) if part == "runs" else value
             keys = (part, name.strip()) if part else (name.strip(),)
             found.append((keys, entry, f"{option} {word}"))
+    if rate is not None:
+        found.append((("sample_rate_hz",), rate, f"--rate {rate:g}"))
     return found
 
 
