@@ -71,6 +71,7 @@ class Campaign:
             raise CampaignError(
                 f"Two runs of the campaign share a name: {', '.join(twice)}.",
                 "A run is the unit of evidence and is identified by its name.",
+                "Give each run a name of its own, or omit one of its files.",
             )
 
     @classmethod

@@ -1,9 +1,12 @@
-"""Which program holds a rig, and how it is asked to let go.
+"""Which program holds a rig or records into a folder, and how it is asked to let go.
 
 A program that may arm a rig holds a lock file while it does: `held-HASH.json` in the user's runtime
 folder, named after the rig's URL, locked by the kernel for as long as the program lives, with its
 process number inside. SIGTERM asks such a program to disarm and end (`rig.bench.interrupts`). One
 that does not end in time is killed: a board and a drive then miss the host and stop by themselves.
+
+A folder is held alike while a campaign is recorded into it: its path is then the URL. This holds
+between the programs of one user on one computer.
 
 A simulated rig is held by nobody. Where the system has no such locks nothing is held, and nobody is
 found.
@@ -45,26 +48,26 @@ class Ending:
 
 
 @contextmanager
-def holding(url: str) -> Iterator[None]:
-    """Hold the rig at a URL, so that `rig stop` finds this program.
+def holding(url: str) -> Iterator[bool]:
+    """Hold the rig at a URL, so that `rig stop` finds this program; yield whether it is held now.
 
-    Another program that holds it is left alone: whether two may is the link's affair.
+    Another program that holds it is left alone: whether two may is the caller's affair.
     """
     path = _path(url)
     if fcntl is None or path is None:
-        yield
+        yield True
         return
     with path.open("a+") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            yield
+            yield False
             return
         file.seek(0)
         file.truncate()
         json.dump({"pid": os.getpid(), "url": url}, file)
         file.flush()
-        yield
+        yield True
 
 
 def let_go(url: str) -> Ending | None:

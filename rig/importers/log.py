@@ -25,7 +25,7 @@ class LogImporter:
     the repair record names it. A log whose recorder did not close it is opened too, excluded from
     evidence with the reason. Where a run was tried again, its earlier attempts are left out: a log
     that ended as planned stands for all of that run's logs that did not, and where none did, the
-    last one stands.
+    last one stands. A log that was set aside stands only where no other ended as planned.
     """
 
     name: str = "log"

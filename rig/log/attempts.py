@@ -7,6 +7,9 @@ from rig.log.reader import LogFile, read_log
 from rig.log.repair import repaired_from
 from rig.log.writer import PART_SUFFIX
 
+SET_ASIDE = ".aborted-"
+"""Stands before the number of an attempt that was set aside, in the name of its log."""
+
 
 def heads_of(paths: Sequence[Path]) -> list[LogFile]:
     """Read what is known about logs without their samples.
@@ -21,7 +24,8 @@ def standing(heads: Sequence[LogFile]) -> list[LogFile]:
     """Return the logs that stand for their runs, in the order given.
 
     A repaired log stands in for the file it was made from. Of the attempts at a run those that
-    ended as planned stand, else the last one. A log that does not name its run stands for itself.
+    ended as planned stand, else the last one; one that was set aside stands only where no other
+    ended as planned. A log that does not name its run stands for itself.
     """
     repaired = {original for log in heads if (original := repaired_from(log)) is not None}
     attempts: dict[tuple[Path, str], list[LogFile]] = {}
@@ -31,7 +35,9 @@ def standing(heads: Sequence[LogFile]) -> list[LogFile]:
     kept: set[Path] = set()
     for same in attempts.values():
         planned = [log for log in same if not is_unfinished(log) and log.end and log.end.clean]
-        kept.update(log.path for log in planned or sorted(same, key=started_ns)[-1:])
+        current = [log for log in planned if SET_ASIDE not in log.path.name]
+        last = sorted(planned or same, key=started_ns)[-1:]
+        kept.update(log.path for log in current or last)
     return [log for log in heads if log.path in kept]
 
 

@@ -17,9 +17,11 @@ from pathlib import Path
 
 from calibration.zero import Drift, drift_verdicts
 from estimation.files import write_text_atomic
+from rig.bench.holding import holder, holding
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.errors import SafetyTripError, UsageError
+from rig.log.attempts import SET_ASIDE
 from rig.log.reader import read_log
 from rig.log.run import RunEnd, RunInfo
 from rig.log.streams import COUNTS, SAMPLE
@@ -128,7 +130,10 @@ def open_campaign_folder(
     Raises:
         UsageError: The folder is in use and `resume` was not asked for, or what is in it was
             recorded with another protocol or configuration.
+        UsageError: Another program records into the folder.
     """
+    if holder(str(folder.resolve())) is not None:
+        raise _is_recorded_into(folder)
     folder.mkdir(parents=True, exist_ok=True)
     manifest = folder / MANIFEST
     whole = json.dumps(config.model_dump(), sort_keys=True).encode()
@@ -176,13 +181,30 @@ def record_campaign(
         folder: Folder of the logs.
         notes: Operator's notes, stored in every log.
         on_progress: Called as the samples come.
+
+    Raises:
+        UsageError: Another program records into the folder.
     """
-    for _ in session.rest(REST_S):
-        pass
-    session.settle()
-    epoch_ns = _epoch_ns(session, folder)
-    for plan in plans:
-        yield _record_run(session, plan, _log_path(folder, plan), epoch_ns, notes, on_progress)
+    with holding(str(folder.resolve())) as is_held:
+        if not is_held:
+            raise _is_recorded_into(folder)
+        for _ in session.rest(REST_S):
+            pass
+        session.settle()
+        epoch_ns = _epoch_ns(session, folder)
+        for plan in plans:
+            path = _log_path(folder, plan)
+            if not _is_recorded(path):  # else by a program that ended since the runs were listed
+                yield _record_run(session, plan, path, epoch_ns, notes, on_progress)
+
+
+def _is_recorded_into(folder: Path) -> UsageError:
+    number = holder(str(folder.resolve()))
+    return UsageError(
+        f"{'Another process' if number is None else f'Process {number}'} records into {folder}.",
+        "Two recordings into one folder would take each other's logs for aborted ones.",
+        "Wait until it has ended, or name another folder with --out.",
+    )
 
 
 def _record_run(
@@ -286,7 +308,7 @@ def _set_aside(path: Path) -> None:
         left = path.with_name(path.stem + ending)
         attempts = itertools.count(1)
         while left.exists():
-            aside = path.with_name(f"{path.stem}.aborted-{next(attempts)}{ending}")
+            aside = path.with_name(f"{path.stem}{SET_ASIDE}{next(attempts)}{ending}")
             if not aside.exists():
                 left.rename(aside)
 

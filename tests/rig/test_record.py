@@ -1,7 +1,10 @@
 """Recording a campaign: whole logs, resumable, nothing overwritten."""
 
 import json
+import subprocess
+import sys
 from collections import namedtuple
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -105,6 +108,48 @@ def test_an_aborted_campaign_resumes_and_loses_nothing(tmp_path):
     assert len(read_log(aborted, tolerant=True).topics[COUNTS]) == len(kept)
     assert len(open_campaign(tmp_path).evidence) == 3
     assert all(run.started_at_ns for run in open_campaign(tmp_path))
+
+
+def test_a_folder_that_is_recorded_into_is_refused_to_others(tmp_path):
+    folder = tmp_path / "runs"
+    with behind_a_recording(folder) as number:
+        for resume in (True, False):
+            with pytest.raises(UsageError, match=f"Process {number} records into") as refused:
+                record(folder, resume=resume)
+            assert "--resume" not in refused.value.fix
+        config = simulated()
+        with (
+            pytest.raises(UsageError, match=f"Process {number} records into"),
+            Session(config, transport(config)) as session,
+        ):
+            list(record_campaign(session, short_protocol().any_plans(), folder))
+        assert not list(folder.glob("*.mcap*"))
+    assert len(record(folder, resume=True)) == 3
+
+
+@contextmanager
+def behind_a_recording(folder):
+    """Open a campaign's folder and hold it by another process, which is killed at the end."""
+    open_campaign_folder(folder, short_protocol(), simulated(), resume=False)
+    code = (
+        "import sys\nfrom rig.bench.holding import holding\n"
+        f"with holding({str(folder.resolve())!r}):\n    print('held', flush=True)\n"
+        "    sys.stdin.read()"
+    )
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", code], stdin=pipe, stdout=pipe) as other:
+        assert other.stdout.readline()
+        yield other.pid
+        other.kill()
+
+
+def test_a_run_completed_since_it_was_listed_is_not_made_again(tmp_path):
+    config = simulated()
+    plans = open_campaign_folder(tmp_path, short_protocol(2), config, resume=False)
+    record(tmp_path, protocol=short_protocol(2), resume=True)
+    with Session(config, transport(config)) as session:
+        assert not list(record_campaign(session, plans, tmp_path))
+    assert not list(tmp_path.glob("*aborted*"))
 
 
 def test_nothing_is_overwritten(folder, tmp_path):

@@ -8,6 +8,7 @@ import pytest
 
 from estimation.recording import Recording
 from rig.errors import ExitCode
+from rig.importers.registry import open_campaign
 from rig.log.convert import write_recording
 from rig.log.run import RunEnd, RunInfo
 from rig.log.streams import COUNTS_STREAM
@@ -84,6 +85,14 @@ def test_check_does_not_count_what_was_recorded_again(rig, tmp_path, make_log):
     assert last == "2 of 2 runs complete, 2400 of 2400 samples; 1 superseded log not counted."
     (tmp_path / "a.mcap").unlink()
     assert rig("check", tmp_path, json=True, code=ExitCode.DATA)["superseded"] == []
+
+
+def test_a_whole_log_that_was_set_aside_is_no_second_run(rig, tmp_path, make_log):
+    whole = make_log(tmp_path / "a.mcap")
+    aside = tmp_path / "a.aborted-1.mcap"
+    aside.write_bytes(whole.read_bytes())
+    assert rig("check", tmp_path, json=True)["superseded"] == [str(aside)]
+    assert len(open_campaign(tmp_path).runs) == 1
 
 
 def test_check_names_the_runs_of_a_campaign_that_are_missing(rig, tmp_path):
