@@ -1,7 +1,7 @@
 """`rig machine`: what a machine is, in one file, and what can be identified of it."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
@@ -11,6 +11,7 @@ from rig.errors import ExitCode
 from rig.output.console import JsonFlag, present
 
 if TYPE_CHECKING:
+    from estimation.model import Model
     from estimation.plant import Plant
     from estimation.plant_check import CheckedEquation, CheckedPlant
 
@@ -38,9 +39,21 @@ def show(file: FileArgument, json_: JsonFlag = False) -> None:
 
     plant = read_machine(file)
     models = declared(plant)
-    data = {"machine": plant, "signals": signals(plant), "equations": models}
+    equations = [_equation(model) for model in models]
+    data = {"machine": plant, "signals": signals(plant), "equations": equations}
     lines = (f"{model.balance}: {model.description}" for model in models)
     present(json_, data, to_toml(plant), *lines)
+
+
+def _equation(model: "Model") -> dict[str, Any]:
+    """Return a declared equation as plain types: its effects by id, with their parameters."""
+    effects = [
+        {"id": term.effect.id, "sign": term.sign, "channels": term.channels}
+        | {"parameters": {p.name: term.unit(p, model.target) for p in term.parameters}}
+        for term in model.terms
+    ]
+    about = {key: getattr(model, key) for key in ("name", "balance", "target", "unit")}
+    return {**about, "description": model.description, "effects": effects}
 
 
 @machine_app.command()

@@ -72,6 +72,14 @@ def test_shipped_machines_can_be_declared_and_written_again(name):
     assert parse(to_toml(plant)) == plant
 
 
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_a_shipped_machine_is_shown_as_json(name, answered):
+    shown = answered("machine show", name)
+    assert shown["machine"]["name"] == read_machine(Path(name)).name
+    effects = [effect for equation in shown["equations"] for effect in equation["effects"]]
+    assert all(effect["id"] and effect["parameters"] for effect in effects)
+
+
 def test_a_table_in_millimetres_and_volts_is_fitted_in_metres_and_newtons(
     slide, tmp_path, said, answered
 ):
