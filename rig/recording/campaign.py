@@ -130,11 +130,18 @@ def open_campaign_folder(
     Raises:
         UsageError: The folder is in use and `resume` was not asked for, or what is in it was
             recorded with another protocol or configuration.
-        UsageError: Another program records into the folder.
+        UsageError: Another program records into the folder, or it cannot be made.
     """
     if holder(str(folder.resolve())) is not None:
         raise _is_recorded_into(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"{folder} cannot be made a folder for a campaign.",
+            error.strerror or "",
+            "Name another folder with --out.",
+        ) from error
     manifest = folder / MANIFEST
     whole = json.dumps(config.model_dump(), sort_keys=True).encode()
     described = {

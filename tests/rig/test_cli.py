@@ -69,7 +69,7 @@ def test_an_error_that_nobody_raised_on_purpose_has_its_own_code():
 def test_a_folder_that_cannot_be_made_is_no_fault_of_the_program(tmp_path, said):
     (tmp_path / "file").write_text("no folder")
     printed = said("record --sim -p quick -o", tmp_path / "file" / "a", code=2).err
-    assert f"{tmp_path / 'file' / 'a'} cannot be read or written" in printed
+    assert f"{tmp_path / 'file' / 'a'} cannot be made a folder" in printed
     assert "Traceback" not in printed
 
 

@@ -164,6 +164,14 @@ def test_nothing_is_overwritten(folder, tmp_path):
         record(tmp_path)
 
 
+@pytest.mark.parametrize("place", ["thesis.txt", "thesis.txt/runs", "/dev/null", "/proc/runs"])
+def test_what_can_be_no_folder_is_refused(tmp_path, place, said):
+    (tmp_path / "thesis.txt").write_text("mine")
+    err = said("record --sim -o", tmp_path / place, code=2).err
+    assert "cannot be made a folder" in err
+    assert "--out" in err
+
+
 def test_a_full_disk_is_seen_before_anything_moves(tmp_path, monkeypatch):
     usage = namedtuple("usage", "total used free")
     monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10, 10, 1000))
