@@ -1,5 +1,6 @@
 """Reference a board: give the encoders their counts at the place where the rig stands."""
 
+import math
 from collections.abc import Sequence
 
 from drivers.errors import CommandRefusedError
@@ -16,13 +17,16 @@ INDEX_SAMPLES = 60_000
 """Samples in which the index is waited for."""
 SILENT_READS = 5
 READ_S = 0.2
+MOST_RAD = 200 * math.pi
+"""Largest angle of a mark: a hundred turns."""
 
 
 def require_place(config: Config, here_rad: Sequence[float]) -> None:
     """Refuse a place that the configured rig cannot be referenced at.
 
     Raises:
-        UsageError: The rig's encoders need no reference, or the number of angles is wrong.
+        UsageError: The rig's encoders need no reference, the number of angles is wrong, or one is
+            not an angle of a mark.
     """
     names = machine_of(config).here_channels
     if config.logger.driver == "epos4":
@@ -36,6 +40,13 @@ def require_place(config: Config, here_rad: Sequence[float]) -> None:
             f"{config.name} is referenced by {len(names)} angles; {len(here_rad)} were given.",
             fix=f"Give --at {len(names)} times: {', '.join(names)}.",
         )
+    for name, angle_rad in zip(names, here_rad, strict=True):
+        if not abs(angle_rad) <= MOST_RAD:  # nor is NaN
+            raise UsageError(
+                f"{name} = {angle_rad:g} is not an angle of a mark.",
+                f"An angle of at most {MOST_RAD:.0f} rad, which are 100 turns, can be given.",
+                "Give --at the angle in rad.",
+            )
 
 
 def reference_board(config: Config, here_rad: Sequence[float], at_index: bool = False) -> Identity:

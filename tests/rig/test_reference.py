@@ -45,6 +45,13 @@ def test_a_restarted_board_moves_only_after_the_command(restarted, answered):
     assert played(restarted) < 0.02
 
 
+@pytest.mark.parametrize("angle", ["nan", "inf", "1e9"])
+def test_what_is_not_an_angle_of_a_mark_is_refused(restarted, angle, said):
+    err = said("reference --sim --yes --at", angle, code=2).err
+    assert "not an angle of a mark" in err
+    assert "--at" in err
+
+
 def test_without_a_confirmation_nothing_is_referenced(restarted, monkeypatch, said):
     monkeypatch.setattr("sys.stdin", StringIO("n\n"))
     said("reference --sim", code=130)
