@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from typer import Option
 
-from rig.cli.options import ConfigOption, SimFlag, chosen_rig
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig, require_yes
 from rig.output.console import JsonFlag, emit_json, present, results
 
 YesFlag = Annotated[
@@ -132,10 +132,9 @@ def commission(
     from rig.doctor.commission import commission as checks
 
     settings = chosen_rig(config, sim)
-    if not (yes or settings.is_simulated):
-        typer.confirm(
-            "The jaw is empty, the emergency stop works and is at hand?", abort=True, err=True
-        )
+    require_yes(
+        "The jaw is empty, the emergency stop works and is at hand?", yes or settings.is_simulated
+    )
     screen = results(json)
     made = []
     for check in checks(settings):

@@ -1,9 +1,11 @@
 """Options that several commands share, the names they complete, and the rig that they choose."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import typer
 from typer import Argument, Option
 
 import estimation
@@ -175,6 +177,24 @@ def announced(settings: "Config") -> "Config":
     if settings.is_simulated:
         remarks().print(f"Simulated rig ({settings.name}): nothing real moves or is measured.")
     return settings
+
+
+def require_yes(question: str, yes: bool) -> None:
+    """Ask a person at the terminal, unless `--yes` was given; no for an answer ends the command.
+
+    Raises:
+        UsageError: There is no terminal to ask on.
+        Abort: The person answers no.
+    """
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise UsageError(
+            f"Nobody can answer: {question}",
+            "stdin is not a terminal.",
+            "Run it in a terminal, or add --yes.",
+        )
+    typer.confirm(question, abort=True, err=True)
 
 
 def require_new(path: Path | None) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 from typer import Option
 
-from rig.cli.options import ConfigOption, SimFlag, chosen_rig
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig, require_yes
 from rig.output.console import JsonFlag, present, results
 
 AtOption = Annotated[
@@ -58,15 +58,14 @@ def reference(
     if hard_stop is not None:
         from rig.bench.hard_stop import drive_to_stop
 
-        if not yes:
-            typer.confirm("The motor will turn. Is the jaw empty and clear?", abort=True, err=True)
+        require_yes("The motor will turn. Is the jaw empty and clear?", yes)
         turned_rad = drive_to_stop(settings, hard_stop is Stop.CLOSED)
         results(json).print(f"It turned {turned_rad:+.3f} rad to the {hard_stop} stop.")
     if index:
         typer.echo("Turn the spindle through its index and let go.", err=True)
-    elif not yes:
+    else:
         how = "The motor is off" if hard_stop else "Turn the rig by hand to it and let go"
-        typer.confirm(f"The place is {place}. {how}. Does it stand there?", abort=True, err=True)
+        require_yes(f"The place is {place}. {how}. Does it stand there?", yes)
     identity = reference_board(settings, here_rad, index)
     present(
         json,

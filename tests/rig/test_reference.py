@@ -1,6 +1,7 @@
 """`rig reference` on the firmware core: a restarted board arms only after it and ends a session."""
 
 import dataclasses
+import json
 from io import StringIO
 from pathlib import Path
 
@@ -54,9 +55,17 @@ def test_what_is_not_an_angle_of_a_mark_is_refused(restarted, angle, said):
 
 def test_without_a_confirmation_nothing_is_referenced(restarted, monkeypatch, said):
     monkeypatch.setattr("sys.stdin", StringIO("n\n"))
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
     said("reference --sim", code=130)
     with pytest.raises(CommandRefusedError, match="Run: rig reference"):
         played(restarted)
+
+
+@pytest.mark.parametrize("more", ["", "--hard-stop closed"])
+def test_without_a_terminal_the_answer_is_an_option(restarted, more, monkeypatch, said):
+    monkeypatch.setattr("sys.stdin", StringIO())
+    printed = said("reference --sim --json", more, code=2)
+    assert "--yes" in json.loads(printed.out)["error"]["fix"]
 
 
 def test_the_index_stands_for_the_mark(restarted, said):
