@@ -219,6 +219,8 @@ def _evidence(fitted: Model, runs: list[FitRun], seed: int) -> Evidence:
         target_range=(float(min(map(np.min, targets))), float(max(map(np.max, targets)))),
         # of time stamps, whose rounding a rate of so many digits does not show
         sample_rate_hz=float(f"{np.median([run.whole.sample_rate_hz for run in runs]):.6g}"),
+        rig=", ".join(sorted({run.whole.rig for run in runs} - {""})),
+        is_simulated=any(run.whole.is_simulated for run in runs),
     )
 
 

@@ -139,6 +139,8 @@ class Evidence:
             not contain it.
         sample_rate_hz: Median rate of the runs, Hz; None where the file does not contain it.
         made_at: When it was fitted, ISO 8601 with offset from UTC; empty if unknown.
+        rig: Names of the rigs of the runs, with commas between; empty if unknown.
+        is_simulated: Whether a run was recorded on a simulated rig.
     """
 
     runs: tuple[str, ...]
@@ -150,6 +152,8 @@ class Evidence:
     target_range: tuple[float, float] | None = None
     sample_rate_hz: float | None = None
     made_at: str = ""
+    rig: str = ""
+    is_simulated: bool = False
 
 
 @dataclass(frozen=True)

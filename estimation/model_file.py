@@ -229,8 +229,9 @@ def _lines(model: Model, within: str = "") -> list[str]:
                 stated = {"value": estimate.value, "unit": term.unit(parameter, model.target)}
                 lines += entries({parameter.name: stated | _known(estimate)}, "parameters.")
     if model.evidence is not None:
-        made_at = {"made_at": model.evidence.made_at or None}
-        lines += ["", f"[{within}fit]", *entries(asdict(model.evidence) | made_at)]
+        optional = ("made_at", "rig", "is_simulated")  # left out where nothing is known
+        stated = {key: getattr(model.evidence, key) or None for key in optional}
+        lines += ["", f"[{within}fit]", *entries(asdict(model.evidence) | stated)]
     return lines
 
 

@@ -112,6 +112,7 @@ class Recording:
         calibrations: Calibration name to content hash.
         source: File it was read from.
         excluded: Reason for excluding the run, or None when it counts.
+        is_simulated: Whether it was recorded on a simulated rig, as far as its file states that.
     """
 
     name: str
@@ -128,6 +129,7 @@ class Recording:
     calibrations: Mapping[str, str] = field(default_factory=dict)
     source: str = ""
     excluded: str | None = None
+    is_simulated: bool = False
 
     def __post_init__(self) -> None:
         time_s = read_only(self.time_s)

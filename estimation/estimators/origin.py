@@ -22,6 +22,7 @@ class Origin:
         data: Hash of each run fitted on, by the run's name.
         figures: Errors it was reported with, in SI units, by name.
         adapted_from: Hash of the file of the estimator it was adapted from; empty of a fit.
+        is_simulated: Whether a run was recorded on a simulated rig.
     """
 
     made_at: str
@@ -29,6 +30,7 @@ class Origin:
     data: Mapping[str, str]
     figures: Mapping[str, float] = field(default_factory=dict)
     adapted_from: str = ""
+    is_simulated: bool = False
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return it as a named array."""

@@ -34,6 +34,7 @@ def grip(
     from rig.bench.session import Session
     from rig.live.estimator import ModelEstimator
     from rig.live.grip import SHARE, hold_grip
+    from rig.live.suits import require_channels
     from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
     settings = chosen_rig(config, sim)
@@ -42,6 +43,7 @@ def grip(
     if path is None:
         raise UsageError("No model estimates the torque.", fix="Name one with --model FILE.")
     estimator = ModelEstimator(path, SAMPLE_RATE_HZ)
+    require_channels([estimator], settings, path)
     screen = results(json)
     held = []
     with Session(settings, open_logger(settings)) as session:

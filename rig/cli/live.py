@@ -67,6 +67,7 @@ def live(
     from rig.live.session_blocks import session_blocks
     from rig.live.show import show
     from rig.live.status import model_steps
+    from rig.live.suits import require_channels
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
 
@@ -81,6 +82,8 @@ def live(
     plans = load_protocol(protocol).any_plans() if protocol else []
     model_path = model or settings.model_path
     estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
+    if model_path:
+        require_channels(estimators, settings, model_path)
     options = ShowOptions(
         title=f"rig live: {settings.name}",
         channels=shown_channels(estimators, machine.shown),

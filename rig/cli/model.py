@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from typer import Argument
+from typer import Argument, Option
 
 from estimation.channels import unit_of
 from rig.cli.help import group
@@ -59,14 +59,20 @@ def use(
     ],
     config: ConfigOption = None,
     sim: SimFlag = False,
+    from_simulation: Annotated[
+        bool, Option("--from-simulation", help="Allow a model of simulated recordings.")
+    ] = False,
     json: JsonFlag = False,
 ) -> None:
     """Make a fitted model the one that `rig live`, `grip`, `replay` and `view` estimate with.
 
-    A copy is kept, so the file may change or go. `rig replay` and `rig view` take it for recordings
-    of this rig. --model of a command goes before it.
+    It must read channels of the rig, and a real rig takes none that was fitted on simulated
+    recordings. A copy is kept, so the file may change or go. `rig replay` and `rig view` take it
+    for recordings of this rig. --model of a command goes before it.
     """
     from rig.configuration.chosen import choose_rig
+    from rig.live.estimator import estimators_of
+    from rig.live.suits import require_channels, require_measured
 
     settings = choose_rig(config, sim)
     file = Path(model)
@@ -78,7 +84,11 @@ def use(
             f"Known are: {', '.join(known)}.",
             "Write one with `rig fit LOGS --out FILE` or `rig diagnose LOGS --model-out FILE`.",
         )
-    _choose(settings, source, json)
+    estimators = estimators_of(source, 1000.0)  # refuses what is not a fitted model
+    require_channels(estimators, settings, source)
+    if not from_simulation:
+        require_measured(estimators, settings, source)
+    _choose(settings, source, [one.target_channel for one in estimators], json)
 
 
 @model_app.command()
@@ -86,16 +96,13 @@ def reset(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fa
     """Go back to the model that the configuration names."""
     from rig.configuration.chosen import choose_rig
 
-    _choose(choose_rig(config, sim), None, json)
+    _choose(choose_rig(config, sim), None, [], json)
 
 
-def _choose(settings: "Config", source: Path | None, json: bool) -> None:
+def _choose(settings: "Config", source: Path | None, estimates: list[str], json: bool) -> None:
     """Choose, and print what is in use now and what it replaced."""
     from rig.configuration.model_in_use import choose
-    from rig.live.estimator import estimators_of
 
-    # refuses what is no fitted model
-    estimates = [] if source is None else [e.target_channel for e in estimators_of(source, 1000.0)]
     replaced, was = settings.model_path, _name(settings)
     choose(settings.name, source, now_utc())
     now = settings.model_path

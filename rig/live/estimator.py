@@ -51,6 +51,7 @@ class ModelEstimator:
         self.usual_half_width: float | None = None
         self._settles_s, self._began_s = 0.0, math.nan
         self.instrument = ""  # a physical model has none
+        self.is_of_simulation = False  # as far as the file states where its recordings are from
         self.other_levels: Mapping[str, float] = {}  # conditions of the run that no run fitted had
         if path.suffix == ".npz":
             estimator = load(path)
@@ -61,14 +62,23 @@ class ModelEstimator:
                 self.usual_half_width = interval.typical if interval is not None else None
             if isinstance(estimator, BankEstimator | NetworkEstimator):
                 self.instrument = estimator.instrument
+                origin = estimator.origin
+                self.is_of_simulation = origin is not None and origin.is_simulated
         else:
             models = model_file.read_all(path)
             self.model = next((m for m in models if m.balance == balance), models[0])
             estimator = PhysicalEstimator(self.model)
             self.usual_half_width = usual_half_width(self.model)
+            evidence = self.model.evidence
+            self.is_of_simulation = evidence is not None and evidence.is_simulated
             self._settles_s = 2.0 * self.model.low_pass.reach_s  # as offline, at either end
         self.target_channel = estimator.target
         self._stream: Stepper = estimator.stepper(sample_rate_hz)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels that it reads."""
+        return self._stream.channels
 
     @property
     def half_width(self) -> float | None:
@@ -97,12 +107,12 @@ class ModelEstimator:
         Raises:
             MissingChannelError: The stream lacks a channel that the model needs.
         """
-        absent = [name for name in self._stream.channels if name not in columns]
+        absent = [name for name in self.channels if name not in columns]
         if absent:
             raise MissingChannelError(
                 f"The model needs {', '.join(absent)}, and the stream has no such channel.",
                 f"It has: {', '.join(columns) or 'none'}.",
-                "Choose a model that needs less.",
+                "Choose another with --model or `rig model use`; `rig model reset` undoes that.",
             )
         estimate = self._stream.step(time_s, columns)
         if math.isnan(self._began_s) and len(time_s):

@@ -1,5 +1,7 @@
 """Between a log and a recording: every field of a recording survives the way there and back."""
 
+import json
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +10,7 @@ from numpy.typing import NDArray
 from estimation.recording import FloatArray, Recording
 from rig.errors import DataError
 from rig.log.reader import LogFile
-from rig.log.run import RunEnd, RunInfo
+from rig.log.run import CONFIG, SIMULATED, RunEnd, RunInfo
 from rig.log.streams import SAMPLE, sample_stream
 from rig.log.writer import LogWriter
 
@@ -53,6 +55,7 @@ def run_info(recording: Recording) -> RunInfo:
         calibrations=recording.calibrations,
         source=recording.source,
         excluded=recording.excluded,
+        details={SIMULATED: True} if recording.is_simulated else {},
     )
 
 
@@ -129,7 +132,17 @@ def recording_from_log(log: LogFile) -> Recording:
         calibrations=run.calibrations,
         source=run.source or str(log.path),
         excluded=exclusion(log),
+        is_simulated=bool(run.details.get(SIMULATED)) or _has_simulated_logger(log),
     )
+
+
+def _has_simulated_logger(log: LogFile) -> bool:
+    """Whether the configuration that a log carries is that of a simulated rig."""
+    for item in log.attachments:
+        if item.name == CONFIG:
+            with suppress(ValueError, KeyError, TypeError):
+                return str(json.loads(item.data)["logger"]["url"]).startswith("sim:")
+    return False
 
 
 def exclusion(log: LogFile) -> str | None:

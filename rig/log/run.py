@@ -16,6 +16,11 @@ from estimation.recording import Flag, Instrument, Mark, Stretch
 from rig.errors import DataError
 from rig.log.schema import CHECKSUM_KEY
 
+CONFIG = "config.json"
+"""Attachment of the configuration that a run was recorded with."""
+SIMULATED = "simulated"
+"""Key of a run's details, true where a converted recording is of a simulated rig."""
+
 
 @dataclass(frozen=True)
 class RunInfo:

@@ -32,6 +32,7 @@ def with_origin(
         data={recording.name: data_hash(recording) for recording in campaign.evidence},
         figures=dict(figures),
         adapted_from=file_hash(source) if source is not None else "",
+        is_simulated=any(recording.is_simulated for recording in campaign.evidence),
     )
     return replace(estimator, origin=origin)
 

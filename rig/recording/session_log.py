@@ -15,7 +15,7 @@ from rig.bench.companions import Beside, Companion
 from rig.bench.session import Session
 from rig.log.container import Attached
 from rig.log.recalibrate import ATTACHMENT, ZERO_SUFFIX
-from rig.log.run import RunInfo
+from rig.log.run import CONFIG, RunInfo
 from rig.log.streams import COUNTS, FLIGHT, FLIGHT_STREAM, SAMPLE, sample_stream
 from rig.log.writer import LogWriter
 from rig.machines.reading import Reading
@@ -62,7 +62,7 @@ class SessionLog(LogWriter):
             ),
             streams,
             attachments=[
-                Attached("config.json", "application/json", settings),
+                Attached(CONFIG, "application/json", settings),
                 Attached(ATTACHMENT, "application/json", calibrations.to_json().encode()),
             ],
         )

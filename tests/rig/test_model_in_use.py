@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from estimation import model_file
+from estimation.campaign import Campaign
 from estimation.fitting import fit
 from rig.configuration.config import SHIPPED, load_config
+from rig.configuration.model_in_use import choose
 from rig.importers.registry import open_campaign
 from rig.live.block import through
 from rig.live.estimator import estimators_of
@@ -59,6 +61,42 @@ def test_only_a_fitted_model_is_used(home, said):
     model_file.write(model_file.read(Path("motor")), home / "declared.toml")
     assert "not fitted" in said("model use declared.toml", code=5).err
     assert load_config().model_path == SHIPPED_MODEL
+
+
+def test_a_model_of_another_machine_is_refused(home, said):
+    err = said("model use simulated_grasper --sim", code=2).err
+    assert "which simulated rig does not measure" in err
+    assert load_config().model_path == SHIPPED_MODEL
+
+
+def test_a_model_of_simulated_recordings_is_not_taken_for_a_real_rig(home, said):
+    err = said("model use simulated_grip -c reference", code=2).err
+    assert "fitted on simulated recordings" in err
+    assert "--from-simulation" in err
+    said("model use simulated_grip -c reference --from-simulation")
+    assert load_config(Path("reference")).model_path.stem.startswith("simulated_grip")
+
+
+def test_a_choice_that_does_not_suit_is_named_with_what_takes_it_back(home, said):
+    choose("simulated rig", SHIPPED / "simulated_grasper.model.toml", "2026-01-01")
+    err = said("live --sim --pace 0 --duration 0.1", code=2).err
+    assert "`rig model use` chose it" in err
+    assert "rig model reset" in err
+
+
+def test_a_fit_states_whether_its_runs_were_simulated(home, said):
+    said("record --sim -p still -o runs")
+    recorded = open_campaign(home / "runs").runs[0].recording()
+    assert recorded.is_simulated
+    write_recording(home / "again.mcap", recorded)
+    assert open_campaign(home / "again.mcap").runs[0].recording().is_simulated
+    runs = [run(name, 0.4, 0.1, seed=seed, seconds=3.0) for seed, name in enumerate("ab")]
+    made = Campaign.of(replace(one, rig="b", is_simulated=True) for one in runs)
+    fitted = fit(model_file.read(Path("motor")), made)
+    model_file.write(fitted, home / "m.toml")
+    assert model_file.read(home / "m.toml").evidence == fitted.evidence
+    assert fitted.evidence.rig == "b"
+    assert fitted.evidence.is_simulated
 
 
 def logs(folder: Path) -> Path:
