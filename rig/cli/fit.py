@@ -22,7 +22,7 @@ from rig.cli.options import (
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, progress
 from rig.output.provenance import now_utc
-from rig.output.table import TextTable
+from rig.output.table import TextTable, counted
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from estimation.model import Model
 
 
+FOLDS = 5
 STATE_NODES, THINNED = 12, 24
 """Hidden nodes of a network with physical states, and every how many-th sample it learns from."""
 
@@ -117,7 +118,9 @@ def fit(
     ] = None,
     machine: MachineOption = None,
     out: Annotated[Path | None, Option("--out", "-o", help="File of the fitted model.")] = None,
-    folds: Annotated[int, Option(help="Folds of the error on runs not fitted on.")] = 5,
+    folds: Annotated[
+        int | None, Option(min=2, help="Folds of the error on runs not fitted on. If none: 5.")
+    ] = None,
     seed: SeedOption = 0,
     target: Annotated[
         str, Option(help="Channel to estimate; with --model states or network.")
@@ -143,6 +146,7 @@ def fit(
     require_new(out)
     campaign = open_recordings(path, machine, format_, skip_bad)
     say_left_out(path, campaign)
+    folds = _folds(folds, len(campaign.evidence))
     if model in ("states", "network"):
         _learn(_recipe(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)
         return
@@ -162,6 +166,21 @@ def fit(
     present(json_, told[0] if len(told) == 1 else {"models": told, "out": out}, *said)
 
 
+def _folds(asked: int | None, runs: int) -> int:
+    """Return the number of folds, at most one a run.
+
+    Raises:
+        UsageError: More were asked for than there are runs.
+    """
+    if asked is not None and asked > runs:
+        raise UsageError(
+            f"--folds {asked} cannot be used: there are {counted(runs, 'run')}.",
+            "A fold has at least one run.",
+            f"Give at most {runs}." if runs > 1 else "Omit --folds.",
+        )
+    return min(asked or FOLDS, runs)
+
+
 def _fitted(
     models: "Sequence[Model]", campaign: "Campaign", folds: int, seed: int
 ) -> "list[tuple[Model, HeldOutError | None]]":
@@ -169,7 +188,7 @@ def _fitted(
     from estimation.cross_validation import held_out_error
     from estimation.fitting import fit as fit_model
 
-    folds, several = min(folds, len(campaign.evidence)), len(campaign.evidence) > 1
+    several = len(campaign.evidence) > 1
     done = []
     with progress() as bar:
         task = bar.add_task("fits", total=2 * len(models))

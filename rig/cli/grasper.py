@@ -6,7 +6,7 @@ from typing import Annotated
 from typer import Option
 
 from rig.cli.help import group
-from rig.cli.options import ConfigOption, SeedOption, SimFlag, chosen_rig
+from rig.cli.options import ConfigOption, SeedOption, SimFlag, chosen_rig, require_number
 from rig.output.console import JsonFlag, present, progress, remarks
 from rig.output.table import TextTable
 
@@ -85,6 +85,8 @@ def follow(
     from rig.configuration.check import refuse_problems
     from rig.grasper.follow import follow_master
 
+    require_number("--duration", duration, 0.5)
+    require_number("--scale", scale, 0.01)
     # the simulated rig of this command is the simulated grasper
     settings = chosen_rig(Path("grasper") if sim and config is None else config, sim=False)
     refuse_problems(settings)

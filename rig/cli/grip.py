@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from rig.cli.options import ConfigOption, LiveModel, SimFlag, chosen_rig
+from rig.cli.options import ConfigOption, LiveModel, SimFlag, chosen_rig, require_number
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, present, results
 
@@ -37,6 +37,7 @@ def grip(
     from rig.live.suits import require_channels
     from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
+    require_number("--duration", duration, 8.0)
     settings = chosen_rig(config, sim)
     most_a = SHARE * settings.reference_limits.load_command_a
     path = model or settings.model_path

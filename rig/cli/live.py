@@ -5,12 +5,23 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from rig.cli.options import ConfigOption, LiveModel, PlainFlag, SimFlag, chosen_rig
+from rig.cli.options import (
+    ConfigOption,
+    LiveModel,
+    PlainFlag,
+    SimFlag,
+    chosen_rig,
+    require_number,
+)
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, remarks, results
 
 if TYPE_CHECKING:
     from rig.live.web_server import PageServer
+
+
+SHORTEST_S = 0.001
+"""Shortest duration: one sample of the logger board."""
 
 
 def live(
@@ -73,6 +84,8 @@ def live(
 
     if host and not web:
         raise UsageError("--host is an address of the page.", fix="Add --web.")
+    require_number("--duration", duration, SHORTEST_S)
+    require_number("--pace", pace, 0.0)
     settings = chosen_rig(config, sim)
     refuse_problems(settings)
     remarks().print(f"{settings.name}: starting ...")

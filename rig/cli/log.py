@@ -15,7 +15,7 @@ from rig.output.provenance import utc_of
 from rig.output.table import counted, listed
 
 if TYPE_CHECKING:
-    from rig.log.check import LogReport
+    from rig.log.check import LogReport, TopicReport
     from rig.log.reader import LogFile
     from rig.log.repair import RepairReport
 
@@ -80,7 +80,7 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     said += [f"superseded  {item}: not counted" for item in superseded]
     said += [f"missing     {name}. Record it: rig record --resume {path}" for name in missing]
     whole = sum(report.verdict is Verdict.COMPLETE for report in reports)
-    topics = [topic for report in reports for topic in report.topics]
+    topics = [topic for report in reports for topic in _samples_of(report)]
     received, expected = sum(t.received for t in topics), sum(t.expected for t in topics)
     runs = f"{whole} of {len(reports) + len(missing)} runs complete"
     line = f"{runs}, {received} of {expected} samples"
@@ -90,6 +90,14 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     found = {"logs": reports, "superseded": superseded, "missing_runs": missing}
     present(json, {**found, "no_logs": foreign, "exit_code": int(code)}, *said)
     return int(code)
+
+
+def _samples_of(report: "LogReport") -> "list[TopicReport]":
+    """Return the stream of samples, whose counts are not other samples; else all streams."""
+    from rig.log.streams import SAMPLE
+
+    own = [topic for topic in report.topics if topic.topic == SAMPLE]
+    return own or list(report.topics)
 
 
 def _heads(path: Path) -> "tuple[list[LogFile], list[str]]":

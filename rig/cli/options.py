@@ -1,5 +1,6 @@
 """Options that several commands share, the names they complete, and the rig that they choose."""
 
+import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -195,6 +196,18 @@ def require_yes(question: str, yes: bool) -> None:
             "Run it in a terminal, or add --yes.",
         )
     typer.confirm(question, abort=True, err=True)
+
+
+def require_number(option: str, value: float | None, least: float) -> None:
+    """Refuse a number that is not finite or is below the least; None where none was given.
+
+    Raises:
+        UsageError: It cannot be used.
+    """
+    if value is not None and not least <= value < math.inf:
+        raise UsageError(
+            f"{option} {value:g} cannot be used.", fix=f"Give a finite number from {least:g} on."
+        )
 
 
 def require_new(path: Path | None) -> None:

@@ -1,14 +1,12 @@
 """`rig replay LOG`: the live display on a recording, with any model."""
 
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from rig.cli.options import FormatOption, MachineOption, PlainFlag, ReplayModel
-from rig.errors import UsageError
+from rig.cli.options import FormatOption, MachineOption, PlainFlag, ReplayModel, require_number
 from rig.output.console import JsonFlag, present, remarks, results
 
 if TYPE_CHECKING:
@@ -63,11 +61,7 @@ def replay(
     from rig.live.status import model_steps
     from rig.machines.recordings import open_recordings
 
-    if not 0 <= speed < math.inf:
-        raise UsageError(
-            f"A speed of {speed:g} shows nothing.",
-            fix="Give --speed 1 for real time, 10 for ten times that, 0 for no waiting.",
-        )
+    require_number("--speed", speed, 0.0)
     recording = _choose(open_recordings(log, machine, format_), run, quiet=json_)
     estimators = _estimators(recording, model, any_instrument, quiet=json_)
     options = ShowOptions(

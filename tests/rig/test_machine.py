@@ -253,5 +253,6 @@ def test_no_cause_is_sought_in_a_deflection_from_another_gear_ratio(geared, tmp_
     words = ("diagnose --equation gearbox", runs, "--ledger", tmp_path / "used")
     printed = said(*words, "--json-out", tmp_path / "out.json", code=5).err
     assert "changes 20 times as much as spindle_angle_rad" in printed
+    assert "at most" in said("fit --model gearbox --folds 500", runs, code=2).err
     printed = " ".join(said("fit --model gearbox --folds 2", runs).out.split())
     assert "but the machine states the ratio 35. The values above describe that" in printed

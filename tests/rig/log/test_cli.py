@@ -82,7 +82,7 @@ def test_check_does_not_count_what_was_recorded_again(rig, tmp_path, make_log):
     out = rig("check", tmp_path).out
     assert f"superseded  {tmp_path / 'a.aborted-1.mcap.part'}" in out
     last = out.splitlines()[-1]
-    assert last == "2 of 2 runs complete, 2400 of 2400 samples; 1 superseded log not counted."
+    assert last == "2 of 2 runs complete, 1200 of 1200 samples; 1 superseded log not counted."
     (tmp_path / "a.mcap").unlink()
     assert rig("check", tmp_path, json=True, code=ExitCode.DATA)["superseded"] == []
 
