@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from io import TextIOWrapper
 from typing import Annotated, Any
@@ -196,14 +197,15 @@ def _report(error: Exception, words: list[str]) -> int:
     sys.stderr.write("\n".join(lines) + "\n")
     if "--json" in words:
         whole = {"what": what, "why": why, "fix": fix, "more": more, "exit_code": int(code)}
-        emit_json({"error": whole})
+        with suppress(OSError):  # where stdout cannot be written, stderr has the error
+            emit_json({"error": whole})
     if extra and "--json" not in words and offer(extra):
         sys.stderr.write("Installed. Type the command again.\n")
     return code
 
 
 def run() -> None:
-    """Run the command line as the console script does: exit with its exit code."""
+    """Run the command line and exit with its exit code."""
     if isinstance(sys.stdout, TextIOWrapper):  # as stderr does: a missing letter is not an error
         sys.stdout.reconfigure(errors="backslashreplace")
     sys.exit(main())

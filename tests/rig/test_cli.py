@@ -79,6 +79,41 @@ def test_a_folder_that_cannot_be_made_is_no_fault_of_the_program(tmp_path, said)
     assert "Traceback" not in printed
 
 
+def test_ctrl_c_while_modules_are_loaded_shows_no_traceback():
+    code = """
+import os, signal, sys
+from rig.__main__ import run
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "rig.cli.record":
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+sys.argv = ["rig", "effects"]
+run()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr, done.stdout) == (130, "Interrupted.\n", "")
+
+
+@pytest.mark.parametrize("words", [["effects"], ["effects", "--json"], ["loop", "--json"]])
+def test_a_result_that_cannot_be_written_is_an_error_without_traceback(words, tmp_path):
+    if not Path("/dev/full").exists():
+        pytest.skip("a device that is always full is there on Linux only")
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "rig", *words],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            cwd=tmp_path,
+        )
+    assert done.returncode == ExitCode.USAGE
+    assert done.stderr.count("error: ") == 1
+    assert "Traceback" not in done.stderr
+    assert "Exception" not in done.stderr
+
+
 def verbs(command, words=()):
     """Yield every verb of the command line and its options that take no value."""
     if not getattr(command, "commands", None):
