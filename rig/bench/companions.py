@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import ClockLine, arrival_fit
 from drivers.device import Batch, Device
-from drivers.errors import DriverError
+from drivers.errors import DriverError, LinkTimeoutError
 from rig.bench.devices import open_section
 from rig.configuration.config import Config, is_simulated
 from rig.configuration.sections import DeviceSection
@@ -27,6 +27,8 @@ BATCHES_KEPT = 20_000
 """Batches kept without a reader; older ones are dropped."""
 MOST_READS = 64
 """Most reads of one device a turn; a device that has more waits for the next."""
+SILENCE_S, SILENT_PERIODS = 1.0, 5
+"""With no sample for so long, s, and for so many of its periods, a device is taken for dead."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +66,7 @@ class Companion:
         self._batches: deque[Batch] = deque(maxlen=BATCHES_KEPT)
         self._arrivals: list[tuple[int, float]] = []
         self._refit_at_s = 0.0
+        self._quiet_since_s: float | None = None
         self.line: ClockLine | None = None
         """From sequence over rate to the host's clock, once there are arrivals enough."""
 
@@ -86,7 +89,7 @@ class Companion:
         """Take in what has come by now, without waiting for it.
 
         Raises:
-            DriverError: It is gone, or reports a fault.
+            DriverError: It is gone, silent, or reports a fault.
         """
         due = (now_s - self._began_s) * self.rate_hz
         for _ in range(MOST_READS):
@@ -96,7 +99,8 @@ class Companion:
             if len(batch):
                 self._take(batch, now_s)
             elif not self._in_step:
-                return
+                break
+        self._refuse_silence(now_s)
 
     def take(self) -> Beside:
         """Return the samples since the last call, on the host's clock."""
@@ -129,7 +133,20 @@ class Companion:
             None,
         )
 
+    def _refuse_silence(self, now_s: float) -> None:
+        """Count from the first poll that found nothing: a pause of this computer does not count."""
+        if self._quiet_since_s is None:
+            self._quiet_since_s = now_s
+        longest_s = max(SILENCE_S, SILENT_PERIODS / self.rate_hz)
+        if now_s - self._quiet_since_s > longest_s:
+            raise LinkTimeoutError(
+                f"Device {self.name!r} has sent no sample for {longest_s:g} s.",
+                "Its cable was pulled, it lost its supply, or what it sends is damaged.",
+                "Check its cable and its supply, then start again; nothing recorded is lost.",
+            )
+
     def _take(self, batch: Batch, now_s: float) -> None:
+        self._quiet_since_s = None
         self._newest = int(batch.sequence[-1])
         self._batches.append(batch)
         if self._in_step:

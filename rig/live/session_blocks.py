@@ -1,6 +1,6 @@
 """A session with the rig as the stream of blocks the display shows."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -56,7 +56,7 @@ def session_blocks(
                     estimate = one.push(reading.columns, reading.time_s)
                     estimates[one.target_channel] = estimate
                     recorded[f"{ESTIMATED}{one.target_channel}"] = within_range(one, estimate)
-                logger = _logger_status(session, reading)
+                devices = _device_status(session, reading)
                 limits = _limits(session, reading)
                 hand.obey(replace(reading, columns=recorded))
                 if hand.leaves:
@@ -67,7 +67,7 @@ def session_blocks(
                     reading.flags,
                     estimates,
                     reading.lost,
-                    (logger, calibrations.of(reading), *hand.status()),
+                    (*devices, calibrations.of(reading), *hand.status()),
                     limits,
                 )
 
@@ -137,16 +137,23 @@ def _readings(session: Session, plans: Sequence[Plan], hand: _Hand) -> Iterator[
         yield from session.watch()
 
 
-def _logger_status(session: Session, reading: Reading) -> DeviceStatus:
-    counters = session.counters
-    faults = [
-        f"{counters[name]} {words}"
-        for name, words in (("crc_errors", "bad frames"), ("gaps", "gaps"), ("retries", "retries"))
-        if counters[name]
-    ]
+def _device_status(session: Session, reading: Reading) -> list[DeviceStatus]:
+    """Return the states of the logger and of the further devices, a silent one of which raises."""
     state = "armed" if reading.armed else "disarmed"
-    detail = ", ".join([f"logger {session.identity.serial}", *faults])
-    return DeviceStatus("logger", state, detail)
+    logger = _with_faults(f"logger {session.identity.serial}", session.counters)
+    return [
+        DeviceStatus("logger", state, logger),
+        *(
+            DeviceStatus(one.name, "ok", _with_faults(one.device.name, one.device.counters))
+            for one in session.companions
+        ),
+    ]
+
+
+def _with_faults(device: str, counters: Mapping[str, int]) -> str:
+    named = (("crc_errors", "bad frames"), ("gaps", "gaps"), ("retries", "retries"))
+    faults = [f"{counters[name]} {words}" for name, words in named if counters.get(name)]
+    return ", ".join([device, *faults])
 
 
 def _limits(session: Session, reading: Reading) -> tuple[LimitStatus, ...]:
