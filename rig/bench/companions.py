@@ -20,6 +20,7 @@ from rig.bench.devices import open_section
 from rig.configuration.config import Config, is_simulated
 from rig.configuration.sections import DeviceSection
 from rig.log.schema import Field, Stream
+from rig.machines.safety import check_samples
 
 REFIT_S = 0.5
 ARRIVALS_KEPT = 2000
@@ -55,12 +56,16 @@ class Companion:
         name: Its name in the configuration.
         device: The device, open.
         in_step: It is a fake with a clock of its own, which is to keep step with the logger's.
+        limits: Limit of each limited channel, as `[limits]` names it: `NAME.channel`.
     """
 
-    def __init__(self, name: str, device: Device, in_step: bool) -> None:
+    def __init__(
+        self, name: str, device: Device, in_step: bool, limits: Mapping[str, float]
+    ) -> None:
         self.name = name
         self.device = device
         self._in_step = in_step
+        self._limits = limits
         self._began_s = 0.0
         self._newest = -1
         self._batches: deque[Batch] = deque(maxlen=BATCHES_KEPT)
@@ -74,6 +79,11 @@ class Companion:
     def rate_hz(self) -> float:
         """Its nominal rate."""
         return self.device.channels[0].rate_hz
+
+    @property
+    def channels(self) -> dict[str, str]:
+        """Its channels, by the names that `[limits]` has for them."""
+        return {f"{self.name}.{channel.name}": channel.name for channel in self.device.channels}
 
     def begin(self, now_s: float) -> None:
         """Identify it and let its samples come.
@@ -90,6 +100,7 @@ class Companion:
 
         Raises:
             DriverError: It is gone, silent, or reports a fault.
+            SafetyTripError: A value is beyond its limit. The caller disarms the rig.
         """
         due = (now_s - self._began_s) * self.rate_hz
         for _ in range(MOST_READS):
@@ -149,6 +160,9 @@ class Companion:
         self._quiet_since_s = None
         self._newest = int(batch.sequence[-1])
         self._batches.append(batch)
+        if self._limits:
+            columns = {limit: batch.columns[name] for limit, name in self.channels.items()}
+            check_samples(self._limits, columns, np.full(len(batch), now_s - self._began_s))
         if self._in_step:
             return
         self._arrivals = [*self._arrivals[-ARRIVALS_KEPT:], (self._newest, float(now_s))]
@@ -180,7 +194,8 @@ def open_companions(config: Config) -> list[Companion]:
     try:
         for name, section in config.devices.items():
             device = _open_named(name, section)
-            opened.append(Companion(name, device, in_step=is_simulated(section.url)))
+            limits = {n: v for n, v in config.limits.further.items() if n.startswith(f"{name}.")}
+            opened.append(Companion(name, device, is_simulated(section.url), limits))
     except BaseException:
         for companion in opened:
             companion.device.close()

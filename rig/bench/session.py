@@ -26,6 +26,7 @@ from rig.bench.flight import FlightRecorder
 from rig.bench.holding import holding
 from rig.bench.intake import Intake
 from rig.bench.interrupts import leaving_safely
+from rig.bench.limited import refuse_unknown_limits
 from rig.bench.logger import is_real_time
 from rig.bench.sensor_logger import SensorWay
 from rig.bench.trips import HostWatch, require_same_start, trip_error, tripped
@@ -95,6 +96,7 @@ class Session:
             ways_out.callback(self._stop_streaming)
             for companion in self.companions:
                 companion.begin(self._transport.now_s)
+            refuse_unknown_limits(self.config, self.calibrations, self.companions)
             self._logger.start()
             self._ways_out = ways_out.pop_all()
         return self
@@ -286,8 +288,6 @@ class Session:
 
     def _read(self) -> Reading:
         batch = self._intake.next(self.identity.boot)
-        for companion in self.companions:
-            companion.poll(self._transport.now_s)
         if self._first_tick_us is None:
             self._first_tick_us = int(batch.tick_us[0])
         reading = reading_of(batch, self.calibrations, self.zeros, self._first_tick_us)
@@ -299,7 +299,9 @@ class Session:
             if self._watch is not None and trip is not None:
                 state = "It holds the spindle with a low command" if trip[1] else "It is released"
                 raise self._tripped(self._logger.trip(), f"{state}, until it is cleared.")
-            check_samples(self.config.limits, reading)
+            check_samples(self.config.limits.model_dump(), reading.columns, reading.time_s)
+            for companion in self.companions:
+                companion.poll(self._transport.now_s)
             crossing = self._watch.check(reading) if self._watch else None
             if crossing is not None:
                 raise self._tripped(crossing, "This computer is disarming the rig.")

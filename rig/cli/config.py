@@ -71,15 +71,16 @@ def init(
 
 @config_app.command()
 def check(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
-    """Check keys, ranges, drivers, options, and that devices on a CAN bus get along.
+    """Check keys, ranges, drivers, options, limits, and that devices on a CAN bus get along.
 
     Exit code 2 when the configuration cannot be used; every problem is named.
     """
+    from rig.bench.limited import limit_problems
     from rig.configuration.check import problems
     from rig.configuration.chosen import choose_rig
 
     settings = choose_rig(path, sim)
-    found = problems(settings)
+    found = problems(settings) or limit_problems(settings)
     sound = f"{settings.name} is sound. The logger and further devices: {len(settings.devices)}."
     said = [f"{problem.key}: {problem.what}\n  fix: {problem.fix}" for problem in found]
     data = {"name": settings.name, "sound": not found, "problems": found}

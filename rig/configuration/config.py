@@ -97,7 +97,7 @@ class Config(Section):
         settings = settings_of(profile)
         kinds = {"limits": settings.limits, "drift": settings.drift, "machine": settings.own}
         kind = kinds[str(info.field_name)]
-        takes_any = kind.model_config.get("extra") == "allow"
+        takes_any = getattr(kind, "takes_any", False)
         known = set(kind.model_fields)
         if isinstance(value, dict) and value and not takes_any and not set(value) & known:
             raise ValueError(

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
-from typing import Any
+from typing import Any, ClassVar
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from rig.configuration.sections import MACHINE_SETTINGS, Angle, Current, Positive, Section, Torque
 from rig.errors import UsageError
@@ -14,8 +14,39 @@ from rig.errors import UsageError
 class LimitsSection(Section):
     """Limits checked at every sample, on the absolute value; a crossing ends in the safe state.
 
-    Every key is the name of a channel; which there are depends on `[logger] profile`.
+    Every key is the name of a channel; which there are depends on `[logger] profile`. The channel
+    of a further device is `NAME.channel`.
     """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Positive] = Field(init=False)
+
+    takes_any: ClassVar[bool] = False
+    """Whether a key may be any channel of the device in the logger's place."""
+
+    @property
+    def further(self) -> dict[str, float]:
+        """Limits of channels that the machine does not name: only the devices know them."""
+        return dict(self.__pydantic_extra__)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_a_channel(cls, value: Any) -> Any:
+        """Take `NAME.channel` with and without quotes; refuse a key that no device can have."""
+        if not isinstance(value, dict):
+            return value
+        flat: dict[str, Any] = {}
+        for name, limit in value.items():
+            inner = limit if isinstance(limit, dict) else {}
+            flat |= {f"{name}.{channel}": one for channel, one in inner.items()} or {name: limit}
+        strange = [
+            {"type": "extra_forbidden", "loc": (name,), "input": limit}
+            for name, limit in flat.items()
+            if not (cls.takes_any or "." in name or name in cls.model_fields)
+        ]
+        if strange:
+            raise ValidationError.from_exception_data(cls.__name__, strange)  # type: ignore[arg-type]
+        return flat
 
 
 class DriftSection(Section):
@@ -107,15 +138,13 @@ REFERENCE = MachineSettings(ReferenceLimits, ReferenceDrift, ("teensy", "epos4")
 class SensorLimits(LimitsSection):
     """Limits of any channels of a device without motors."""
 
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, Positive]
+    takes_any = True
 
 
 class DriveLimits(ReferenceLimits):
     """Limits of a drive, whose shaft counts as the spindle, and of any other of its channels."""
 
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, Positive]
+    takes_any = True
 
     proximal_torque_n_m: Torque = 100.0
     distal_torque_n_m: Torque = 100.0

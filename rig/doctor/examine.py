@@ -7,6 +7,7 @@ from drivers.errors import DriverError
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Trip
 from rig.bench.devices import openers
+from rig.bench.limited import limit_problems
 from rig.bench.logger import open_logger
 from rig.bench.trips import WORDS
 from rig.configuration.check import problems
@@ -24,7 +25,7 @@ def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
         config: The expected configuration.
         root: Root of the file system, for the files of the operating system.
     """
-    wrong = problems(config)
+    wrong = problems(config) or limit_problems(config)
     for problem in wrong:
         yield Finding("configuration", problem.key, Level.ERROR, problem.what, problem.fix)
     if not wrong:

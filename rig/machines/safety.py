@@ -1,20 +1,19 @@
 """The limits of the rig: trips, and limits checked by the board itself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
 from drivers.teensy.protocol import TOP, SafeState
 from drivers.teensy.reference import Limits
 from rig.configuration.config import Config
-from rig.configuration.machine_settings import LimitsSection
 from rig.configuration.sections import SafetySection
 from rig.errors import SafetyTripError
 from rig.machines.plausible_counts import jaw_ends_rad, loop_limits, pair_limits
-from rig.machines.reading import Reading
 
 TICK_S = 1e-3
 
@@ -165,14 +164,23 @@ def ticks_of(duration_s: float, tick_s: float) -> int:
     return max(1, round(duration_s / tick_s)) if duration_s else TOP
 
 
-def check_samples(limits: LimitsSection, reading: Reading) -> None:
+def check_samples(
+    limits: Mapping[str, float],
+    columns: Mapping[str, NDArray[np.float64]],
+    time_s: NDArray[np.float64],
+) -> None:
     """Hold every limit against every sample, armed or not; what is not a number is beyond it.
+
+    Args:
+        limits: Channel to its largest absolute value.
+        columns: Values by channel; a limit whose channel is not among them is left out.
+        time_s: Time of each sample in the session.
 
     Raises:
         SafetyTripError: A value is beyond its limit. The caller disarms the rig.
     """
-    for name, limit in limits.model_dump().items():
-        values = reading.columns.get(name)
+    for name, limit in limits.items():
+        values = columns.get(name)
         if values is None or values.size == 0:
             continue
         beyond = ~(np.abs(values) <= limit)  # NaN fails too
@@ -180,6 +188,6 @@ def check_samples(limits: LimitsSection, reading: Reading) -> None:
             worst = int(beyond.argmax())
             raise SafetyTripError(
                 f"{name} reached {abs(values[worst]):.3g}, the limit is {limit:g}.",
-                f"At {reading.time_s[worst]:.3f} s of the session; the rig is being disarmed.",
+                f"At {time_s[worst]:.3f} s of the session; the rig is being disarmed.",
                 "Find out what the jaw met before going on; limits stand under [limits].",
             )

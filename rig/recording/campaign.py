@@ -280,6 +280,8 @@ def _crossing_in(log: SessionLog, session: Session, run_start_us: int) -> Iterat
         newest = session.newest
         if newest is not None and newest.tick_us[0] > run_start_us:
             log.write_reading(newest)
+            for companion in session.companions:
+                log.write_beside(companion.stream().topic, companion.take())
             log.write_flight()
         raise
 

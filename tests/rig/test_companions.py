@@ -6,10 +6,14 @@ import pytest
 
 from drivers.errors import LinkTimeoutError
 from drivers.ft300.fake import Ft300Fake
-from rig.configuration.config import SIMULATED
+from rig.bench.companions import topic
+from rig.bench.session import Session
+from rig.configuration.config import SHIPPED, SIMULATED
+from rig.errors import SafetyTripError
 from rig.log.check import Verdict, check_log
+from rig.log.reader import read_log
 from rig.recording.campaign import open_campaign_folder, record_campaign
-from tests.rig.simulated import session, short_protocol, simulated
+from tests.rig.simulated import is_armed, session, short_protocol, simulated, transport
 
 pytestmark = pytest.mark.integration
 
@@ -19,6 +23,11 @@ FT = '\n[devices.ft]\ndriver = "ft300"\nurl = "sim://"\n'
 def with_ft(**changes):
     """The simulated rig with a force and torque sensor beside it."""
     return simulated().changed(devices={"ft": {"driver": "ft300", "url": "sim://"}}, **changes)
+
+
+def narrow(rig, limits):
+    """Narrow a limit while the rig moves."""
+    rig.companions[0]._limits = limits.further
 
 
 def silenced(monkeypatch, sends=b""):
@@ -52,6 +61,48 @@ def test_one_that_falls_silent_ends_the_recording_and_the_log_is_kept(tmp_path, 
         list(record_campaign(rig, plans, tmp_path))
     (log,) = tmp_path.glob("*.mcap*")
     assert check_log(log).verdict is Verdict.INCOMPLETE
+
+
+def test_a_crossed_limit_of_one_trips_the_rig_and_its_samples_are_in_the_log(tmp_path):
+    config, runs = with_ft(limits={"ft.force_z_n": 1000.0}), short_protocol(1)
+    plans = open_campaign_folder(tmp_path, runs, config, resume=False)
+    link = transport(config)
+    limits = config.changed(limits={"ft.force_z_n": 1.0}).limits
+    with Session(config, link) as rig:
+        campaign = record_campaign(rig, plans, tmp_path, on_progress=lambda *_: narrow(rig, limits))
+        with pytest.raises(SafetyTripError, match=r"ft\.force_z_n reached"):
+            list(campaign)
+        assert not is_armed(link.board)
+    (log,) = tmp_path.glob("*.mcap*")
+    rows = read_log(log, tolerant=True).topics[topic("ft")].rows
+    assert abs(rows["force_z_n"][-1]) > 1.0
+
+
+@pytest.mark.parametrize(
+    ("rig", "limit", "message"),
+    [
+        ("moteus_simulated", "temperatur_k = 303.0", "'temperature_k'"),
+        ("moteus_simulated", '"ft.force_zz_n" = 1.0', "'ft.force_z_n'"),
+        ("moteus_simulated", "ft.force_zz_n = 1.0", "'ft.force_z_n'"),
+        ("simulated", '"gt.force_z_n" = 1.0', "gt.force_z_n"),
+    ],
+)
+def test_a_limit_on_a_channel_that_no_device_has_is_refused(tmp_path, said, rig, limit, message):
+    path = tmp_path / "rig.toml"
+    text = (SHIPPED / f"{rig}.toml").read_text() + FT
+    path.write_text(text.replace("[limits]", f"[limits]\n{limit}"))
+    assert message in said("config check", path, code=2).out
+    printed = said("record -p quick -c", path, "-o", tmp_path / "runs", code=2).err
+    assert message in printed
+    assert "nothing was armed" in printed
+
+
+def test_a_limit_that_no_device_can_have_is_no_key(tmp_path, said):
+    path = tmp_path / "rig.toml"
+    path.write_text(SIMULATED.read_text().replace("[limits]", "[limits]\nmotor_current = 1.0"))
+    assert "did you mean 'motor_current_a'?" in said("config check", path, code=2).err
+    path.write_text(SIMULATED.read_text().replace("[limits]", "[limits]\nft.force_z_n = 1e3") + FT)
+    assert "is sound" in said("config check", path).out
 
 
 def test_one_that_goes_on_sending_is_read_on():

@@ -117,7 +117,7 @@ def test_a_value_that_is_no_number_is_beyond_every_limit():
         reading = next(session.rest(0.1))
     columns = {**reading.columns, "proximal_torque_n_m": np.full(len(reading), np.nan)}
     with pytest.raises(SafetyTripError, match="proximal_torque_n_m reached nan"):
-        check_samples(config.limits, dataclasses.replace(reading, columns=columns))
+        check_samples(config.limits.model_dump(), columns, reading.time_s)
 
 
 @pytest.mark.usefixtures("hang_up_is_heard")
