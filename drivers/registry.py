@@ -95,24 +95,49 @@ OpenFake = Callable[[Faults], Device]
 """Opens a driver on its fake; the given faults strike between the two."""
 
 
-def drivers() -> dict[str, Driver]:
-    """Return every installed driver by name.
+def driver(name: str) -> Driver:
+    """Return the driver of a name; no other is loaded.
 
     Raises:
-        UnknownDriverError: An entry point does not load or is not a driver. None is skipped
-            silently.
+        UnknownDriverError: None is installed, it does not load, or it is not a driver.
     """
-    found = {}
+    every = entry_points(group=DRIVERS)
+    named = every.select(name=name)
+    if not named:
+        known = ", ".join(sorted(every.names))
+        raise UnknownDriverError(f"There is no driver {name!r}.", f"Installed: {known}.")
+    return _driver_of(next(iter(named)))
+
+
+def drivers() -> dict[str, Driver]:
+    """Return every installed driver that loads, by name; the others are in `broken_drivers`."""
+    return {name: one for name, one in _every().items() if isinstance(one, Driver)}
+
+
+def broken_drivers() -> dict[str, UnknownDriverError]:
+    """Return the error of every installed driver that does not load, by name."""
+    return {name: one for name, one in _every().items() if isinstance(one, UnknownDriverError)}
+
+
+def _every() -> dict[str, Driver | UnknownDriverError]:
+    found: dict[str, Driver | UnknownDriverError] = {}
     for entry in sorted(entry_points(group=DRIVERS)):
-        driver = _load(entry)
-        if not isinstance(driver, Driver) or driver.name != entry.name:
-            raise UnknownDriverError(
-                f"{entry.value} is not the driver {entry.name!r}.",
-                f"Expected a drivers.registry.Driver of the name {entry.name!r}.",
-                f"Install {_package(entry)} again, or remove it.",
-            )
-        found[entry.name] = driver
+        try:
+            found[entry.name] = _driver_of(entry)
+        except UnknownDriverError as error:
+            found[entry.name] = error
     return found
+
+
+def _driver_of(entry: EntryPoint) -> Driver:
+    loaded = _load(entry)
+    if not isinstance(loaded, Driver) or loaded.name != entry.name:
+        raise UnknownDriverError(
+            f"{entry.value} of {_package(entry)} is not the driver {entry.name!r}.",
+            f"Expected a drivers.registry.Driver of the name {entry.name!r}.",
+            f"Install {_package(entry)} again, or remove it.",
+        )
+    return loaded
 
 
 def fakes() -> dict[str, OpenFake]:
@@ -154,27 +179,24 @@ def open_device(name: str, url: str, **options: Any) -> Device:
         **options: The driver's own options.
 
     Raises:
-        UnknownDriverError: No driver has this name.
+        UnknownDriverError: No driver has this name, or it does not load.
         DriverError: The driver has no such option.
         LinkError: The link cannot be opened.
     """
-    known = drivers()
-    if name not in known:
-        raise UnknownDriverError(f"There is no driver {name!r}.", f"Installed: {', '.join(known)}.")
-    driver = known[name]
-    strange = sorted(set(options) - set(driver.options))
+    named = driver(name)
+    strange = sorted(set(options) - set(named.options))
     if strange:
         raise DriverError(
             f"The driver {name} has no option {', '.join(strange)}.",
-            f"Its options are: {', '.join(driver.options) or 'none'}.",
+            f"Its options are: {', '.join(named.options) or 'none'}.",
         )
-    return driver.open(url, **options)
+    return named.open(url, **options)
 
 
 def _load(entry: EntryPoint) -> Any:
     try:
         return entry.load()
-    except (ImportError, AttributeError) as error:
+    except Exception as error:  # a module of another package may raise anything
         raise UnknownDriverError(
             f"The driver {entry.name!r} of {_package(entry)} cannot be loaded: {error}.",
             f"Its entry point is {entry.value}.",

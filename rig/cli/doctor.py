@@ -53,7 +53,7 @@ def doctor(
 
 def devices(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> None:
     """List serial ports, CAN interfaces, installed drivers, and what is configured."""
-    from drivers.registry import drivers
+    from drivers.registry import broken_drivers, drivers
     from rig.configuration.check import LOGGER
     from rig.configuration.chosen import choose_rig, default_config
     from rig.doctor.ports import can_interfaces, serial_ports
@@ -74,7 +74,10 @@ def devices(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = 
     said += [f"configured  {name}: {s.driver} at {s.url}" for name, s in configured.items()]
     width = max(map(len, texts))
     said += [f"driver      {name:{width}}  {text}" for name, text in texts.items()]
-    data = {"serial_ports": ports, "can_interfaces": buses, "drivers": texts, "configured": named}
+    broken = {name: error.what for name, error in broken_drivers().items()}
+    said += [f"broken      {name}  {text}" for name, text in broken.items()]
+    data: dict[str, Any] = {"serial_ports": ports, "can_interfaces": buses}
+    data |= {"drivers": texts, "broken_drivers": broken, "configured": named}
     present(json, data, *said)
 
 

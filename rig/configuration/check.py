@@ -12,7 +12,7 @@ from urllib.parse import parse_qsl
 from pydantic import ConfigDict, ValidationError, create_model
 
 from calibration.linear import SHIPPED as SHIPPED_CALIBRATIONS
-from drivers.registry import Driver, drivers, fakes
+from drivers.registry import Driver, UnknownDriverError, driver, fakes
 from rig.configuration.config import SHIPPED, Config, is_simulated
 from rig.configuration.machine_settings import settings_of
 from rig.configuration.sections import DeviceSection
@@ -40,11 +40,8 @@ class Problem:
 
 def problems(config: Config) -> list[Problem]:
     """Return the problems of a configuration beyond its keys and ranges; empty when sound."""
-    known = drivers()
     sections: dict[str, DeviceSection] = {LOGGER: config.logger, **config.devices}
-    found = [
-        p for name, section in sections.items() for p in _driver_problems(name, section, known)
-    ]
+    found = [p for name, section in sections.items() for p in _driver_problems(name, section)]
     carried_by = settings_of(config.logger.profile).drivers
     if carried_by is not None and config.logger.driver not in carried_by:
         what = f"The driver {config.logger.driver} cannot run a {config.logger.profile}."
@@ -54,7 +51,7 @@ def problems(config: Config) -> list[Problem]:
         found.append(Problem(f"devices.{LOGGER}", "The name is the logger's.", "Choose another."))
     found += _name_problems(config)
     sound = {n: s for n, s in sections.items() if not any(p.key == _key(n) for p in found)}
-    return found + _bus_problems(sound, known)
+    return found + _bus_problems(sound)
 
 
 def refuse_problems(config: Config) -> None:
@@ -93,37 +90,36 @@ def _unknown(key: str, name: str, known: list[str]) -> Problem:
     return Problem(key, f"There is no {key} {name!r}: neither a file nor shipped.", fix)
 
 
-def _driver_problems(
-    name: str, section: DeviceSection, known: Mapping[str, Driver]
-) -> list[Problem]:
+def _driver_problems(name: str, section: DeviceSection) -> list[Problem]:
     key = _key(name)
-    driver = known.get(section.driver)
-    if driver is None:
-        return [Problem(key, f"There is no driver {section.driver!r}.", _one_of(known))]
-    found = _option_problems(key, driver, section.options)
-    if is_simulated(section.url) and driver.name not in fakes():
-        what = f"The driver {driver.name} has no fake."
+    try:
+        named = driver(section.driver)
+    except UnknownDriverError as error:
+        return [Problem(key, error.what, error.fix or error.why)]
+    found = _option_problems(key, named, section.options)
+    if is_simulated(section.url) and named.name not in fakes():
+        what = f"The driver {named.name} has no fake."
         found.append(Problem(key, what, "Write the url of the device in place of sim://."))
     on_can = section.url.startswith("can:")
-    if not is_simulated(section.url) and on_can and driver.can is None:
-        found.append(Problem(key, f"The driver {driver.name} is on no CAN bus.", "Change its url."))
-    if not is_simulated(section.url) and driver.can is not None and not on_can:
-        what = f"The driver {driver.name} needs a CAN bus."
+    if not is_simulated(section.url) and on_can and named.can is None:
+        found.append(Problem(key, f"The driver {named.name} is on no CAN bus.", "Change its url."))
+    if not is_simulated(section.url) and named.can is not None and not on_can:
+        what = f"The driver {named.name} needs a CAN bus."
         found.append(Problem(key, what, "Write e.g. can:socketcan:can0."))
     return found
 
 
-def _option_problems(key: str, driver: Driver, options: Mapping[str, Any]) -> list[Problem]:
+def _option_problems(key: str, named: Driver, options: Mapping[str, Any]) -> list[Problem]:
     """Hold options against the types and ranges of the parameters they become."""
-    parameters = list(inspect.signature(driver.open, eval_str=True).parameters.values())[1:]
+    parameters = list(inspect.signature(named.open, eval_str=True).parameters.values())[1:]
     fields: dict[str, Any] = {
         p.name: (Any if p.annotation is p.empty else p.annotation, p.default) for p in parameters
     }
     rules = ConfigDict(extra="forbid", strict=True, arbitrary_types_allowed=True)
     try:
-        create_model(driver.name, __config__=rules, **fields).model_validate(options)
+        create_model(named.name, __config__=rules, **fields).model_validate(options)
     except ValidationError as error:
-        what = f"Options of the driver {driver.name}: {explain(error, fields)}"
+        what = f"Options of the driver {named.name}: {explain(error, fields)}"
         return [Problem(key, what, _one_of(fields))]
     return []
 
@@ -137,17 +133,18 @@ class _OnBus:
     bit_rate: int
 
 
-def _bus_problems(
-    sections: Mapping[str, DeviceSection], known: Mapping[str, Driver]
-) -> list[Problem]:
+def _bus_problems(sections: Mapping[str, DeviceSection]) -> list[Problem]:
     buses: dict[str, list[_OnBus]] = {}
     found = []
     for name, section in sections.items():
-        use = known[section.driver].can
-        if use is None or not section.url.startswith("can:"):
+        if not section.url.startswith("can:"):
+            continue
+        named = driver(section.driver)
+        use = named.can
+        if use is None:
             continue
         bus, _, query = section.url.partition("?")
-        options = {**known[section.driver].options, **section.options}
+        options = {**named.options, **section.options}
         place = _OnBus(name, use.identifiers(options), section.bit_rate or use.bit_rate)
         said = dict(parse_qsl(query)).get("bitrate")
         if said is not None and said != str(place.bit_rate):

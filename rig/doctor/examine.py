@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from drivers.errors import DriverError
+from drivers.registry import broken_drivers
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Trip
 from rig.bench.devices import openers
@@ -30,6 +31,8 @@ def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
         yield Finding("configuration", problem.key, Level.ERROR, problem.what, problem.fix)
     if not wrong:
         yield Finding("configuration", "sound", Level.OK, f"{config.name} is sound.")
+    for driver, error in broken_drivers().items():
+        yield Finding("drivers", driver, Level.WARNING, error.what, error.fix)
     yield from port_findings(serial_ports(), root)
     if wrong:
         return  # it would be opened as it must not be

@@ -7,7 +7,7 @@ import math
 from dataclasses import replace
 from typing import Self
 
-from drivers.registry import drivers
+from drivers.registry import driver
 from drivers.teensy.profile import Profile
 from drivers.teensy.reference import REFERENCE
 from rig.configuration.config import Config
@@ -75,9 +75,10 @@ def rate_of(config: Config) -> float:
     """Return the rate a device is asked at, by its options; 1000 Hz where it has none.
 
     A fake is opened without options.
+
+    Raises:
+        UnknownDriverError: The driver is not installed, or does not load.
     """
     section = config.logger
-    driver = drivers().get(section.driver)
-    own = driver.options if driver else {}
     asked = {} if config.is_simulated else section.options
-    return float({**own, **asked}.get("rate_hz", SAMPLE_RATE_HZ))
+    return float({**driver(section.driver).options, **asked}.get("rate_hz", SAMPLE_RATE_HZ))

@@ -7,10 +7,13 @@ import pytest
 
 from drivers.device import LinkedDevice
 from drivers.errors import DriverError
-from drivers.registry import UnknownDriverError, drivers, open_device
+from drivers.registry import UnknownDriverError, broken_drivers, driver, drivers, open_device
 from rig.bench.devices import open_section
+from rig.cli.main import main
 from rig.configuration.check import problems
 from rig.configuration.config import Config, load_config
+from rig.doctor.examine import examine
+from rig.doctor.finding import Level
 
 MODULE = '''
 """A scale on a serial line."""
@@ -59,11 +62,40 @@ def test_a_missing_fake_is_reported_where_one_is_required(tmp_path, monkeypatch)
         open_section(config.devices["scale"])
 
 
-@pytest.mark.parametrize("entry", ["acme_scale:NONE", "acme_nonesuch:DRIVER", "acme_scale:MODULE"])
-def test_a_broken_one_names_its_package(tmp_path, monkeypatch, entry):
+BROKEN = ["acme_scale:NONE", "acme_nonesuch:DRIVER", "acme_scale:open_scale", "acme_bad:DRIVER"]
+
+
+@pytest.mark.parametrize("entry", BROKEN)
+def test_a_broken_one_names_its_package_and_stops_no_other(tmp_path, monkeypatch, entry):
+    (tmp_path / "acme_bad.py").write_text("1 / 0")
     install(tmp_path, monkeypatch, entry)
     with pytest.raises(UnknownDriverError, match=r"acme"):
-        drivers()
+        driver("acme-scale")
+    with pytest.raises(UnknownDriverError, match=r"acme"):
+        open_device("acme-scale", "/dev/ttyS9")
+    (problem,) = problems(with_scale("/dev/ttyS9"))
+    assert "acme" in problem.what
+    assert set(broken_drivers()) == {"acme-scale"}
+    assert "acme-scale" not in drivers()
+    assert driver("teensy").name == "teensy"
+    assert not problems(load_config())
+
+
+def test_the_doctor_reports_a_broken_one_and_goes_on(tmp_path, monkeypatch):
+    install(tmp_path, monkeypatch, "acme_nonesuch:DRIVER")
+    findings = list(examine(load_config()))
+    (broken,) = (f for f in findings if f.subject == "drivers")
+    assert broken.level is Level.WARNING
+    assert "acme_nonesuch" in broken.what
+    assert any(f.subject == "logger" for f in findings)
+
+
+def test_the_list_of_devices_has_a_broken_one(tmp_path, monkeypatch, capsys):
+    install(tmp_path, monkeypatch, "acme_nonesuch:DRIVER")
+    assert main(["devices", "--sim"]) == 0
+    out = capsys.readouterr().out
+    assert "acme_nonesuch" in out
+    assert "teensy" in out
 
 
 def test_a_driver_that_cannot_stop_its_device_cannot_be_made():
