@@ -7,6 +7,7 @@ import numpy as np
 
 from drivers.counters import LinkCounters
 from drivers.device import Channel, Device
+from drivers.errors import DriverError
 from drivers.teensy.driver import ClockExchange, SampleBatch
 from drivers.teensy.protocol import Identity, Trip, TripReport
 from drivers.transport.simulated import Pace
@@ -14,6 +15,12 @@ from rig.errors import UsageError
 
 FLAGS = "flags"
 """Field of a device's own `SampleFlag` bits among the samples."""
+RATE_S, RATE_SAMPLES = 5.0, 20
+"""A rate is measured over so long, s, and over so many samples."""
+RATE_TOLERANCE = 0.05
+SETTLE_S = 1.0
+"""After a start and after a pause what had gathered is read this long, s, before rates count."""
+PAUSE_S = 0.5
 _HEAD = (("sequence", "<u4"), ("tick_us", "<u4"), ("status", "<u2"), (FLAGS, "u1"))
 
 
@@ -56,6 +63,50 @@ class SensorWay:
     read = write = refuse
 
 
+class RateWatch:
+    """Compares the rate at which samples arrive with the one that makes their times.
+
+    Args:
+        name: The device in messages.
+        rate_hz: Its nominal rate.
+    """
+
+    def __init__(self, name: str, rate_hz: float) -> None:
+        self._name = name
+        self._rate_hz = rate_hz
+        self._span_s = max(RATE_S, RATE_SAMPLES / rate_hz)
+        self._first: tuple[int, float] | None = None
+        self._read_s = self._settled_s = -np.inf
+
+    def check(self, asked_s: float, arrived_s: float, sequence: int | None) -> None:
+        """Take one read.
+
+        Args:
+            asked_s: When the read began.
+            arrived_s: When it ended.
+            sequence: Number of its newest sample; None without one.
+
+        Raises:
+            DriverError: The rates differ by more than `RATE_TOLERANCE`.
+        """
+        if asked_s - self._read_s > PAUSE_S:  # samples that nobody reads may be lost uncounted
+            self._first, self._settled_s = None, asked_s + SETTLE_S
+        self._read_s = arrived_s
+        if sequence is None or arrived_s < self._settled_s:
+            return
+        first_sequence, first_s = self._first = self._first or (sequence, arrived_s)
+        if arrived_s - first_s < self._span_s:
+            return
+        rate_hz = (sequence - first_sequence) / (arrived_s - first_s)
+        self._first = (sequence, arrived_s)
+        if abs(rate_hz - self._rate_hz) > RATE_TOLERANCE * self._rate_hz:
+            raise DriverError(
+                f"The {self._name} sends {rate_hz:.4g} Hz; {self._rate_hz:.4g} Hz is configured.",
+                "Its samples have no times of their own: those of the recording would be wrong.",
+                "Set the rate on the device, or `rate_hz` in the options of [logger].",
+            )
+
+
 class SensorLogger:
     """A device without motors, with the calls of `TeensyLogger` that a session makes.
 
@@ -70,6 +121,7 @@ class SensorLogger:
         self.arm = self.queue = way.refuse
         self._first_s: float | None = None
         self._next = 0
+        self._rate_watch: RateWatch | None = None
         self.channels: tuple[Channel, ...] = ()
         self.last_exchange: ClockExchange | None = None
 
@@ -83,6 +135,8 @@ class SensorLogger:
         """Ask who is there."""
         found = self._device.identify()
         self.channels = self._device.channels
+        if not self._way.is_simulated:
+            self._rate_watch = RateWatch(self._device.name, self.channels[0].rate_hz)
         serial = " ".join(part for part in (found.model, found.serial) if part)
         return Identity(serial, found.firmware, 0)
 
@@ -99,14 +153,21 @@ class SensorLogger:
     def read(self, timeout_s: float) -> SampleBatch:
         """Return the samples that have come, waiting at most `timeout_s` for the first.
 
-        Times are the device's own where it has a clock, else by its nominal rate.
+        Times are the device's own where it has a clock, else by its nominal rate, which real
+        time must confirm.
+
+        Raises:
+            DriverError: The device fails, or has another rate.
         """
-        before_s = self._way.now_s
+        before_s, asked_s = self._way.now_s, monotonic()
         batch = self._device.read(timeout_s)
         rate_hz = self.channels[0].rate_hz
         count = int(batch.sequence[-1]) + 1 - self._next if len(batch) else 0
         self._next += count
         self._way.pass_time(count / rate_hz if len(batch) else timeout_s)
+        if self._rate_watch is not None and batch.clock == "host":
+            newest = int(batch.sequence[-1]) if len(batch) else None
+            self._rate_watch.check(asked_s, self._way.now_s, newest)
         dtype = np.dtype([*_HEAD, *((c.name, "<f8") for c in self.channels)])
         samples = np.zeros(len(batch), dtype)
         if not len(batch):
