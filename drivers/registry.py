@@ -15,6 +15,7 @@ from pydantic import Field
 
 from drivers.device import Clocked, Device
 from drivers.errors import DriverError, LinkError
+from drivers.guarded import blaming, guarded
 from drivers.transport.faulty import Faults
 
 RateOption = Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False)]
@@ -101,12 +102,25 @@ def driver(name: str) -> Driver:
     Raises:
         UnknownDriverError: None is installed, it does not load, or it is not a driver.
     """
+    return _driver_of(_entry(name))
+
+
+def _entry(name: str) -> EntryPoint:
     every = entry_points(group=DRIVERS)
-    named = every.select(name=name)
-    if not named:
+    if name not in every.names:
         known = ", ".join(sorted(every.names))
         raise UnknownDriverError(f"There is no driver {name!r}.", f"Installed: {known}.")
-    return _driver_of(next(iter(named)))
+    return every[name]
+
+
+def _opened(entry: EntryPoint, open_it: Callable[[], Device]) -> Device:
+    """Open a device; the errors of a driver that is not of this room name it."""
+    if entry.module.partition(".")[0] == __name__.partition(".")[0]:
+        return open_it()
+    title = f"the driver {entry.name} of {_package(entry)}"
+    with blaming(title):
+        device = open_it()
+    return guarded(device, title)
 
 
 def drivers() -> dict[str, Driver]:
@@ -166,8 +180,8 @@ def open_fake(name: str) -> Device:
 
 
 def _open_fake(entry: EntryPoint, faults: Faults) -> Device:
-    device: Device = _load(entry)(faults)
-    return device
+    open_it = _load(entry)
+    return _opened(entry, lambda: open_it(faults))
 
 
 def open_device(name: str, url: str, **options: Any) -> Device:
@@ -183,14 +197,15 @@ def open_device(name: str, url: str, **options: Any) -> Device:
         DriverError: The driver has no such option.
         LinkError: The link cannot be opened.
     """
-    named = driver(name)
+    entry = _entry(name)
+    named = _driver_of(entry)
     strange = sorted(set(options) - set(named.options))
     if strange:
         raise DriverError(
             f"The driver {name} has no option {', '.join(strange)}.",
             f"Its options are: {', '.join(named.options) or 'none'}.",
         )
-    return named.open(url, **options)
+    return _opened(entry, lambda: named.open(url, **options))
 
 
 def _load(entry: EntryPoint) -> Any:

@@ -1,5 +1,6 @@
 """A driver of another package: found by its entry point, opened, and named when it is broken."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -11,29 +12,55 @@ from drivers.registry import UnknownDriverError, broken_drivers, driver, drivers
 from rig.bench.devices import open_section
 from rig.cli.main import main
 from rig.configuration.check import problems
-from rig.configuration.config import Config, load_config
+from rig.configuration.config import SIMULATED, Config, load_config
 from rig.doctor.examine import examine
 from rig.doctor.finding import Level
 
 MODULE = '''
 """A scale on a serial line."""
+import numpy as np
+from drivers.device import Batch, Channel, DeviceIdentity
 from drivers.errors import PortNotFoundError
 from drivers.registry import Driver
 
 def open_scale(url: str, rate_hz: float = 10.0):
     raise PortNotFoundError(f"no scale at {url}, {rate_hz} Hz")
 
+class Scale:
+    name = "scale"
+    channels = (Channel("force_n", "N", 10.0, -1.0, 1.0, "load"),)
+    counters = {}
+    def __init__(self, faults):
+        self.sent = 0
+    def identify(self):
+        return DeviceIdentity("scale", "1", "")
+    def start(self): ...
+    def stop(self): ...
+    def close(self): ...
+    def read(self, timeout_s):
+        numbers = np.array([self.sent])
+        self.sent += 1
+        zero = np.zeros(1)
+        return Batch({"force_n": zero}, zero, "host", numbers, np.zeros(1, np.uint8), 0)
+
 DRIVER = Driver("acme-scale", "ACME bench scale", open_scale)
 '''
 
 
-def install(folder: Path, monkeypatch: pytest.MonkeyPatch, entry: str) -> None:
+FAKE = "[rig.driver_fakes]\nacme-scale = acme_scale:Scale\n"
+
+
+def install(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, entry: str, change: tuple[str, str] = ("", "")
+) -> None:
     """Put a package with one driver on the path, as pip would."""
-    (folder / "acme_scale.py").write_text(MODULE)
+    (folder / "acme_scale.py").write_text(MODULE.replace(*change) if change[0] else MODULE)
     info = folder / "acme-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[rig.drivers]\nacme-scale = {entry}\n")
+    (info / "entry_points.txt").write_text(
+        f"[rig.drivers]\nacme-scale = {entry}\n{FAKE if change[0] else ''}"
+    )
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delitem(sys.modules, "acme_scale", raising=False)
 
@@ -96,6 +123,35 @@ def test_the_list_of_devices_has_a_broken_one(tmp_path, monkeypatch, capsys):
     out = capsys.readouterr().out
     assert "acme_nonesuch" in out
     assert "teensy" in out
+
+
+FAULTS = {
+    "a key": ("self.sent += 1", "self.sent += {}['n']", r"failed: KeyError: 'n'.*in read"),
+    "a method": ("def identify", "def identity", "AttributeError.*identify"),
+    "the making": ("self.sent = 0", "1 / 0", "ZeroDivisionError"),
+    "the channels": ("    channels", "    chanels", "AttributeError.*channels"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "message"), FAULTS.values(), ids=FAULTS)
+@pytest.mark.parametrize("place", ["logger", "beside"])
+def test_a_fault_of_one_names_it(tmp_path, monkeypatch, capsys, place, old, new, message):
+    install(tmp_path, monkeypatch, "acme_scale:DRIVER", (old, new))
+    assert main(["record", "-c", rig_with_scale(tmp_path, place), "-o", str(tmp_path / "r")]) == 3
+    said = capsys.readouterr().err
+    assert re.search(f"driver acme-scale of acme .*{message}", said, re.DOTALL)
+
+
+def rig_with_scale(folder: Path, place: str) -> str:
+    """Write a configuration with the scale in the logger's place, or beside it."""
+    path = folder / "rig.toml"
+    scale = 'driver = "acme-scale"\nurl = "sim://"\n'
+    if place == "logger":
+        head = 'name = "scale"\ncalibration = "sensor"\n[logger]\nprofile = "sensor"\n'
+        path.write_text(head + scale)
+    else:
+        path.write_text(f"{SIMULATED.read_text()}\n[devices.scale]\n{scale}")
+    return str(path)
 
 
 def test_a_driver_that_cannot_stop_its_device_cannot_be_made():

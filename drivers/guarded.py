@@ -1,0 +1,147 @@
+"""A device whose driver is of another package: whatever the driver raises names it."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from traceback import extract_tb
+from typing import Any
+
+from drivers.device import Axis, Batch, Channel, Device, DeviceIdentity, Drive
+from drivers.errors import DriverError
+
+
+class ForeignDriverError(DriverError):
+    """A driver of another package has a fault."""
+
+
+@contextmanager
+def blaming(title: str) -> Iterator[None]:
+    """Raise a fault of a driver as an error that names the driver.
+
+    Args:
+        title: The driver and its package, such as `the driver acme of acme-drivers`.
+
+    Raises:
+        ForeignDriverError: The driver raised it.
+    """
+    try:
+        yield
+    except DriverError:
+        raise
+    except Exception as error:
+        place = extract_tb(error.__traceback__)[-1]
+        raise ForeignDriverError(
+            f"{title[0].upper()}{title[1:]} failed: {type(error).__name__}: {error}.",
+            f"It was raised in {place.name}, {place.filename}, line {place.lineno}.",
+            "Report it to those who made the package, or install another version of it.",
+        ) from error
+
+
+def guarded(device: Device, title: str) -> Device:
+    """Return a device of another package's driver, with that driver named in its errors."""
+    with blaming(title):
+        return GuardedDrive(device, title) if isinstance(device, Drive) else Guarded(device, title)
+
+
+class Guarded(Device):
+    """See `guarded`.
+
+    Args:
+        device: The device.
+        title: Its driver and package.
+    """
+
+    def __init__(self, device: Any, title: str) -> None:
+        self._device = device
+        self._title = title
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a member that this device has and others lack."""
+        return getattr(self._device, name)
+
+    @property
+    def name(self) -> str:
+        """See `Device`; so has every member below."""
+        with blaming(self._title):
+            return str(self._device.name)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Its channels."""
+        with blaming(self._title):
+            return tuple(self._device.channels)
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Its counters."""
+        with blaming(self._title):
+            return dict(self._device.counters)
+
+    def identify(self) -> DeviceIdentity:
+        """Ask who is there."""
+        with blaming(self._title):
+            found: DeviceIdentity = self._device.identify()
+            return found
+
+    def start(self) -> None:
+        """Let samples come."""
+        with blaming(self._title):
+            self._device.start()
+
+    def read(self, timeout_s: float) -> Batch:
+        """Return the samples that have come."""
+        with blaming(self._title):
+            batch: Batch = self._device.read(timeout_s)
+            return batch
+
+    def stop(self) -> None:
+        """Let no more samples come."""
+        with blaming(self._title):
+            self._device.stop()
+
+    def close(self) -> None:
+        """Stop, and let go of the link."""
+        with blaming(self._title):
+            self._device.close()
+
+
+class GuardedDrive(Guarded, Drive):
+    """A drive; see `guarded`."""
+
+    @property
+    def axis(self) -> Axis:  # type: ignore[override]
+        """What it measures of its motor."""
+        with blaming(self._title):
+            axis: Axis = self._device.axis
+            return axis
+
+    @property
+    def now_s(self) -> float:
+        """The clock of its samples."""
+        with blaming(self._title):
+            return float(self._device.now_s)
+
+    @property
+    def wait_s(self) -> float:
+        """Time until the next sample is due."""
+        with blaming(self._title):
+            return float(self._device.wait_s)
+
+    def idle(self, wait_s: float) -> None:
+        """Let time pass."""
+        with blaming(self._title):
+            self._device.idle(wait_s)
+
+    def arm(self) -> None:
+        """Energise the motor."""
+        with blaming(self._title):
+            self._device.arm()
+
+    def command(self, ratio: float) -> None:
+        """Command a share of full scale."""
+        with blaming(self._title):
+            self._device.command(ratio)
+
+    def disarm(self) -> None:
+        """Take the motor out of force."""
+        with blaming(self._title):
+            self._device.disarm()
