@@ -1,12 +1,16 @@
-"""A device whose driver is of another package: whatever the driver raises names it."""
+"""A device whose driver is of another package: its errors and wrong samples name the driver."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from traceback import extract_tb
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from drivers.device import Axis, Batch, Channel, Device, DeviceIdentity, Drive
 from drivers.errors import DriverError
+
+Answer = TypeVar("Answer")
 
 
 class ForeignDriverError(DriverError):
@@ -40,6 +44,39 @@ def guarded(device: Device, title: str) -> Device:
     """Return a device of another package's driver, with that driver named in its errors."""
     with blaming(title):
         return GuardedDrive(device, title) if isinstance(device, Drive) else Guarded(device, title)
+
+
+def require(answer: object, kind: type[Answer], title: str, call: str) -> Answer:
+    """Return the answer of a driver, which is of the kind that the interface states.
+
+    Raises:
+        ForeignDriverError: It is of another kind.
+    """
+    if not isinstance(answer, kind):
+        raise ForeignDriverError(
+            f"{title[0].upper()}{title[1:]} returned {type(answer).__name__} from {call}.",
+            f"A drivers.device.{kind.__name__} is expected.",
+        )
+    return answer
+
+
+def require_whole(batch: Batch, names: Iterable[str], title: str) -> None:
+    """Refuse a batch that lacks a column, or whose columns differ in length.
+
+    Raises:
+        ForeignDriverError: Names the column.
+    """
+    whole = (len(batch),)
+    columns: dict[str, Any] = {"sequence": batch.sequence, "flags": batch.flags}
+    columns |= {name: batch.columns[name] for name in names if name in batch.columns}
+    missing = [name for name in names if name not in columns]
+    wrong = [f"{name} has {np.shape(c)}" for name, c in columns.items() if np.shape(c) != whole]
+    if missing or wrong:
+        what = f"no column {missing[0]}" if missing else f"a column of the wrong shape: {wrong[0]}"
+        raise ForeignDriverError(
+            f"{title[0].upper()}{title[1:]} sent a batch with {what}.",
+            f"Its channels are {', '.join(names)}; each has the shape {whole} of time_s.",
+        )
 
 
 class Guarded(Device):
@@ -79,8 +116,7 @@ class Guarded(Device):
     def identify(self) -> DeviceIdentity:
         """Ask who is there."""
         with blaming(self._title):
-            found: DeviceIdentity = self._device.identify()
-            return found
+            return require(self._device.identify(), DeviceIdentity, self._title, "identify")
 
     def start(self) -> None:
         """Let samples come."""
@@ -90,7 +126,11 @@ class Guarded(Device):
     def read(self, timeout_s: float) -> Batch:
         """Return the samples that have come."""
         with blaming(self._title):
-            batch: Batch = self._device.read(timeout_s)
+            batch = require(self._device.read(timeout_s), Batch, self._title, "read")
+            if len(batch):
+                require_whole(
+                    batch, [channel.name for channel in self._device.channels], self._title
+                )
             return batch
 
     def stop(self) -> None:

@@ -17,6 +17,7 @@ from drivers.clock import ClockLine, arrival_fit
 from drivers.device import Batch, Device
 from drivers.errors import DriverError, LinkTimeoutError
 from rig.bench.devices import open_section
+from rig.bench.sensor_logger import require_units
 from rig.configuration.config import Config, is_simulated
 from rig.configuration.sections import DeviceSection
 from rig.log.schema import Field, Stream
@@ -89,9 +90,10 @@ class Companion:
         """Identify it and let its samples come.
 
         Raises:
-            DriverError: It does not answer.
+            DriverError: It does not answer, or a channel has another unit than its name.
         """
         self.device.identify()
+        require_units(self.device.name, self.device.channels)
         self.device.start()
         self._began_s = now_s
 

@@ -11,7 +11,7 @@ from drivers.registry import open_device, open_fake
 from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.transport import Transport, open_transport
 from rig.bench.holding import holding
-from rig.bench.sensor_logger import SensorWay
+from rig.bench.sensor_logger import SensorWay, require_units
 from rig.configuration.config import Config
 from rig.errors import UsageError
 from rig.logic.latch import TripLatch
@@ -127,6 +127,7 @@ def _open_any(config: Config, pace: float | None) -> Transport:
                 'The configuration has [logger] profile = "drive".',
                 'Write profile = "sensor".',
             )
+        require_units(section.driver, device.channels)
         rate_hz = device.channels[0].rate_hz
         return LogicLink(
             device,

@@ -1,5 +1,6 @@
 """A device without motors where a session expects a logger: it gives its samples as they are."""
 
+from collections.abc import Sequence
 from time import monotonic
 from typing import NoReturn
 
@@ -11,6 +12,7 @@ from drivers.errors import DriverError
 from drivers.teensy.driver import ClockExchange, SampleBatch
 from drivers.teensy.protocol import Identity, Trip, TripReport
 from drivers.transport.simulated import Pace
+from estimation.channels import unit_or_none
 from rig.errors import UsageError
 
 FLAGS = "flags"
@@ -61,6 +63,26 @@ class SensorWay:
         )
 
     read = write = refuse
+
+
+def require_units(name: str, channels: Sequence[Channel]) -> None:
+    """Refuse a channel whose name ends in another unit than it has.
+
+    Args:
+        name: The driver in messages.
+        channels: Its channels.
+
+    Raises:
+        DriverError: Names the channel.
+    """
+    for channel in channels:
+        named = unit_or_none(channel.name)
+        if named is not None and named != channel.unit:
+            raise DriverError(
+                f"The driver {name} has a channel {channel.name!r} in {channel.unit!r}.",
+                f"The end of its name states {named}, and it would be recorded as that.",
+                "Correct the unit or the name in the driver.",
+            )
 
 
 class RateWatch:
@@ -135,6 +157,7 @@ class SensorLogger:
         """Ask who is there."""
         found = self._device.identify()
         self.channels = self._device.channels
+        require_units(self._device.name, self.channels)
         if not self._way.is_simulated:
             self._rate_watch = RateWatch(self._device.name, self.channels[0].rate_hz)
         serial = " ".join(part for part in (found.model, found.serial) if part)

@@ -129,6 +129,11 @@ FAULTS = {
     "a key": ("self.sent += 1", "self.sent += {}['n']", r"failed: KeyError: 'n'.*in read"),
     "a method": ("def identify", "def identity", "AttributeError.*identify"),
     "the making": ("self.sent = 0", "1 / 0", "ZeroDivisionError"),
+    "no identity": ('DeviceIdentity("scale", "1", "")', "None", "NoneType from identify"),
+    "a column": ('{"force_n": zero}', '{"force": zero}', "no column force_n"),
+    "a shape": ('{"force_n": zero}', '{"force_n": np.zeros(2)}', r"force_n has \(2,\)"),
+    "a sequence": ("np.array([self.sent])", "np.arange(2)", r"sequence has \(2,\)"),
+    "the unit": ('"force_n", "N"', '"force_n", "lbf"', "'force_n' in 'lbf'"),
     "the channels": ("    channels", "    chanels", "AttributeError.*channels"),
 }
 
@@ -139,7 +144,7 @@ def test_a_fault_of_one_names_it(tmp_path, monkeypatch, capsys, place, old, new,
     install(tmp_path, monkeypatch, "acme_scale:DRIVER", (old, new))
     assert main(["record", "-c", rig_with_scale(tmp_path, place), "-o", str(tmp_path / "r")]) == 3
     said = capsys.readouterr().err
-    assert re.search(f"driver acme-scale of acme .*{message}", said, re.DOTALL)
+    assert re.search(f"driver (acme-scale of acme|scale) .*{message}", said, re.DOTALL)
 
 
 def rig_with_scale(folder: Path, place: str) -> str:
