@@ -212,6 +212,21 @@ def _straight(
     return ClockLine(device_mean_s, host_mean_s, 1 + drift, residual_s, trip_s / 2, len(host_s))
 
 
+def rising(times_s: NDArray[np.float64], after_s: float, step_s: float) -> NDArray[np.float64]:
+    """Return times of which each is at least a step after the one before.
+
+    A line that is fitted again moves; times by the new one may lie before those by the old.
+
+    Args:
+        times_s: Times by the line, s, shape (n,).
+        after_s: The time before the first, s; minus infinity without one.
+        step_s: Least distance, s; below the true one, so that the times return to the line.
+    """
+    floor_s = step_s * np.arange(1, times_s.size + 1)
+    ahead_s = np.maximum.accumulate(times_s - floor_s)
+    return np.asarray(np.maximum(ahead_s, after_s) + floor_s)
+
+
 def arrival_fit(
     sequence: NDArray[np.int64], arrived_s: NDArray[np.float64], rate_hz: float
 ) -> ClockLine:

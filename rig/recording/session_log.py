@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.zero import SensorZero
+from drivers.clock import rising
 from rig import __version__
 from rig.bench.companions import Beside, Companion
 from rig.bench.session import Session
@@ -72,6 +73,8 @@ class SessionLog(LogWriter):
         self.newest_s = 0.0
         """Time of the newest sample, s, on the run's clock."""
         self._flown = 0
+        self._least_s = {c.stream().topic: 0.5 / c.rate_hz for c in companions}
+        self._beside_s: dict[str, float] = {}
 
     def write_reading(self, reading: Reading) -> None:
         """Write a reading to both streams, with the run's own clock in `time_s`."""
@@ -90,9 +93,16 @@ class SessionLog(LogWriter):
         self._newest_ns, self.newest_s = int(log_time_ns[-1]), float(since_us[-1]) * 1e-6
 
     def write_beside(self, topic: str, block: Beside) -> None:
-        """Write what a further device measured since the run began, on the logger's clock."""
+        """Write what a further device measured since the run began, on the logger's clock.
+
+        Both clocks' lines are fitted again all the time; times increase all the same.
+        """
         start_us = self._start_us or 0
+        if not block.host_s.size:
+            return
         tick_s = self._session.clock.line.to_device(block.host_s)
+        tick_s = rising(tick_s, self._beside_s.get(topic, -np.inf), self._least_s[topic])
+        self._beside_s[topic] = float(tick_s[-1])
         time_s = tick_s - start_us * 1e-6
         of_run = time_s >= 0  # what came before the run began is not of it
         rows: dict[str, NDArray[Any]] = dict(block.columns)

@@ -1,7 +1,10 @@
 """A further device beside the logger: its silence, its limits, its times in a log."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from drivers.errors import LinkTimeoutError
@@ -12,7 +15,9 @@ from rig.configuration.config import SHIPPED, SIMULATED
 from rig.errors import SafetyTripError
 from rig.log.check import Verdict, check_log
 from rig.log.reader import read_log
+from rig.log.run import RunInfo
 from rig.recording.campaign import open_campaign_folder, record_campaign
+from rig.recording.session_log import SessionLog
 from tests.rig.simulated import is_armed, session, short_protocol, simulated, transport
 
 pytestmark = pytest.mark.integration
@@ -103,6 +108,25 @@ def test_a_limit_that_no_device_can_have_is_no_key(tmp_path, said):
     assert "did you mean 'motor_current_a'?" in said("config check", path, code=2).err
     path.write_text(SIMULATED.read_text().replace("[limits]", "[limits]\nft.force_z_n = 1e3") + FT)
     assert "is sound" in said("config check", path).out
+
+
+def test_its_times_increase_while_the_clocks_are_fitted_again(tmp_path, monkeypatch):
+    path = tmp_path / "run.mcap"
+    with session(with_ft()) as rig:
+        (ft,) = rig.companions
+        next(rig.rest(0.5))
+        line = rig.clock.line
+        with SessionLog(rig, path, RunInfo(name="run"), companions=[ft]) as log:
+            for number, reading in enumerate(rig.rest(2.0)):
+                moved = replace(line, host_s=line.host_s + 0.03 * (number % 2))
+                monkeypatch.setattr(rig, "clock", SimpleNamespace(line=moved))
+                log.write_reading(reading)
+                log.write_beside(topic("ft"), ft.take())
+    rows = read_log(path, tolerant=True).topics[topic("ft")].rows
+    time_s, sequence = rows["time_s"], rows["sequence"]
+    assert np.diff(time_s).min() > 0.004
+    off_s = (time_s - time_s[0]) - (sequence - sequence[0]) / ft.rate_hz
+    assert np.abs(off_s).max() < 0.05
 
 
 def test_one_that_goes_on_sending_is_read_on():
