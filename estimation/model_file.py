@@ -137,7 +137,11 @@ def parse_all(text: str, where: str = "model") -> list[Model]:
         if schema == SCHEMA:
             return [_model(top)]
         if schema != SEVERAL:
-            raise ModelFileError(f"{where} is not a model of schema {SCHEMA} or {SEVERAL}.")
+            raise ModelFileError(
+                f"{where} is not a model of schema {SCHEMA} or {SEVERAL}.",
+                f"It has the schema {schema}.",
+                "Read it with the version of rig that wrote it, or fit the model again.",
+            )
         models = [_model(entry) for entry in top.tables("models")]
         top.finish()
         if not models:

@@ -2,6 +2,7 @@
 
 import tomllib
 from datetime import UTC, datetime
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -228,10 +229,13 @@ def load_config(path: Path | None = None) -> Config:
         text = path.read_text()
         return Config.model_validate(tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as error:
+        near = get_close_matches(str(path), shipped_configs(), n=1)
         raise UsageError(
             f"The configuration {path} cannot be read.",
             str(error),
-            f"Give a TOML file, or one of: {', '.join(shipped_configs())}.",
+            f"Did you mean {near[0]!r}?"
+            if near
+            else f"Give a TOML file, or one of: {', '.join(shipped_configs())}.",
         ) from error
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path} is not TOML.", str(error)) from error

@@ -48,6 +48,9 @@ WIDE = 64
 LEAST_TRACES = 5
 """Lines reserved for the traces."""
 
+LEAST_LIMITS = 2
+"""Lines reserved for the limits: the nearest, and how many there are besides."""
+
 MARGIN = 18
 """Columns left of a trace, for its name and the edges of its scale."""
 
@@ -85,7 +88,7 @@ class View:
             above.append(_styled(f"▲ flagged in {TRACE_S:g} s: {seen}", "warning"))
         below = [_device(device) for device in snapshot.devices]
         footer = [_styled(line, "quiet") for line in self.options.footer.splitlines()]
-        room = max(height - len(above) - len(below) - len(footer) - LEAST_TRACES, 1)
+        room = max(height - len(above) - len(below) - len(footer) - LEAST_TRACES, LEAST_LIMITS)
         below += list(_limits(snapshot.limits, width, room))
         below += footer
         free = height - len(above) - len(below)

@@ -110,6 +110,12 @@ def test_what_is_wrong_is_named(old, new, message):
         parse(DECLARED.replace(old, new, 1), "mine.toml")
 
 
+def test_a_file_of_another_schema_is_refused_with_what_to_do():
+    with pytest.raises(ModelFileError, match="not a model of schema") as refused:
+        parse(DECLARED.replace("rig.model/1", "rig.model/9", 1), "mine.toml")
+    assert "version of rig" in refused.value.fix
+
+
 def test_a_missing_file_names_the_shipped_ones_and_one_without_a_model_is_refused(tmp_path):
     with pytest.raises(ModelFileError, match="holds no model"):
         parse_all('schema = "rig.models/1"\nmodels = []\n')

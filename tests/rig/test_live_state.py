@@ -230,6 +230,14 @@ def test_limits_say_in_words_when_they_are_near_or_unknown():
     assert "no value, limit 0.600 A" in text
 
 
+@pytest.mark.parametrize("height", [16, 24])
+def test_a_small_terminal_shows_the_nearest_limit(height):
+    limits = tuple(LimitStatus(f"limit {k}", 0.1 * k, 0.6, "A") for k in range(6))
+    text = render(snapshot_of(stream(limits=limits)), width=40, height=height)
+    assert "limit 5" in text
+    assert "5 more limits, none nearer" in text or height > 16
+
+
 def test_colour_only_repeats_the_text():
     coloured = Console(file=io.StringIO(), width=80, height=24, record=True, force_terminal=True)
     coloured.print(View(snapshot_of(stream()), OPTIONS))

@@ -5,7 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from estimation.files import write_text_atomic
 from rig.cli.main import main
+from rig.errors import ExitCode
 from rig.importers.registry import open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import read_runs
@@ -139,3 +141,9 @@ def test_a_table_of_which_nothing_is_mapped_is_listed(tmp_path, said, answered):
     assert shown["columns"]["t"][:2] == [0.0, 10.0]
     refused = said("import", table, "--out", tmp_path / "logs", code=5).err
     assert f"rig import {table} --preview" in " ".join(refused.split())
+
+
+def test_a_campaign_of_this_program_is_named_as_one(tmp_path, capsys):
+    write_text_atomic(tmp_path / "campaign.json", "{}")
+    assert main(["import", str(tmp_path), "--preview"]) == ExitCode.USAGE
+    assert "a recording of this program already" in capsys.readouterr().err
