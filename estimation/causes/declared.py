@@ -7,10 +7,12 @@ import numpy as np
 
 from estimation.causes.candidates import Claim
 from estimation.causes.equations import Layout
+from estimation.causes.instruments import instrumented
 from estimation.causes.joint import Joint
 from estimation.causes.places import places_of
 from estimation.causes.scoring import ByRun
 from estimation.causes.sources import Source
+from estimation.effects import effect
 from estimation.fit_problem import OFFSET
 
 
@@ -46,33 +48,47 @@ def amplitudes_of(layout: Layout) -> Iterator[Moved]:
     for equation in layout.equations.values():
         own, column = places[equation.name], 0
         for term in equation.model.terms:
-            effect, of_all_runs = term.effect, term.effect.id == OFFSET
+            own_effect, of_all_runs = term.effect, term.effect.id == OFFSET
             entries = [e for e in own.enters if e.equation == equation.name]
             signed = tuple(replace(entry, gain=float(term.sign)) for entry in entries)
             place = replace(own, enters=signed)
-            channels = tuple((role, term.channels[role]) for role in effect.roles)
-            shape = tuple(term.numbers(effect.shape))
-            for k in range(len(effect.amplitudes)):
+            channels = tuple((role, term.channels[role]) for role in own_effect.roles)
+            shape = tuple(term.numbers(own_effect.shape))
+            for k in range(len(own_effect.amplitudes)):
                 at = None if of_all_runs else column + k
-                yield Moved(place, effect, channels, shape, (k,), column=at)
+                yield Moved(place, own_effect, channels, shape, (k,), column=at)
             if not of_all_runs:
-                column += len(effect.amplitudes) + len(effect.shape)
+                column += len(own_effect.amplitudes) + len(own_effect.shape)
+
+
+def drives_of(layout: Layout) -> Iterator[Moved]:
+    """Yield the gain of every drive that is an equation's target, read as the equation predicts."""
+    for place in places_of(layout):
+        target = layout.equations[place.home].target
+        known = layout.runs[0].channels
+        if place.name == f"actuator {target}" and instrumented(target, place.home) in known:
+            yield Moved(place, effect("motor.torque_constant"), (("source", target),), (), (0,))
 
 
 def moved_terms(joint: Joint) -> list[tuple[Claim, ByRun]]:
     """Return the declared terms as causes that act in no run yet, with their products by run.
 
-    In all runs they are the base itself, so they compete only for acting in some.
+    In all runs they are the base itself, so they compete only for acting in some. So does the gain
+    of a drive that is the target, by which all terms differ alike.
     """
     usual, weights = joint.left_out([[]]).base[0], joint.weights
     out = []
-    for one in amplitudes_of(joint.layout):
-        if one.column is None:
+    for one in (*amplitudes_of(joint.layout), *drives_of(joint.layout)):
+        part = one.place.home, "within"
+        terms = np.zeros(joint.size + 1)
+        if one.column is not None:
+            terms[joint.at[part][one.column]] = 1.0
+        elif one.place.kind == "actuator":
+            terms[joint.at[part]] = -usual[joint.at[part]]
+        else:
             continue
-        part = one.place.name, "within"
-        at = joint.at[part][one.column]
-        products = weights[part] * joint.gram[part][:, :, at, None]
+        products = weights[part] * joint.gram[part] @ terms[:, None]
         base = products[:, :-1]
         cross = products[:, -1] - np.einsum("b,rbk->rk", usual, base)
-        out.append((Claim(one), (cross, products[:, at, None], base)))
+        out.append((Claim(one), (cross, (terms @ products)[..., None], base)))
     return out

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.causes.candidates import Candidate
+from estimation.causes.declared import Moved
 from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Errors, Part, Refit, Solved
@@ -99,7 +100,7 @@ class Refits:
             if term is not None:
                 if set(term.channels.values()) - {channel for _, channel in cause.channels}:
                     term = self.of[name].refined(self.parts[name], term)
-                return Part(term, acts, is_change=cause.is_declared)
+                return Part(term, acts, is_change=isinstance(cause, Moved))
             if name != cause.place.home:
                 return None
         gain = sum(abs(e.gain) for e in cause.place.enters if e.equation == name)

@@ -143,6 +143,18 @@ def test_a_drive_that_saturates_is_found_where_it_is_the_target() -> None:
     assert "sensor.gain_nonlinear" in finding.alternatives  # of the current: the same column
 
 
+def test_a_drive_may_give_another_torque_an_ampere_in_some_of_the_runs() -> None:
+    has = (1, 4, 5, 8)
+    runs = []
+    for k, run in enumerate(turning(lambda angle, speed, acceleration: 0.0 * speed, size=3.0)):
+        current = run["crank_torque_n_m"] / (0.75 if k in has else 0.8)
+        runs.append(Recording(run.name, run.time_s, run.columns | {"crank_current_a": current}))
+    (finding,) = diagnose(runs, [axis("crank_current_a")], split(runs)).findings
+    assert finding.family == "motor.torque_constant"
+    assert finding.parameters["change"].value == pytest.approx(0.75 / 0.8 - 1.0, rel=0.15)
+    assert {*finding.runs_affected} == {runs[k].name for k in has}
+
+
 def test_a_tight_spot_in_every_turn_depends_on_the_angle_and_the_direction() -> None:
     def rubs(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
         spot = np.exp(-(((np.mod(angle, 2 * np.pi) - 3.0) / 0.4) ** 2))
