@@ -6,7 +6,7 @@ from functools import partial
 from drivers.device import Device
 from drivers.registry import open_device, open_fake
 from drivers.teensy.device import TeensyDevice, raw_channels
-from rig.bench.logger import open_logger
+from rig.bench.logger import DRIVE, open_logger
 from rig.configuration.check import LOGGER
 from rig.configuration.config import Config, is_simulated
 from rig.configuration.sections import DeviceSection
@@ -30,7 +30,7 @@ def open_section(section: DeviceSection) -> Device:
 def openers(config: Config) -> Iterator[tuple[str, Callable[[], Device]]]:
     """Yield name and a function that opens it, of the logger and of each further device."""
     counts = {line.counts for line in config.calibration_set().channels.values()}
-    if config.logger.driver == "epos4":
+    if config.logger.driver == "epos4" or config.logger.profile == DRIVE:
         counts -= {"current"}  # a drive that is switched off reports no current
     profile = machine_of(config).profile
     wired = [channel for channel in raw_channels(profile) if channel.field in counts]

@@ -24,9 +24,11 @@ from rig.doctor.selftest import Check
 from rig.errors import UsageError
 from rig.machines.choose import machine_of
 
-STEPS_RATIO = (0.02, 0.04, 0.06, 0.08, 0.10, 0.13, 0.16, 0.20)
+STEPS_RATIO = (0.005, 0.01, 0.02, 0.04, 0.06, 0.08, 0.10, 0.13, 0.16, 0.20)
 """Pulses, of a full command; none is larger than the configured controller's limit."""
 PULSE_S = 0.05
+REST_S, LOOK_S = 10.0, 0.1
+"""A shaft that coasts on from the pulse before is waited for so long, s, in such steps."""
 REACH_RAD = 0.12
 """How far the spindle may turn from where it stands; beyond it the board releases."""
 TURNED_RAD = 0.01
@@ -110,7 +112,7 @@ def _first_turn(bench: "_Bench", closing: int) -> Iterator[Check]:
             break
         pulse = bench.pulse(closing * ratio)
         if pulse.trip is not Trip.NONE:
-            yield Check(f"a pulse of {ratio:.0%}, {word}", False, WORDS[pulse.trip][0])
+            yield Check(f"a pulse of {100 * ratio:g}%, {word}", False, WORDS[pulse.trip][0])
             return
         if max(map(abs, pulse.change.values())) >= TURNED_RAD:
             break
@@ -121,9 +123,9 @@ def _first_turn(bench: "_Bench", closing: int) -> Iterator[Check]:
     yield Check(
         f"the shaft turns, {word}",
         turned,
-        f"at {abs(pulse.ratio):.0%} of a full command"
+        f"at {abs(100 * pulse.ratio):g}% of a full command"
         if turned
-        else f"not up to {abs(pulse.ratio):.0%}: supply, enable, set value or a blocked shaft",
+        else f"not up to {abs(100 * pulse.ratio):g}%: supply, enable, set value or a blocked shaft",
     )
     for name, change in pulse.change.items() if turned else ():
         seen = change * closing
@@ -154,11 +156,12 @@ class _Bench:
         self._logger = logger
         self._limits = limits
         self._lines: CalibrationSet = config.calibration_set()
+        self._rate_hz = machine_of(config).profile.rate_hz
 
     def pulse(self, ratio: float) -> Pulse:
         """Give one pulse, disarm, and return what it did."""
         lines = self._lines.channels
-        before = self._read(0.1)
+        before = self._at_rest()
         here = int(np.median(before["spindle"]))
         reach = abs(REACH_RAD / lines["spindle_angle_rad"].slope)
         command = ratio / lines["motor_command_ratio"].slope
@@ -166,7 +169,7 @@ class _Bench:
         gain = abs(command) / (OPEN_LOOP_SHARE * reach)
         self._logger.arm([gain, 0.0, 0.0, 1.0, abs(command)], self._narrow(here, round(reach)))
         try:
-            count = round(PULSE_S * 1e3)
+            count = round(PULSE_S * self._rate_hz)
             self._logger.queue(np.full(count, target), np.zeros(count, np.int64))
         except CommandRefusedError:
             if self._logger.trip().code is Trip.NONE:
@@ -180,6 +183,15 @@ class _Bench:
             trip = Trip.NONE
         armed = during[(during["status"] & STATUS_ARMED) != 0]
         return Pulse(ratio, self._changes(before, armed), self._current_a(before, armed), trip)
+
+    def _at_rest(self) -> NDArray[np.void]:
+        """Return samples of the standing shaft, or the newest when it does not come to rest."""
+        still = max(1.0, 0.1 * SEEN_RAD / abs(self._lines.channels["spindle_angle_rad"].slope))
+        for _ in range(round(REST_S / LOOK_S)):
+            samples = self._read(LOOK_S)
+            if np.ptp(samples["spindle"]) <= still:
+                break
+        return samples
 
     def _narrow(self, here: int, reach: int) -> Limits:
         """Return the limits about where it stands; what is being tested is not yet believed."""

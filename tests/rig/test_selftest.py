@@ -46,6 +46,13 @@ def test_the_simulated_rig_passes_with_every_kind_of_device(names, library):
     assert all(check.passed for check in checks), [c for c in checks if not c.passed]
 
 
+@pytest.mark.parametrize("name", ["moteus_simulated", "dynamixel_simulated"])
+def test_the_shipped_drives_pass_and_turn(name, library):
+    for checks in (selftest, commission):
+        done = list(checks(load_config(Path(name))))
+        assert all(check.passed for check in done), [c for c in done if not c.passed]
+
+
 @pytest.fixture
 def failing(monkeypatch):
     """The checks that fail on a board whose output goes through a function."""
