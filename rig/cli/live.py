@@ -93,6 +93,7 @@ def live(
     if protocol is None and settings.is_simulated:
         protocol = machine.first_look(settings)
     plans = load_protocol(protocol).any_plans() if protocol else []
+    machine.require_within_limits(settings, plans)
     model_path = model or settings.model_path
     estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
     if model_path:

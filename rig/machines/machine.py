@@ -92,6 +92,22 @@ class Machine:
                     f"Change the protocol, or [limits] {name} if the rig can take it.",
                 )
 
+    def require_within_limits(self, config: Config, plans: Sequence[Plan]) -> None:
+        """Refuse runs that the limits forbid, before a rig is connected.
+
+        The approach begins somewhere within the limits: here at zero.
+
+        Raises:
+            UsageError: A run is beyond a limit, or for another kind of rig.
+        """
+        for plan in plans:
+            motion = self.motion(plan, (0.0,) * len(self.here_channels))
+            try:
+                if self.setpoint_channels:
+                    self.check_setpoints(config, motion.setpoints)
+            except SafetyTripError as error:
+                raise UsageError(f"{plan.name}: {error.what}", error.why, error.fix) from error
+
     def here(self, columns: Mapping[str, FloatArray]) -> tuple[float, ...]:
         """Return where it stood in the newest sample: the positions its setpoints ask for, rad."""
         return tuple(float(columns[name][-1]) for name in self.here_channels)

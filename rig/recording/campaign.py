@@ -26,6 +26,7 @@ from rig.log.reader import read_log
 from rig.log.run import RunEnd, RunInfo
 from rig.log.streams import COUNTS, SAMPLE
 from rig.log.writer import PART_SUFFIX
+from rig.machines.choose import machine_of
 from rig.machines.reading import Reading
 from rig.protocols.motion import Motion
 from rig.protocols.protocol import Plan, Protocol
@@ -130,10 +131,13 @@ def open_campaign_folder(
     Raises:
         UsageError: The folder is in use and `resume` was not asked for, or what is in it was
             recorded with another protocol or configuration.
+        UsageError: A run is beyond a limit, or for another kind of rig.
         UsageError: Another program records into the folder, or it cannot be made.
     """
     if holder(str(folder.resolve())) is not None:
         raise _is_recorded_into(folder)
+    plans = protocol.any_plans()
+    machine_of(config).require_within_limits(config, plans)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -168,7 +172,6 @@ def open_campaign_folder(
         )
     else:
         write_text_atomic(manifest, json.dumps(described, indent=1) + "\n")
-    plans = protocol.any_plans()
     check_disk_space(folder, plans)
     return [plan for plan in plans if not _is_recorded(_log_path(folder, plan))]
 

@@ -1,6 +1,7 @@
 """Recording a campaign: whole logs, resumable, nothing overwritten."""
 
 import json
+import re
 import subprocess
 import sys
 from collections import namedtuple
@@ -11,6 +12,7 @@ import pytest
 
 from drivers.transport.simulated import SimulatedTransport
 from rig.bench.session import Session
+from rig.configuration.config import SHIPPED
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 from rig.log.check import Verdict, check_log
@@ -170,6 +172,16 @@ def test_what_can_be_no_folder_is_refused(tmp_path, place, said):
     err = said("record --sim -o", tmp_path / place, code=2).err
     assert "cannot be made a folder" in err
     assert "--out" in err
+
+
+def test_a_run_beyond_a_limit_is_refused_before_there_is_a_folder(tmp_path, said):
+    config, text = tmp_path / "rig.toml", (SHIPPED / "simulated.toml").read_text()
+    config.write_text(re.sub(r"(?m)^load_command_a = \S+", "load_command_a = 0.0", text))
+    protocol = protocol_file(tmp_path)
+    err = said("record -c", config, "-p", protocol, "-o", tmp_path / "runs", code=2).err
+    assert "load_command_a = 0.1" in err
+    assert not (tmp_path / "runs").exists()
+    assert "load_command_a = 0.1" in said("live -c", config, "-p", protocol, code=2).err
 
 
 def test_a_full_disk_is_seen_before_anything_moves(tmp_path, monkeypatch):
