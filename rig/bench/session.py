@@ -44,8 +44,7 @@ LEAD_S = 0.3
 UNENDING = 2**62
 """Number of setpoints while it is not known how many there will be."""
 
-COOLING_STEP_S = 0.25
-COOLING_S = 60.0
+COOLING_STEP_S, COOLING_S = 0.25, 60.0
 """How long a board whose motors are too warm to be armed is waited for, s, and in which steps."""
 
 
