@@ -11,16 +11,12 @@ import numpy as np
 from estimation.causes.blocks import Block, block_of
 from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.functions import MOST_VARIABLES, Function, functions_at
-from estimation.causes.instruments import noisy_bands, signal
+from estimation.causes.instruments import signal
 from estimation.causes.joint import Joint
 from estimation.causes.laid import NOTHING, Columns, Laid, Scale
 from estimation.causes.places import places_of
 from estimation.causes.sources import Source, sources_at
 from estimation.recording import FloatArray
-
-SKEW_S = 1e-3
-MOST_SKEW = 2.0
-"""Usual delay of a reading against the others, a sample at 1 kHz, and the most, over it."""
 
 QUIET = 0.002
 """Noise of a channel over its range below which no column follows it."""
@@ -163,64 +159,6 @@ def _choices(cause: Source | Function, count: Mapping[tuple[str, str], int]) -> 
     return forms * MOST_VARIABLES * sets
 
 
-def skews(joint: Joint) -> list[Claim]:
-    """Return the readings that are late or early by a little, each as a short delay.
-
-    No two boards share a clock, and a reading has an age. A delay as short as that is part of the
-    base, no finding; a longer one is. Where a reading is differentiated its noise hides as short a
-    delay.
-    """
-    plain = [
-        replace(place, enters=tuple(e for e in place.enters if e.order == 0))
-        for place in places_of(joint.layout)
-    ]
-    late = [
-        Claim(replace(source, shape=(SKEW_S,)))
-        for place in plain
-        if place.enters
-        for source in itertools.islice(
-            (s for s in sources_at(joint.layout, place) if s.effect.id == "sensor.delay"), 1
-        )
-    ]
-    found = [one for group in groups_of(joint, late) for one in group.candidates]
-    delays = _with_delays(joint, found).left_out([[]]).base[0][joint.size :]
-    return [
-        Claim(one.cause)
-        for one, delay in zip(found, delays, strict=True)
-        if abs(delay / one.size[0]) < MOST_SKEW
-    ]
-
-
-def with_skews(joint: Joint, late: Sequence[Claim]) -> Joint:
-    """Return a regression with short delays and noisy bands of readings in its base."""
-    return _with_delays(_with_bands(joint), late)
-
-
-def _with_bands(joint: Joint) -> Joint:
-    """Return a regression in which the noisy bands of a channel have amplitudes of their own.
-
-    With one amplitude a noisy channel's parameter comes out too small, and the same channel with
-    less noise, such as by a lag of its sensor, passes for a cause.
-    """
-    layout = joint.layout
-    for equation in layout.equations.values():
-        columns, shaken = (
-            [{equation.name: band} for band in noisy_bands(equation, layout, runs)]
-            for runs in (layout.runs, layout.shaken)
-        )
-        if columns[0][equation.name].size:
-            laid = _without_declared(joint, [columns], [shaken] if shaken else [], "each")
-            joint = joint.with_cause(laid, np.full(laid.size.shape[1], 4.0 / joint.power))
-    return joint
-
-
-def _with_delays(joint: Joint, late: Sequence[Claim]) -> Joint:
-    for group in groups_of(joint, late):
-        for one in group.candidates:
-            joint = joint.with_cause(one.laid, 1.0 / one.size**2)
-    return joint
-
-
 def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
     """Return causes laid out; those that show nowhere are left out.
 
@@ -271,7 +209,7 @@ def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
     first = held[0][0]
     shaken = [raw[2] for raw in held if raw[2] is not None]
     columns = [raw[1] for raw in held]
-    laid = _without_declared(joint, columns, shaken, _unit(first.cause), first.has_means)
+    laid = without_declared(joint, columns, shaken, _unit(first.cause), first.has_means)
     shown = np.flatnonzero(laid.size.min(axis=1) >= NOTHING)
     if len(shown) < len(held):
         laid = laid.only(shown)
@@ -294,7 +232,7 @@ def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
         yield Group(whole, laid, precision)
 
 
-def _without_declared(
+def without_declared(
     joint: Joint,
     columns: Sequence[OfRuns],
     shaken: Sequence[OfRuns],

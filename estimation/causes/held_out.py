@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.causes.candidates import Candidate, Claim, laid_out, with_skews
+from estimation.causes.candidates import Candidate, Claim, laid_out
 from estimation.causes.equations import Layout
 from estimation.causes.joint import Joint, Part
 from estimation.causes.laid import TINY
+from estimation.causes.nuisances import with_skews
 from estimation.causes.numbers import Numbers
 from estimation.causes.sources import Source
 from estimation.derived import CAMPAIGN_TIME

@@ -8,12 +8,11 @@ from estimation.causes.candidates import (
     Claim,
     Group,
     candidates,
-    skews,
-    with_skews,
 )
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.joint import Joint
+from estimation.causes.nuisances import skews, with_skews
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.ranking import competing
 from estimation.causes.scoring import Scored

@@ -15,14 +15,13 @@ from estimation.causes.candidates import (
     groups_of,
     laid_out,
     pool_of,
-    skews,
-    with_skews,
 )
 from estimation.causes.equations import Layout, lay_out
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.levels import with_levels
+from estimation.causes.nuisances import skews, with_skews
 from estimation.causes.numbers import Numbers
 from estimation.causes.scoring import Scored, assessed, best_of_each
 from estimation.causes.search import Rank, Ranking, hypothesis
