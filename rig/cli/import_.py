@@ -83,15 +83,9 @@ def import_(
     from rig.importers.table.open import read_runs
     from rig.importers.table.preview import preview as look
     from rig.importers.table.raw import Remark
-    from rig.log.check import looks_like_log
     from rig.machines.shipped import place_of
-    from rig.recording.campaign import MANIFEST
 
-    if (path / MANIFEST).is_file() or looks_like_log(path):
-        raise UsageError(
-            f"{path} is a recording of this program already; nothing is to be mapped.",
-            fix=f"Give it to a command as it is, such as `rig log info {path}`.",
-        )
+    _require_a_table(path)
     if not preview and out is None:
         raise UsageError(
             "Nothing states where the recordings are to be written.",
@@ -119,6 +113,18 @@ def import_(
         remarks().print(f"Check: {line}")
     data = {"preview": found, "written": written, "plots": plots}
     present(json, data, *_tables(found, mapping), *lines)
+
+
+def _require_a_table(path: Path) -> None:
+    """Refuse recordings of this program."""
+    from rig.log.check import looks_like_log
+    from rig.recording.campaign import MANIFEST
+
+    if (path / MANIFEST).is_file() or looks_like_log(path):
+        raise UsageError(
+            f"{path} is a recording of this program already; nothing is to be mapped.",
+            fix=f"Give it to a command as it is, such as `rig log info {path}`.",
+        )
 
 
 def _plotted(recordings: "list[Recording]", plots: Path) -> str:
