@@ -14,8 +14,8 @@ from estimation.causes.equations import ANGLES, Equation, Layout, RunSignals
 from estimation.filters import FilterError, zero_phase
 from estimation.recording import FloatArray
 
-NOISY = 0.1
-"""Share of a channel that may be noise: the parameter comes out too small by its square."""
+NOISY, CLEAN = 0.7, 0.1
+"""Shares of a channel that are noise: most of its power above the first, little below the other."""
 
 BAND, MOST_BANDS = 4.0, 3
 """Ratio of the cutoffs of neighbouring bands, and how many bands may be noisy."""
@@ -106,10 +106,10 @@ def noisy_bands(equation: Equation, layout: Layout, runs: Sequence[RunSignals]) 
 
 
 def _cutoffs(runs: Sequence[RunSignals], channel: str) -> Iterator[float]:
-    """Yield the cutoffs above which a channel is noisy, from the highest on."""
+    """Yield the cutoffs of the bands of a noisy channel, down to what is clean."""
     above = np.inf
     for step in range(1, MOST_BANDS + 1):
-        if noise_share(runs, channel, above) <= NOISY:
+        if noise_share(runs, channel, above) <= (NOISY if step == 1 else CLEAN):
             return
         above = runs[0].low_pass.cutoff_hz / BAND**step
         yield above

@@ -97,7 +97,7 @@ def test_a_limit_on_a_channel_that_no_device_has_is_refused(tmp_path, said, rig,
     text = (SHIPPED / f"{rig}.toml").read_text() + FT
     path.write_text(text.replace("[limits]", f"[limits]\n{limit}"))
     assert message in said("config check", path, code=2).out
-    printed = said("record -p quick -c", path, "-o", tmp_path / "runs", code=2).err
+    printed = said("record -p unloaded -c", path, "-o", tmp_path / "runs", code=2).err
     assert message in printed
     assert "nothing was armed" in printed
 
