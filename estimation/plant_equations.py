@@ -280,7 +280,16 @@ def _deflections(plant: Plant, chain: Chain) -> Iterator[Written]:
 def missing(plant: Plant) -> list[Missing]:
     """Return the gaps of these sensors: quantities without an equation, and the sensor for each."""
     found = []
-    if not plant.actuators and not any(plant.effort(axis.name) for axis in plant.axes):
+    efforts = [sensor.name for sensor in plant.sensors if sensor.reads == "effort"]
+    if not plant.actuators and efforts and not equations(plant):
+        found.append(
+            Missing(
+                "No [[actuator]] drives the machine: no equation has an effort on its left.",
+                f"An [[actuator]] in place of the [[sensor]] that reads the driving effort, such as"
+                f" {efforts[0]}.",
+            )
+        )
+    if not plant.actuators and not efforts:
         found.append(
             Missing(
                 "Nothing drives the machine and no effort is read.",

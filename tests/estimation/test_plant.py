@@ -160,6 +160,15 @@ def test_without_a_torque_sensor_the_drive_is_the_target_and_the_gap_is_named():
     assert unused(plant) == ["spindle_angle_rad", "jaw_angle_rad"]
 
 
+def test_torque_sensors_without_an_actuator_lead_to_what_drives():
+    whole = shipped_plant("reference")
+    links = tuple(replace(t, compliant=False) for t in whole.transmissions)
+    plant = replace(whole, actuators=(), transmissions=links, loads=())
+    assert not equations(plant)
+    (gap,) = missing(plant)
+    assert "An [[actuator]] in place of the [[sensor]]" in gap.needed
+
+
 def slide(seed, mass=90.0, viscous=200.0, coulomb=20.0):
     """Return a run of a carriage in m, its drive in N."""
     random = np.random.default_rng(seed)
