@@ -36,6 +36,7 @@ class Identified:
         unit: Its unit.
         description: In words.
         value: Fitted on the recordings; None without them.
+        at_bound: Whether that is the least or the largest value that makes sense.
     """
 
     effect: str
@@ -43,6 +44,7 @@ class Identified:
     unit: str
     description: str
     value: float | None = None
+    at_bound: bool = False
 
 
 @dataclass(frozen=True)
@@ -131,6 +133,7 @@ def _described(model: Model, values: bool = False) -> CheckedEquation:
             term.unit(parameter, model.target),
             parameter.description,
             term.values[parameter.name].value if values else None,
+            values and term.values[parameter.name].value in (parameter.lower, parameter.upper),
         )
         for term in model.terms
         for parameter in term.parameters

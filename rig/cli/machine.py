@@ -102,7 +102,13 @@ def _parameter_lines(equation: "CheckedEquation") -> list[str]:
         value = "" if one.value is None else f" = {one.value:.5g}"
         unit = "" if one.unit == "1" else f" {one.unit}"
         text = f"{value}{unit}" if value else f" ({one.unit})"
+        text += ", at its bound" if one.at_bound else ""
         lines.append(f"  {one.effect}, {one.name}{text}: {one.description}")
+    if any(one.at_bound for one in equation.parameters):
+        lines.append(
+            "  A parameter at its bound is not identified: noise of its channel, an effect that the"
+            " equation lacks, or too little motion."
+        )
     if equation.relative_error is not None:
         share = 100 * equation.relative_error
         lines.append(f"  Residual: {share:.3f} % of the root mean square of {equation.target}.")

@@ -23,6 +23,7 @@ from estimation.plant import (
     Transmission,
     Written,
 )
+from estimation.plant_check import check
 from estimation.plant_equations import equations, missing, signals, unused
 from estimation.plant_file import PlantFileError, parse, shipped_plant, to_toml
 from estimation.plant_models import declared
@@ -167,6 +168,15 @@ def test_torque_sensors_without_an_actuator_lead_to_what_drives():
     assert not equations(plant)
     (gap,) = missing(plant)
     assert "An [[actuator]] in place of the [[sensor]]" in gap.needed
+
+
+def test_a_parameter_that_comes_out_at_its_bound_is_marked():
+    sound, broken = (
+        check(SLIDE, Campaign.of([slide(k, viscous=viscous) for k in range(4)]))
+        for viscous in (200.0, -60.0)
+    )
+    assert not any(one.at_bound for one in sound.equations[0].parameters)
+    assert [one.name for one in broken.equations[0].parameters if one.at_bound] == ["damping"]
 
 
 def slide(seed, mass=90.0, viscous=200.0, coulomb=20.0):
