@@ -60,8 +60,8 @@ the proposed runs were recorded, of those for which runs were proposed. Sure and
 a wrong statement at a confidence of .9 or more. Extra names: wrong names in addition to the
 hidden effects, over all cases. Error ratio: error on the test runs over the residual of the
 declared model on the same campaign without the hidden effects, median of the rightly named cases
-(their number). A judging seed is used once: `judge` on the first line with it; `seen` on later
-lines. Processor time is of one call on one core of a shared machine.""",
+(their number). A judging seed of a generator is used once: `judge` on the first line with
+both; `seen` on later lines. Processor time is of one call on one core of a shared machine.""",
     MACHINES: """Measured data of machines that were built, recorded and published by others; the
 conversions are in `benchmarks/diagnosis`. Error is the root mean square of the test runs'
 residual, run means included, over that of the target, before and after what was found. A dash
@@ -134,7 +134,8 @@ def _simulated(
 ) -> list[str]:
     use = "develop" if measured.seed is None else part_of(measured.seed)
     seed = "-" if measured.seed is None else str(measured.seed)
-    if use == "judge" and any(c[3] == seed and c[0] != measured.version for c in earlier):
+    same = [c for c in earlier if [*c[2:4]] == [measured.generator, seed]]
+    if use == "judge" and any(c[0] != measured.version for c in same):
         use = "seen"
     solved = [row.solved for row in rows if row.solved is not None]
     ratios = [row.ratio for row in rows if row.ratio is not None]

@@ -4,7 +4,9 @@ from typing import Any
 
 import pytest
 
+from benchmarks.diagnosis.measure import Row
 from benchmarks.diagnosis.own import CHAINS, CLEAN, Answer, draw, plans_of, record, truth_of
+from benchmarks.diagnosis.page import Measured, append
 from benchmarks.diagnosis.scoring import judge, judge_next, outcome
 from benchmarks.diagnosis.truths import CATALOGUED, NOT_HIDDEN, TRUTHS
 from estimation.derived import zero_phase_channels
@@ -127,3 +129,12 @@ def test_a_confounded_case_is_solved_by_the_single_true_name():
     assert judge_next(answer, said(finding("identified", "friction.load"))).right
     both = finding("one_of", "friction.load", alternatives=["motor.saturation"])
     assert not judge_next(answer, said(both)).right
+
+
+def test_a_judging_seed_is_seen_when_another_version_had_it_from_the_same_generator(tmp_path):
+    page = tmp_path / "page.md"
+    row = Row("clean-0", "clean", True, False, 0, [], None, None, 1.0, 1.0, False, "")
+    for version, generator in (("a1", "varied"), ("b2", "strangers"), ("c3", "varied")):
+        append(page, Measured(version, generator, 2_000_000), [row])
+    lines = [line.split(" | ") for line in page.read_text().splitlines() if "2000000" in line]
+    assert [cells[4] for cells in lines] == ["judge", "judge", "seen"]
