@@ -22,7 +22,7 @@ def blaming(title: str) -> Iterator[None]:
     """Raise a fault of a driver as an error that names the driver.
 
     Args:
-        title: The driver and its package, such as `the driver acme of acme-drivers`.
+        title: The driver and its package, such as `The driver acme of acme-drivers`.
 
     Raises:
         ForeignDriverError: The driver raised it.
@@ -34,7 +34,7 @@ def blaming(title: str) -> Iterator[None]:
     except Exception as error:
         place = extract_tb(error.__traceback__)[-1]
         raise ForeignDriverError(
-            f"{title[0].upper()}{title[1:]} failed: {type(error).__name__}: {error}.",
+            f"{title} failed: {type(error).__name__}: {error}.",
             f"It was raised in {place.name}, {place.filename}, line {place.lineno}.",
             "Report it to those who made the package, or install another version of it.",
         ) from error
@@ -54,7 +54,7 @@ def require(answer: object, kind: type[Answer], title: str, call: str) -> Answer
     """
     if not isinstance(answer, kind):
         raise ForeignDriverError(
-            f"{title[0].upper()}{title[1:]} returned {type(answer).__name__} from {call}.",
+            f"{title} returned {type(answer).__name__} from {call}.",
             f"A drivers.device.{kind.__name__} is expected.",
         )
     return answer
@@ -74,7 +74,7 @@ def require_whole(batch: Batch, names: Iterable[str], title: str) -> None:
     if missing or wrong:
         what = f"no column {missing[0]}" if missing else f"a column of the wrong shape: {wrong[0]}"
         raise ForeignDriverError(
-            f"{title[0].upper()}{title[1:]} sent a batch with {what}.",
+            f"{title} sent a batch with {what}.",
             f"Its channels are {', '.join(names)}; each has the shape {whole} of time_s.",
         )
 

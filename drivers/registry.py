@@ -117,7 +117,7 @@ def _opened(entry: EntryPoint, open_it: Callable[[], Device]) -> Device:
     """Open a device; the errors of a driver that is not of this room name it."""
     if entry.module.partition(".")[0] == __name__.partition(".")[0]:
         return open_it()
-    title = f"the driver {entry.name} of {_package(entry)}"
+    title = f"The driver {entry.name} of {_package(entry)}"
     with blaming(title):
         device = open_it()
     return guarded(device, title)

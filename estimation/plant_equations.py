@@ -285,7 +285,7 @@ def missing(plant: Plant) -> list[Missing]:
         found.append(
             Missing(
                 "No [[actuator]] drives the machine: no equation has an effort on its left.",
-                f"An [[actuator]] in place of the [[sensor]] that reads the driving effort, such as"
+                "An [[actuator]] in place of the [[sensor]] that reads the driving effort, such as"
                 f" {efforts[0]}.",
             )
         )

@@ -102,7 +102,7 @@ def named(one: Kept, may_name: bool) -> Finding:
         verdict = "identified" if lead.share >= SURE else "one_of"
     return Finding(
         balance=home,
-        also_in=tuple(dict.fromkeys(e.equation for e in cause.place.enters if e.equation != home)),
+        also_in=tuple(name for name in cause.place.equations if name != home),
         place=cause.place.name,
         family=lead.family if may_name else "unknown",
         verdict=verdict,

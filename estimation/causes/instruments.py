@@ -85,24 +85,18 @@ def noise_share(runs: Sequence[RunSignals], channel: str, cutoff_hz: float = np.
     return float(np.median([noise / (size or 1.0) for noise, size in sizes] or [0.0]))
 
 
-def noisy_bands(equation: Equation, layout: Layout, runs: Sequence[RunSignals]) -> list[FloatArray]:
+def noisy_bands(equation: Equation, runs: Sequence[RunSignals]) -> list[tuple[int, float]]:
     """Return the noisy bands of the columns that are a channel times a constant.
 
-    Args:
-        equation: The equation.
-        layout: Its runs decide which bands are noisy.
-        runs: Runs, shaken ones or not.
-
     Returns:
-        Shape (n, bands) of every run.
+        The place of each among the declared columns, and the cutoff that the band is above, Hz.
     """
-    bands = [
+    return [
         (k, cutoff_hz)
         for k, channel in enumerate(equation.of_channel)
         if channel
-        for cutoff_hz in _cutoffs(layout.runs, channel)
+        for cutoff_hz in _cutoffs(runs, channel)
     ]
-    return [_above(equation, run, bands) for run in runs]
 
 
 def _cutoffs(runs: Sequence[RunSignals], channel: str) -> Iterator[float]:
@@ -115,12 +109,11 @@ def _cutoffs(runs: Sequence[RunSignals], channel: str) -> Iterator[float]:
         yield above
 
 
-def _above(equation: Equation, run: RunSignals, bands: Sequence[tuple[int, float]]) -> FloatArray:
-    """Return declared columns less what is below a cutoff, shape (n, bands)."""
-    columns = _declared(equation, run)
+def above(equation: Equation, run: RunSignals, bands: Sequence[tuple[int, float]]) -> FloatArray:
+    """Return declared columns less what is below the cutoff of each band, shape (n, bands)."""
+    columns, used = _declared(equation, run), run.grid[run.used[equation.name]]
     found = [columns[:, k] - _below(columns[:, k], run, cutoff_hz) for k, cutoff_hz in bands]
-    used = run.grid[run.used[equation.name]]
-    return np.column_stack([x[used] for x in found]) if found else np.zeros((len(used), 0))
+    return np.column_stack([x[used] for x in found])
 
 
 def _below(values: FloatArray, run: RunSignals, cutoff_hz: float) -> FloatArray:

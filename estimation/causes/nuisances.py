@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.causes.candidates import Claim, groups_of, without_declared
-from estimation.causes.instruments import noisy_bands
+from estimation.causes.instruments import above, noisy_bands
 from estimation.causes.joint import Joint
 from estimation.causes.places import places_of
 from estimation.causes.sources import sources_at
@@ -58,13 +58,14 @@ def _with_bands(joint: Joint) -> Joint:
     """
     layout = joint.layout
     for equation in layout.equations.values():
-        columns, shaken = (
-            [{equation.name: band} for band in noisy_bands(equation, layout, runs)]
-            for runs in (layout.runs, layout.shaken)
-        )
-        if columns[0][equation.name].size:
+        bands = noisy_bands(equation, layout.runs)
+        if bands:
+            columns, shaken = (
+                [{equation.name: above(equation, run, bands)} for run in runs]
+                for runs in (layout.runs, layout.shaken)
+            )
             laid = without_declared(joint, [columns], [shaken] if shaken else [], "each")
-            joint = joint.with_cause(laid, np.full(laid.size.shape[1], 4.0 / joint.power))
+            joint = joint.with_cause(laid, np.full(len(bands), 4.0 / joint.power))
     return joint
 
 

@@ -56,6 +56,11 @@ class Place:
     like: str = ""
     others: tuple[tuple[str, ...], ...] = ()
 
+    @property
+    def equations(self) -> tuple[str, ...]:
+        """The equations that it enters, each once."""
+        return tuple(dict.fromkeys(entry.equation for entry in self.enters))
+
 
 def places_of(layout: Layout) -> list[Place]:
     """Return every place the declared equations know of."""

@@ -54,7 +54,7 @@ class Refits:
             acts_in: Run to whether it acts there.
         """
         runs = [name for name, acts in acts_in.items() if acts]
-        for name in dict.fromkeys(e.equation for e in candidate.cause.place.enters):
+        for name in candidate.cause.place.equations:
             part = self._part(candidate, name, runs)
             if part is not None:
                 self.parts[name] = [*self.parts[name], part]

@@ -163,8 +163,9 @@ def _judged(
     """Return the causes that the test runs confirm, their findings, and notes on the others."""
     confirmed, notes = _confirmed(found, held_out, refits.numbers)
     opened: dict[int, tuple[Kept, Finding]] = {}
+    spread = [len(one.scored.candidate.cause.place.equations) for one in confirmed]
     # each equation is refitted on its own, where a cause of several ones could stand in for another
-    for k in sorted(range(len(confirmed)), key=lambda k: len(_entered(confirmed[k]))):
+    for k in sorted(range(len(confirmed)), key=spread.__getitem__):
         one, candidate = confirmed[k], confirmed[k].scored.candidate
         added = _opened(one, [kept for kept, _ in opened.values()], held_out, refits)
         if added is None:
@@ -183,11 +184,6 @@ def _judged(
     return [kept for kept, _ in in_order], [finding for _, finding in in_order], notes
 
 
-def _entered(one: Kept) -> list[str]:
-    """Return the equations that a cause enters."""
-    return list(dict.fromkeys(e.equation for e in one.scored.candidate.cause.place.enters))
-
-
 def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) -> _Opened | None:
     """Add a cause to the equations it enters; None, and nothing added, where no error falls."""
     candidate, sealed = one.scored.candidate, refits.sealed
@@ -203,7 +199,7 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
             f" {candidate.cause.family} acts there; "
             + ("these test runs themselves do." if counted else "not counted in the errors.")
         )
-    entered = _entered(one)
+    entered = candidate.cause.place.equations
     before = {name: refits.test_errors(name) for name in entered}
     refits.add(candidate, acts_in)
     after = {name: refits.test_errors(name) for name in entered}

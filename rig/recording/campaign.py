@@ -129,10 +129,9 @@ def open_campaign_folder(
     """Prepare a campaign's folder and return the runs that are still to be made.
 
     Raises:
-        UsageError: The folder is in use and `resume` was not asked for, or what is in it was
-            recorded with another protocol or configuration.
-        UsageError: A run is beyond a limit, or for another kind of rig.
-        UsageError: Another program records into the folder, or it cannot be made.
+        UsageError: A run is beyond a limit or for another kind of rig, the folder cannot be made,
+            another program records into it, it is in use and `resume` was not asked for, or what
+            is in it was recorded with another protocol or configuration.
     """
     if holder(str(folder.resolve())) is not None:
         raise _is_recorded_into(folder)
