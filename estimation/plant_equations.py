@@ -129,8 +129,8 @@ def signals(plant: Plant) -> Signals:
         count = (sensor and sensor.step) or 0.0
         rest[speed] = count * plant.cutoff_hz if axis.rest_speed is None else axis.rest_speed
     stated = {s.name: Reading(s.noise, s.step, s.rate_hz, s.delay_s) for s in plant.sensors}
-    warmth = {s.name for s in plant.sensors if s.reads == "temperature"}
-    readings = {name: one for name, one in stated.items() if one != Reading() or name in warmth}
+    named = {s.name for s in plant.sensors if s.reads in ("temperature", "position")}
+    readings = {name: one for name, one in stated.items() if one != Reading() or name in named}
     joined = _joined(plant)
     own = {*(s.name for s in plant.sensors), *plant.integrals, *(c.name for c in plant.derived)}
     positions = (c for c in joined if c.name not in own)

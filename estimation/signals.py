@@ -98,7 +98,8 @@ class Signals:
             spindle stands still: an equation is static when the speed of its own friction is below
             the threshold. Slower than a share of the usual speed is at rest too, see
             `estimation.rest`, so 0 is a threshold that follows the data.
-        readings: What is stated of the sensors of some channels; of a temperature that it is one.
+        readings: What is stated of the sensors of some channels; of a temperature or a position
+            that it is one.
         joined: Positions that follow from another's by the ratio of a transmission. One whose axis
             has no encoder is among the combinations, too; else a reading can be compared with it.
     """

@@ -20,10 +20,13 @@ def travel_of(layout: Layout, position: str) -> float:
 def angles_of(layout: Layout) -> list[str]:
     """Return the angles that the equations read, the one with the largest travel first.
 
-    Those that follow by a known ratio come with them. No other channel is ever read: another
-    recorded channel may be a copy of a target.
+    Those that follow by a known ratio come with them. Where they read none, the positions that the
+    machine states are read. No other channel is ever read: another recorded channel may be a copy
+    of a target.
     """
     read = set().union(*map(_read, layout.equations.values()))
+    if not any(name.endswith(ANGLES) for name in read):
+        read |= {*signals_of(layout).readings}
     agreeing = [_ends(one) for one in signals_of(layout).joined if _agrees(layout, one)]
     names = _grown(read.intersection(layout.measured), agreeing)
     angles = [name for name in names if name.endswith(ANGLES)]

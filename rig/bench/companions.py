@@ -6,7 +6,7 @@ the host's too, so both are on one time base, each with the residual of its fit.
 """
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,11 +16,15 @@ from numpy.typing import NDArray
 from drivers.clock import ClockLine, arrival_fit
 from drivers.device import Batch, Device
 from drivers.errors import DriverError, LinkTimeoutError
+from estimation.channels import unit_or_none
 from rig.bench.devices import open_section
 from rig.bench.sensor_logger import require_units
 from rig.configuration.config import Config, is_simulated
 from rig.configuration.sections import DeviceSection
+from rig.errors import UsageError
+from rig.log.devices import channel_of
 from rig.log.schema import Field, Stream
+from rig.log.streams import DEVICES
 from rig.machines.safety import check_samples
 
 REFIT_S = 0.5
@@ -85,6 +89,12 @@ class Companion:
     def channels(self) -> dict[str, str]:
         """Its channels, by the names that `[limits]` has for them."""
         return {f"{self.name}.{channel.name}": channel.name for channel in self.device.channels}
+
+    @property
+    def recorded(self) -> dict[str, str]:
+        """Its channels with a unit, by the names that a recording and the display have for them."""
+        named = {channel_of(self.name, one.name): one.name for one in self.device.channels}
+        return {name: own for name, own in named.items() if unit_or_none(name) is not None}
 
     def begin(self, now_s: float) -> None:
         """Identify it and let its samples come.
@@ -181,9 +191,31 @@ class Companion:
         return time_s if self.line is None else self.line.to_host(sequence / self.rate_hz)
 
 
+def refuse_shared_names(companions: Sequence[Companion], channels: Collection[str]) -> None:
+    """Refuse a further device with a channel that a recording has of another one already.
+
+    Args:
+        companions: The devices, identified.
+        channels: Channels of the device in the logger's place.
+
+    Raises:
+        UsageError: Names the channel and the device.
+    """
+    taken = dict.fromkeys(channels, "[logger]")
+    for companion in companions:
+        for name in companion.recorded:
+            if name in taken:
+                raise UsageError(
+                    f"[devices.{companion.name}] and {taken[name]} both have the channel {name!r}.",
+                    "A recording has one column of each name.",
+                    f"Give [devices.{companion.name}] another name.",
+                )
+            taken[name] = f"[devices.{companion.name}]"
+
+
 def topic(name: str) -> str:
     """Return the topic of a device's stream in a log."""
-    return f"/rig/device/{name}"
+    return f"{DEVICES}{name}"
 
 
 def open_companions(config: Config) -> list[Companion]:

@@ -20,7 +20,7 @@ from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import Identity, Result, Trip, TripReport
 from drivers.transport.transport import Transport
-from rig.bench.companions import Companion, open_companions
+from rig.bench.companions import Beside, Companion, open_companions, refuse_shared_names, topic
 from rig.bench.device_logger import logger_on, raw_stream, with_channels
 from rig.bench.flight import FlightRecorder
 from rig.bench.holding import holding
@@ -95,6 +95,7 @@ class Session:
             ways_out.callback(self._stop_streaming)
             for companion in self.companions:
                 companion.begin(self._transport.now_s)
+            refuse_shared_names(self.companions, self.calibrations.channels)
             refuse_unknown_limits(self.config, self.calibrations, self.companions)
             self._logger.start()
             self._ways_out = ways_out.pop_all()
@@ -118,6 +119,10 @@ class Session:
     def counters(self) -> Mapping[str, int]:
         """The link's counters: frames, CRC errors, gaps, lost samples, discarded bytes, retries."""
         return self._logger.counters.as_dict()
+
+    def take_beside(self) -> dict[str, Beside]:
+        """Return the samples of each further device since the last call, by its topic in a log."""
+        return {topic(companion.name): companion.take() for companion in self.companions}
 
     @property
     def board(self) -> dict[str, str]:

@@ -101,6 +101,7 @@ def live(
     options = ShowOptions(
         title=f"rig live: {settings.name}",
         channels=shown_channels(estimators, machine.shown),
+        devices=tuple(settings.devices),
         lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
         plain=plain,
         json=json_,

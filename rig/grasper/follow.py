@@ -162,7 +162,7 @@ def follow_master(
         recorder.start()
         asked = setpoints(master, chief, session.here, duration_s, scale)
         for reading in session.follow(asked, LEAD_S):
-            recorder.write(reading)
+            recorder.write(reading, session.take_beside())
             played = reading.where(reading.setpoint >= 0)
             if len(played):
                 for axis in followed:

@@ -9,6 +9,7 @@ from rig.errors import DataError
 from rig.log.attempts import heads_of, is_unfinished, run_name, standing, started_ns
 from rig.log.check import logs_in, looks_like_log
 from rig.log.convert import exclusion, recording_from_log
+from rig.log.devices import device_topics
 from rig.log.reader import LogFile, damaged, read_log
 from rig.log.streams import SAMPLE
 
@@ -100,7 +101,7 @@ def _run(head: LogFile, several: bool) -> Run:
     name = f"{path.parent.name}/{run_name(head)}" if several else run_name(head)
 
     def load() -> Recording:
-        topics = None if unfinished else (SAMPLE,)
+        topics = None if unfinished else (SAMPLE, *device_topics(head))
         recording = recording_from_log(read_log(path, topics, tolerant=unfinished))
         return replace(recording, name=name) if several else recording
 

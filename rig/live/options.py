@@ -15,6 +15,7 @@ class ShowOptions:
     Attributes:
         title: Title of the display.
         channels: Quantities to watch, the main one first.
+        devices: Further devices whose channels are shown too.
         lever_m: Lever arm from the jaw's axis to its tip, m; 12 mm in O'Neill et al. 2018.
         plain: Lines for people, also in a terminal that could draw.
         json: One JSON object a line on stdout, nothing for people.
@@ -26,6 +27,7 @@ class ShowOptions:
 
     title: str
     channels: tuple[str, ...] = ("distal_torque_n_m",)
+    devices: tuple[str, ...] = ()
     lever_m: float = 0.012
     plain: bool = False
     json: bool = False

@@ -9,6 +9,8 @@ import numpy as np
 
 from drivers.transport import Transport
 from estimation.channels import ESTIMATED, unit_of
+from estimation.recording import Flag, FloatArray
+from rig.bench.companions import Beside, Companion, topic
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
@@ -48,6 +50,7 @@ def session_blocks(
             session.settle()
             session.take_zeros(ZERO_S)
         calibrations = CalibrationStatus(config, session.calibrations.name)
+        held = _Held(session.companions)
         named = dict.fromkeys(f"{ESTIMATED}{one.target_channel}" for one in estimators)
         with closing(_Hand(session, keys, LiveRecorder(session, folder, further=[*named]))) as hand:
             for reading in _readings(session, plans, hand):
@@ -58,12 +61,13 @@ def session_blocks(
                     recorded[f"{ESTIMATED}{one.target_channel}"] = within_range(one, estimate)
                 devices = _device_status(session, reading)
                 limits = _limits(session, reading)
-                hand.obey(replace(reading, columns=recorded))
+                beside = session.take_beside()
+                hand.obey(replace(reading, columns=recorded), beside)
                 if hand.leaves:
                     return
                 yield SampleBlock(
                     reading.time_s,
-                    reading.columns,
+                    {**reading.columns, **held.columns(beside, len(reading))},
                     reading.flags,
                     estimates,
                     reading.lost,
@@ -83,7 +87,7 @@ class _Hand:
         self.leaves = False
         self.stopped = False
 
-    def obey(self, reading: Reading) -> None:
+    def obey(self, reading: Reading, beside: Mapping[str, Beside]) -> None:
         """Do what the keys pressed since the last reading ask for, and record."""
         for key in self._keys():
             if key == LEAVE:
@@ -99,7 +103,7 @@ class _Hand:
             elif key == MARK:
                 self._recorder.mark()
                 self._said = "" if self._recorder.is_on else "no recording to mark: r starts one"
-        self._recorder.write(reading)
+        self._recorder.write(reading, beside)
 
     def status(self) -> tuple[DeviceStatus, ...]:
         """Return the message for the user."""
@@ -124,6 +128,37 @@ class _Hand:
         else:
             self._session.take_zeros(ZERO_S)
             self._said = "tared"
+
+
+class _Held:
+    """Values of further devices for the display, which come at rates of their own.
+
+    Those that came with a block are spread evenly over it, and the last one is held in the next: a
+    display shows them late by a block. A log has them at their own times.
+
+    Args:
+        companions: The devices.
+    """
+
+    def __init__(self, companions: Sequence[Companion]) -> None:
+        self._companions = companions
+        self._last: dict[str, float] = {}
+
+    def columns(self, beside: Mapping[str, Beside], samples: int) -> dict[str, FloatArray]:
+        """Return the value of each channel at the samples of a block; none before its first."""
+        found = {}
+        for companion in self._companions:
+            block = beside[topic(companion.name)]
+            for name, own in companion.recorded.items():
+                values = block.columns[own][(block.flags & Flag.MISSING) == 0]
+                if values.size:
+                    self._last[name] = float(values[-1])
+                if name not in self._last:
+                    continue
+                places = np.linspace(0, 1, samples), np.linspace(0, 1, values.size)
+                held = np.full(samples, self._last[name])
+                found[name] = np.interp(*places, values) if values.size else held
+        return found
 
 
 def _readings(session: Session, plans: Sequence[Plan], hand: _Hand) -> Iterator[Reading]:

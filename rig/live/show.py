@@ -19,6 +19,7 @@ from rig.live.options import ShowOptions
 from rig.live.state import LiveState, Snapshot, Summary
 from rig.live.text import json_frame, plain_line, summary_lines
 from rig.live.view import View
+from rig.log.devices import channel_of
 from rig.output.console import emit_json
 
 MOST_SHOWN = 6
@@ -57,9 +58,9 @@ def show(
         clock: Monotonic time, s; only for silence and for frames that cost too much.
     """
     close = getattr(blocks, "close", None)
-    if not options.channels:  # whatever the device measures
+    if not options.channels or options.devices:  # which channels they have, they know alone
         first = next(blocks)
-        options = replace(options, channels=tuple(first.columns)[:MOST_SHOWN])
+        options = replace(options, channels=_shown(options, first))
         blocks = chain([first], blocks)
     state = LiveState(options.channels, all_columns=options.keys is not None)
     writer = _writer(options, console, clock)
@@ -75,6 +76,15 @@ def show(
     summary = state.summary(ended)
     writer.summary(summary)
     return summary
+
+
+def _shown(options: ShowOptions, first: SampleBlock) -> tuple[str, ...]:
+    """Return the stated channels with those of further devices; of a device alone, all it has."""
+    if not options.channels:
+        return tuple(first.columns)[:MOST_SHOWN]
+    prefixes = tuple(channel_of(device, "") for device in options.devices)
+    further = [name for name in first.columns if name.startswith(prefixes)]
+    return tuple(dict.fromkeys([*options.channels, *further[:MOST_SHOWN]]))
 
 
 @dataclass(frozen=True)

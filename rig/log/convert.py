@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.recording import FloatArray, Recording
 from rig.errors import DataError
+from rig.log.devices import device_columns
 from rig.log.reader import LogFile
 from rig.log.run import CONFIG, SIMULATED, RunEnd, RunInfo
 from rig.log.streams import SAMPLE, sample_stream
@@ -88,7 +89,9 @@ def write_recording(path: Path, recording: Recording) -> Path:
 
 
 def recording_from_log(log: LogFile) -> Recording:
-    """Return the samples of a log as a recording.
+    """Return the samples of a log as a recording, with the channels of further devices.
+
+    A device's sample that is flagged flags the run's samples at its time.
 
     A run that did not end as planned has a remark in its notes. One whose log was not closed, or is
     damaged, is excluded from evidence, with the reason.
@@ -117,11 +120,12 @@ def recording_from_log(log: LogFile) -> Recording:
         )
     channels = [f.name for f in topic.stream.fields if f.dtype == "float64" and f.name != "time_s"]
     run = log.run
+    further, further_flags = device_columns(log)
     return Recording(
         name=run.name,
         time_s=topic.rows["time_s"],
-        columns={name: topic.rows[name] for name in channels},
-        flags=topic.rows["flags"].astype(np.uint8),
+        columns={**further, **{name: topic.rows[name] for name in channels}},
+        flags=topic.rows["flags"].astype(np.uint8) | further_flags,
         conditions=run.conditions,
         rig=run.rig,
         instrument=run.instrument,

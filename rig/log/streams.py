@@ -12,6 +12,8 @@ from rig.log.schema import Field, Stream
 SAMPLE = "/rig/sample"
 COUNTS = "/rig/counts"
 FLIGHT = "/rig/flight"
+DEVICES = "/rig/device/"
+"""Topics of further devices begin so and end in the device's name."""
 RATE_HZ = 1000.0
 FLIGHT_BYTES = 56
 """Bytes of commands in one message."""

@@ -243,16 +243,15 @@ def _record_run(
     )
     _set_aside(path)
     with (
-        SessionLog(session, path, info, companions=session.companions) as log,
+        SessionLog(session, path, info) as log,
         _crossing_in(log, session, run_start_us),
     ):
         for reading in itertools.chain([first], readings):
             run = _of_run(reading, motion)
-            beside = {c.stream().topic: c.take() for c in session.companions}
+            beside = session.take_beside()
             if len(run):
                 log.write_reading(run)
-                for topic, block in beside.items():
-                    log.write_beside(topic, block)
+                log.write_beside(beside)
                 samples += len(run)
                 if on_progress:
                     on_progress(plan.name, samples, expected)
@@ -282,8 +281,7 @@ def _crossing_in(log: SessionLog, session: Session, run_start_us: int) -> Iterat
         newest = session.newest
         if newest is not None and newest.tick_us[0] > run_start_us:
             log.write_reading(newest)
-            for companion in session.companions:
-                log.write_beside(companion.stream().topic, companion.take())
+            log.write_beside(session.take_beside())
             log.write_flight()
         raise
 

@@ -1,11 +1,12 @@
 """Recording what the live display shows: one log from one key to the next."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
 from estimation.recording import Mark
+from rig.bench.companions import Beside
 from rig.bench.session import Session
 from rig.log.recalibrate import ZERO_SUFFIX
 from rig.log.run import RunEnd, RunInfo
@@ -65,11 +66,12 @@ class LiveRecorder:
         self._log = SessionLog(self._session, self.path, info, further=self._further)
         self._samples = self._marks = 0
 
-    def write(self, reading: Reading) -> None:
-        """Write a reading, if a log is open."""
+    def write(self, reading: Reading, beside: Mapping[str, Beside]) -> None:
+        """Write a reading and the samples of further devices by topic, if a log is open."""
         if self._log is None:
             return
         self._log.write_reading(reading)
+        self._log.write_beside(beside)
         self._log.write_flight()
         self._samples += len(reading)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from calibration.zero import SensorZero
 from drivers.clock import rising
 from rig import __version__
-from rig.bench.companions import Beside, Companion
+from rig.bench.companions import Beside, topic
 from rig.bench.session import Session
 from rig.log.container import Attached
 from rig.log.recalibrate import ATTACHMENT, ZERO_SUFFIX
@@ -32,7 +32,6 @@ class SessionLog(LogWriter):
         path: Path of the log, ending in `.mcap`.
         run: What is known of the run beyond what the session states; its start is known.
         further: Columns that readings have in addition to those of the session.
-        companions: Further devices whose samples are written.
     """
 
     def __init__(
@@ -42,14 +41,13 @@ class SessionLog(LogWriter):
         run: RunInfo,
         *,
         further: Sequence[str] = (),
-        companions: Sequence[Companion] = (),
     ) -> None:
         config, calibrations = session.config, session.calibrations
         settings = json.dumps(config.logged(), indent=1).encode()
         streams = [
             sample_stream((*calibrations.channels, *further), session.raw.rate_hz),
             session.raw,
-            *(companion.stream() for companion in companions),
+            *(companion.stream() for companion in session.companions),
             *([FLIGHT_STREAM] if session.flight else []),
         ]
         super().__init__(
@@ -73,7 +71,7 @@ class SessionLog(LogWriter):
         self.newest_s = 0.0
         """Time of the newest sample, s, on the run's clock."""
         self._flown = 0
-        self._least_s = {c.stream().topic: 0.5 / c.rate_hz for c in companions}
+        self._least_s = {topic(c.name): 0.5 / c.rate_hz for c in session.companions}
         self._beside_s: dict[str, float] = {}
 
     def write_reading(self, reading: Reading) -> None:
@@ -92,11 +90,18 @@ class SessionLog(LogWriter):
         self.write(COUNTS, counts, log_time_ns)
         self._newest_ns, self.newest_s = int(log_time_ns[-1]), float(since_us[-1]) * 1e-6
 
-    def write_beside(self, topic: str, block: Beside) -> None:
-        """Write what a further device measured since the run began, on the logger's clock.
+    def write_beside(self, blocks: Mapping[str, Beside]) -> None:
+        """Write what further devices measured since the run began, on the logger's clock.
 
         Both clocks' lines are fitted again all the time; times increase all the same.
+
+        Args:
+            blocks: Samples of each by the topic of its stream.
         """
+        for name, block in blocks.items():
+            self._write_device(name, block)
+
+    def _write_device(self, topic: str, block: Beside) -> None:
         start_us = self._start_us or 0
         if not block.host_s.size:
             return

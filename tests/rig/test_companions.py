@@ -9,14 +9,16 @@ import pytest
 
 from drivers.errors import LinkTimeoutError
 from drivers.ft300.fake import Ft300Fake
-from rig.bench.companions import topic
+from rig.bench.companions import refuse_shared_names, topic
 from rig.bench.session import Session
 from rig.configuration.config import SHIPPED, SIMULATED
-from rig.errors import SafetyTripError
+from rig.errors import SafetyTripError, UsageError
+from rig.importers.registry import open_campaign
 from rig.log.check import Verdict, check_log
 from rig.log.reader import read_log
 from rig.log.run import RunInfo
 from rig.recording.campaign import open_campaign_folder, record_campaign
+from rig.recording.recorder import LiveRecorder
 from rig.recording.session_log import SessionLog
 from tests.rig.simulated import is_armed, session, short_protocol, simulated, transport
 
@@ -52,8 +54,34 @@ def test_the_display_lists_it(tmp_path, said):
     path = tmp_path / "rig.toml"
     path.write_text(SIMULATED.read_text() + FT)
     printed = said("live --duration 0.3 --pace 0 --json -c", path).out
-    devices = json.loads(printed.splitlines()[0])["devices"]
-    assert {"name": "ft", "state": "ok", "detail": "ft300"} in devices
+    frame = json.loads(printed.splitlines()[0])
+    assert {"name": "ft", "state": "ok", "detail": "ft300"} in frame["devices"]
+    assert np.isfinite(frame["channels"]["ft_force_z_n"]["sensor"])
+
+
+def test_its_channels_are_those_of_a_recording(tmp_path):
+    with session(with_ft()) as rig:
+        recorder = LiveRecorder(rig, tmp_path)
+        recorder.start()
+        for reading in rig.rest(2.0):
+            recorder.write(reading, rig.take_beside())
+        recorder.stop()
+    (run,) = open_campaign(tmp_path).runs
+    recording = run.recording()
+    assert recording.valid[20:-20].all()
+    force_n = recording["ft_force_z_n"][20:-20]
+    time_s = recording.time_s[20:-20]
+    turn = np.stack([np.sin(2 * np.pi * time_s), np.cos(2 * np.pi * time_s)], axis=1)
+    found, *_ = np.linalg.lstsq(turn, force_n)
+    assert np.hypot(*found) == pytest.approx(90.0, rel=0.02)  # a sine of 1 Hz
+    assert np.abs(force_n - turn @ found).max() < 1.0
+
+
+def test_a_device_whose_channel_is_another_ones_is_refused():
+    with session(with_ft()) as rig:
+        refuse_shared_names(rig.companions, rig.calibrations.channels)
+        with pytest.raises(UsageError, match=r"\[logger\] both have the channel 'ft_force_z_n'"):
+            refuse_shared_names(rig.companions, ["ft_force_z_n"])
 
 
 @pytest.mark.parametrize("sends", [b"", b"\x55\xaa"])
@@ -116,12 +144,12 @@ def test_its_times_increase_while_the_clocks_are_fitted_again(tmp_path, monkeypa
         (ft,) = rig.companions
         next(rig.rest(0.5))
         line = rig.clock.line
-        with SessionLog(rig, path, RunInfo(name="run"), companions=[ft]) as log:
+        with SessionLog(rig, path, RunInfo(name="run")) as log:
             for number, reading in enumerate(rig.rest(2.0)):
                 moved = replace(line, host_s=line.host_s + 0.03 * (number % 2))
                 monkeypatch.setattr(rig, "clock", SimpleNamespace(line=moved))
                 log.write_reading(reading)
-                log.write_beside(topic("ft"), ft.take())
+                log.write_beside(rig.take_beside())
     rows = read_log(path, tolerant=True).topics[topic("ft")].rows
     time_s, sequence = rows["time_s"], rows["sequence"]
     assert np.diff(time_s).min() > 0.004
