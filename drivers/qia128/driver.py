@@ -1,7 +1,7 @@
 """The driver of a QIA128: its calibration is read from it, then it streams."""
 
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
 RATE_HZ = 1300.0
+Unit = Literal["N m", "N", "1"]
+COLUMNS: dict[Unit, str] = {"N m": "torque_n_m", "N": "force_n", "1": "load_ratio"}
+"""Unit of the rated load to the channel's name, which ends in it."""
 REPLY_TIMEOUT_S = 0.2
 
 
@@ -27,7 +30,7 @@ class Qia128(StreamedDevice):
     Args:
         transport: The way to it; the device closes it.
         rated_load: Load of the calibration's full-scale point, from the certificate.
-        unit: Unit of `rated_load`; `1` gives the fraction of full scale.
+        unit: Unit of `rated_load`, `N m` or `N`; `1` gives the fraction of full scale.
         rate_hz: Samples a second. 1300 is set; for any other rate, the amplifier is left as it is.
         serial: Serial number from its label, for one that does not answer the question for it as
             assumed, with four bytes high byte first: then it is not asked.
@@ -39,13 +42,14 @@ class Qia128(StreamedDevice):
         self,
         transport: Transport,
         rated_load: float = 1.0,
-        unit: str = "1",
+        unit: Unit = "1",
         rate_hz: float = RATE_HZ,
         serial: str = "",
     ) -> None:
         super().__init__(transport, rate_hz, "QIA128")
         self._rated_load = rated_load
         self._unit = unit
+        self._column = COLUMNS[unit]
         self._serial = serial
         self._frames = SlidingFrames(protocol.FRAME_SIZE, protocol.frame_checks, self._counters)
         self._points: tuple[int, int] | None = None
@@ -56,7 +60,7 @@ class Qia128(StreamedDevice):
         low, high = -np.inf, np.inf
         if self._points is not None:
             low, high = np.sort(self._load(np.array([0.0, protocol.TOP]))).tolist()
-        return (Channel("load", self._unit, self._rate_hz, low, high, "load on the sensor"),)
+        return (Channel(self._column, self._unit, self._rate_hz, low, high, "load on the sensor"),)
 
     def identify(self) -> DeviceIdentity:
         """End the stream, ask for the serial number and the calibration.
@@ -96,7 +100,7 @@ class Qia128(StreamedDevice):
         """Return the loads that have come; a reading at an end of the range is saturated."""
         raw = protocol.readings(self._frames.read(self._transport, timeout_s))
         flags = flags_of((raw == 0) | (raw == protocol.TOP))
-        return {"load": self._load(raw.astype(np.float64))}, flags
+        return {self._column: self._load(raw.astype(np.float64))}, flags
 
     def stop(self) -> None:
         """Switch the stream off."""
@@ -129,7 +133,7 @@ class Qia128(StreamedDevice):
 def open_qia128(
     url: str,
     rated_load: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0,
-    unit: str = "1",
+    unit: Unit = "1",
     rate_hz: RateOption = RATE_HZ,
     baud_rate: BaudOption = 320_000,
     serial: str = "",

@@ -33,7 +33,7 @@ class Quantity:
 QUANTITIES = {
     "N-m": Quantity("torque_n_m", "N m", 1.0),
     "deg": Quantity("angle_rad", "rad", math.pi / 180),
-    "rpm": Quantity("speed_rad_per_s", "rad/s", 2 * math.pi / 60),
+    "rpm": Quantity("speed_rad_s", "rad/s", 2 * math.pi / 60),
     "KW": Quantity("power_w", "W", 1000.0),
 }
 """The units seen, by the text on a line."""

@@ -18,6 +18,7 @@ from drivers.teensy.grasper_board import GRASPER_LOGIC
 from drivers.teensy_master.fake import TurnedByHand
 from drivers.transport.faulty import Fault, Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
+from estimation.channels import UNIT_BY_SUFFIX, unit_of
 from tests.drivers.emulated_board import MISSING
 from tests.drivers.emulated_board import open_fake as open_emulated
 
@@ -75,6 +76,9 @@ def read_on(device: Device, longer_s: float) -> list[Batch]:
 def check(device: Device, batches: list[Batch]) -> None:
     """Hold batches against what a batch promises."""
     channels = {channel.name: channel for channel in device.channels}
+    for channel in device.channels:
+        if channel.unit in UNIT_BY_SUFFIX.values() and channel.unit != "1":
+            assert unit_of(channel.name) == channel.unit  # else a recording cannot have it
     sequence = np.concatenate([batch.sequence for batch in batches])
     time_s = np.concatenate([batch.time_s for batch in batches])
     assert (np.diff(sequence) > 0).all()

@@ -106,12 +106,12 @@ def test_it_identifies_itself_and_streams_in_the_unit_of_its_certificate():
     assert device.identify().serial == "4711"
     device.start()
     batches = [device.read(0.1) for _ in range(40)]
-    load = np.concatenate([batch.columns["load"] for batch in batches])
+    load = np.concatenate([batch.columns["torque_n_m"] for batch in batches])
     assert abs(len(load) - 2600) < 70
     assert load.max() == pytest.approx(0.2, abs=1e-6)
     assert load.min() == pytest.approx(-0.2, abs=1e-6)
     (channel,) = device.channels
-    assert (channel.unit, channel.rate_hz) == ("N m", 1300.0)
+    assert (channel.name, channel.unit, channel.rate_hz) == ("torque_n_m", "N m", 1300.0)
     assert channel.lower < -0.5 < 0.5 < channel.upper
     device.close()
     assert not fake.streaming
