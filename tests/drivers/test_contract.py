@@ -168,7 +168,8 @@ def test_it_survives_a_fault_and_names_it(name, fault):
     batches += read_on(device, 3 * duration_s)
     assert faults.struck[fault] > 0
     rose = {kind for kind, count in device.counters.items() if count > before[kind]} - EVIDENCE
-    assert rose == SAID[device.name][fault]
+    said = SAID.get(name if name in NAMES else device.name)
+    assert rose if said is None else rose == said[fault]  # no words are declared of a foreign one
     settled = troubles(device)
     batches += read_some(device, 30)
     assert troubles(device) == settled, "the fault is over and the driver still stumbles"
@@ -177,7 +178,7 @@ def test_it_survives_a_fault_and_names_it(name, fault):
 
 
 def test_the_words_of_a_fault_are_declared_for_every_driver():
-    assert set(SAID) == set(NAMES)
+    assert set(SAID) == set(tomllib.loads(PROJECT.read_text())["project"]["entry-points"][DRIVERS])
     for name, said in SAID.items():
         assert set(said) == set(Fault) - {Fault.DISCONNECT}
         readme = Path(inspect.getfile(drivers()[name].open)).with_name("README.md").read_text()
