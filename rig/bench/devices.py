@@ -6,7 +6,7 @@ from functools import partial
 from drivers.device import Device
 from drivers.registry import open_device, open_fake
 from drivers.teensy.device import TeensyDevice, raw_channels
-from rig.bench.logger import DRIVE, open_logger
+from rig.bench.logger import DRIVE, SENSOR, open_logger
 from rig.configuration.check import LOGGER
 from rig.configuration.config import Config, is_simulated
 from rig.configuration.sections import DeviceSection
@@ -29,14 +29,18 @@ def open_section(section: DeviceSection) -> Device:
 
 def openers(config: Config) -> Iterator[tuple[str, Callable[[], Device]]]:
     """Yield name and a function that opens it, of the logger and of each further device."""
+    sections = {LOGGER: config.logger, **config.devices}
+    if config.logger.profile != SENSOR:
+        del sections[LOGGER]
+        yield LOGGER, partial(_open_board, config)
+    for name, section in sections.items():
+        yield name, partial(open_section, section)
+
+
+def _open_board(config: Config) -> Device:
     counts = {line.counts for line in config.calibration_set().channels.values()}
     if config.logger.driver == "epos4" or config.logger.profile == DRIVE:
         counts -= {"current"}  # a drive that is switched off reports no current
     profile = machine_of(config).profile
     wired = [channel for channel in raw_channels(profile) if channel.field in counts]
-    yield (
-        LOGGER,
-        lambda: TeensyDevice(open_logger(config, step_s=SIMULATED_STEP_S), wired, profile),
-    )
-    for name, section in config.devices.items():
-        yield name, partial(open_section, section)
+    return TeensyDevice(open_logger(config, step_s=SIMULATED_STEP_S), wired, profile)

@@ -9,7 +9,7 @@ from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Trip
 from rig.bench.devices import openers
 from rig.bench.limited import limit_problems
-from rig.bench.logger import open_logger
+from rig.bench.logger import SENSOR, open_logger
 from rig.bench.trips import WORDS
 from rig.configuration.check import problems
 from rig.configuration.config import Config
@@ -38,7 +38,7 @@ def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
         return  # it would be opened as it must not be
     for name, open_it in openers(config):
         yield from device_findings(name, open_it)
-    if config.logger.driver != "epos4":
+    if config.logger.driver != "epos4" and config.logger.profile != SENSOR:
         yield from board_findings(config)
 
 

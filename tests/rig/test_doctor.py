@@ -37,6 +37,15 @@ def test_a_healthy_simulated_rig_has_no_complaint():
     assert worst(examine(simulated())) is Level.OK
 
 
+def test_a_sensor_where_the_logger_is_is_examined(tmp_path):
+    path = tmp_path / "cell.toml"
+    logger = '[logger]\ndriver = "ft300"\nprofile = "sensor"\nurl = "sim://"\n'
+    path.write_text(f'name = "cell"\ncalibration = "sensor"\n{logger}')
+    found = list(examine(load_config(path)))
+    assert {"identity", "sample rate"} <= {f.check for f in found if f.subject == "logger"}
+    assert worst(found) is Level.OK
+
+
 def test_a_board_that_was_restarted_needs_its_reference(monkeypatch, library):
     board = FirmwareBoard(SimulatedBench(), BoardStart(simulated=False), library)
     link = SimulatedTransport(board)
