@@ -314,7 +314,9 @@ def _parts(effect: Effect) -> list[tuple[int, ...]]:
     """Return the sets of columns that compete: all, and of a polynomial every part of it."""
     count = len(effect.amplitudes)
     everything = tuple(range(count))
-    polynomial = effect.id.startswith(("sensor.gain_nonlinear", "friction.position"))
+    polynomial = effect.id.startswith(
+        ("sensor.gain_nonlinear", "friction.position", "spring.position.curved")
+    )
     if not polynomial:
         return [everything]
     return [p for k in range(1, count + 1) for p in itertools.combinations(everything, k)]

@@ -1,0 +1,34 @@
+"""Gain by position: a drive whose gain changes along its travel."""
+
+from typing import ClassVar
+
+from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
+
+
+class GainByPosition(Pointwise):
+    """A force or torque constant that depends on where the moving part is in the magnet's field.
+
+    Equation: torque = current (a position + b position^2), current in A, position in rad, a in
+    N m/(A rad), b in N m/(A rad^2).
+
+    Check: measure the stall torque at one current at several positions.
+
+    Source: the force factor Bl(x) of a moving coil; Klippel, "Loudspeaker Nonlinearities", J. Audio
+    Eng. Soc. 54 (2006).
+    """
+
+    id = "motor.gain_by_position"
+    balances: ClassVar = {"motor": -1, "grasp": -1}
+    roles: ClassVar = {"current": "motor_current_a", "position": "spindle_angle_rad"}
+    amplitudes = (
+        Parameter("slope", "target / current / position", "linear change with position"),
+        Parameter(
+            "bend", "target / current / position / position", "quadratic change with position"
+        ),
+    )
+    told_apart_by = "stall at one current at several positions"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        along = inputs["current"] * inputs["position"]
+        return along, inputs["position"] * along
