@@ -49,7 +49,6 @@ class Pair:
     """One pair of campaigns and its answer.
 
     Attributes:
-        seed: Seed of the rig.
         planted: What changed, in words; empty where nothing did.
         kind: `nothing`, `parameter` or `effect`.
         found: The names of the changes found, those that share one place joined by `or`.

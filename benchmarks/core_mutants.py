@@ -116,14 +116,7 @@ _NO_CODE = re.compile(r"\s*(//|#|\"|static_assert|using|template|constexpr char|
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """One change of one file of the core.
-
-    Attributes:
-        file: Name of the file.
-        line: Its line, from 1.
-        before: The line.
-        after: The line in its place.
-    """
+    """One change of one file of the core."""
 
     file: str
     line: int
@@ -175,11 +168,7 @@ def killers_of(
 ) -> dict[str, bool] | None:
     """Return which tests notice a mutant, None where it does not compile.
 
-    Args:
-        mutant: The change.
-        folder: Where a copy of the firmware and the settings of the programs are.
-        known: What is known of it.
-        tests: Which tests to make, of `TESTS`.
+    `known` of them are not made again; the folder holds a copy of the firmware and the settings.
     """
     known = dict(known)
     source = folder / "core" / mutant.file

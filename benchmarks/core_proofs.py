@@ -34,10 +34,7 @@ class Decided:
     """What came of one theorem.
 
     Attributes:
-        name: Of the theorem.
-        text: What it states.
         paths: Ways through the code that were followed to their end.
-        seconds: Time it took.
         broken: Claims that some case breaks, and undefined behaviour that some case reaches.
     """
 
@@ -62,13 +59,7 @@ def build(firmware: Path = FIRMWARE) -> Path | None:
 
 
 def decide(program: Path, name: str, python: str, longest_s: float = LONGEST_S) -> Decided:
-    """Decide one theorem.
-
-    Args:
-        program: The compiled theorems.
-        name: Which one.
-        python: Interpreter that has angr.
-        longest_s: Time after which it counts as not shown.
+    """Decide one theorem by an interpreter that has angr; not shown in time is broken.
 
     Raises:
         RuntimeError: The interpreter has no angr, or the theorem could not be decided.

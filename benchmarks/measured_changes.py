@@ -129,10 +129,8 @@ class Answer:
     """A pair and what was found.
 
     Attributes:
-        pair: The pair.
         found: The answer; None where it was refused.
         refused: Why.
-        seconds: Time it took, the reading of the recordings included.
     """
 
     pair: Pair
@@ -142,13 +140,7 @@ class Answer:
 
 
 def answers(data: Path, only: str, skipped: list[str]) -> Iterator[Answer]:
-    """Yield the answer of each pair whose data are there.
-
-    Args:
-        data: Folder of the measured data.
-        only: Part of the name of the pairs to compare.
-        skipped: Where the names of pairs without data go.
-    """
+    """Yield the answer of each pair whose data are in a folder; name the others in `skipped`."""
     for pair in (pair for pair in PAIRS if only in pair.name):
         began = time.monotonic()
         with ExitStack() as stack:

@@ -52,7 +52,6 @@ class Mutant:
     """One change of one file.
 
     Attributes:
-        driver: Folder of the driver.
         what: The change, in a few words.
         source: The whole changed file.
     """

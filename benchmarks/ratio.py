@@ -11,10 +11,8 @@ class Ratio:
 
     Attributes:
         name: What was measured, against which baseline.
-        ratio: The measured ratio.
         target: What it should reach.
         higher_is_better: Whether the target is a floor (True) or a ceiling.
-        detail: The two figures the ratio was made of.
     """
 
     name: str

@@ -29,8 +29,6 @@ class Answer:
         report: The JSON answer, or None when there was none.
         message: Why there was none.
         protocol: Text of the proposed protocol, or None.
-        cpu_s: Processor time of the call, start of the interpreter included.
-        wall_s: Time on the clock.
     """
 
     report: dict[str, Any] | None
@@ -85,12 +83,7 @@ class Rig:
         return option in self._help.split()
 
     def diagnose(self, folder: Path, options: Sequence[str] = ()) -> Answer:
-        """Ask for a diagnosis of a folder of recordings.
-
-        Args:
-            folder: The recordings.
-            options: Further words of the command line.
-        """
+        """Ask for a diagnosis of a folder of recordings, by further words of the command line."""
         to_file = "--json-out" if self.has("--json-out") else "--json"
         with tempfile.TemporaryDirectory(prefix="rig-measure-") as own:
             out, protocol = Path(own, "answer.json"), Path(own, "next.toml")

@@ -30,8 +30,6 @@ class Row:
     """What one case came to.
 
     Attributes:
-        case: Name of the case.
-        kind: Its class.
         right: Whether the answer was right; None where nobody knows.
         sure_and_wrong: Whether a wrong statement was made surely.
         extra: Wrong names in addition to the right ones.
@@ -41,7 +39,6 @@ class Row:
         solved: Whether the answer was right after the proposed runs; None where none were played.
         cpu_s: Processor time of the first call.
         wall_s: Its time on the clock.
-        failed: Whether there was no answer.
         note: What the answer came to, or why there was none.
     """
 
@@ -192,11 +189,6 @@ def _errors_without(
     The declared model is fitted on the answer's training runs of the same campaign simulated
     without the effects, and its error is that of the answer's test runs: over all valid samples,
     filtered as the model says, each run's mean removed.
-
-    Args:
-        write: Writes the campaign without the effects into an empty folder.
-        report: The answer whose training and test runs are used.
-        equations: Names of equations of the case's machine.
     """
     with tempfile.TemporaryDirectory(prefix="case-") as folder:
         write(Path(folder))

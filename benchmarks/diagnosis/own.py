@@ -83,7 +83,6 @@ class Answer:
     Attributes:
         case: Name of its folder.
         kind: One of `KINDS`.
-        effects: The hidden effects; none in a clean case.
         runs: Places of the runs that have them.
         excitation: One of `EXCITATIONS`.
         chain: One of `CHAINS`.
@@ -183,13 +182,7 @@ def write_next(answer: Answer, protocol: Path, folder: Path) -> None:
 def record(
     answer: Answer, plans: Sequence[RunPlan], places: Sequence[int] | None = None
 ) -> Iterator[Recording]:
-    """Yield a case's recordings; nothing in them names what is hidden.
-
-    Args:
-        answer: From `draw`.
-        plans: The runs.
-        places: Place of each run in the campaign; from 0 on when None.
-    """
+    """Yield a case's recordings at their places in the campaign; nothing names what is hidden."""
     rig_seed = int(answer.case[-8:], 16)
     plant = vary(DECLARED_PLANT, rig_seed, SPREAD)
     sensors = _sensors(answer.chain, rig_seed)
@@ -294,12 +287,7 @@ def _steady(index: int) -> RunPlan:
 
 
 def cases(seed: int, counts: Mapping[str, int] = COUNTS) -> Iterator[Case]:
-    """Yield the cases of a seed, the classes in turn, so that half a measurement shows them all.
-
-    Args:
-        seed: Seed of the draw.
-        counts: Cases of each class.
-    """
+    """Yield the cases of a seed, the classes in turn, so that half a measurement shows them all."""
     of_kind = [[_case(kind, k, seed) for k in range(counts.get(kind, 0))] for kind in KINDS]
     for turn in itertools.zip_longest(*of_kind):
         yield from (case for case in turn if case is not None)

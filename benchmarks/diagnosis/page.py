@@ -74,8 +74,6 @@ class Measured:
     """What was measured.
 
     Attributes:
-        version: Commit that was measured.
-        generator: Name of the generator.
         seed: Seed of the draw, or None for a generator without one.
     """
 
@@ -85,13 +83,7 @@ class Measured:
 
 
 def append(page: Path, measured: Measured, rows: Sequence[Row]) -> None:
-    """Write the lines of one measurement; lines of the same one are replaced.
-
-    Args:
-        page: The page; begun when there is none.
-        measured: What was measured.
-        rows: Its rows.
-    """
+    """Write the lines of one measurement on a page; lines of the same one are replaced."""
     old = page.read_text() if page.exists() else ""
     lines = {section: _lines(old, section) for section in COLUMNS}
     machines = [row for row in rows if row.kind == MACHINE]

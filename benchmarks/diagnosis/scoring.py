@@ -45,7 +45,6 @@ class Truth:
     """What is hidden in a case.
 
     Attributes:
-        kind: Kind of the case.
         hidden: The effects; none in a clean case.
         runs: Names of the runs that have them.
         either: In a confounded case: families that its runs cannot distinguish; else empty.

@@ -98,7 +98,6 @@ class Run:
     """One run, without its hidden effect.
 
     Attributes:
-        number: Of the run.
         time_s: From its first sample.
         age_s: Time since the campaign began.
         position: Of the driven axis.
@@ -305,13 +304,7 @@ class Stranger:
 
 
 def cases(seed: int, counts: Mapping[str, int], kept: Path) -> Iterator[Case]:
-    """Yield the cases of a block of seeds, the classes in turn.
-
-    Args:
-        seed: First seed of the block.
-        counts: Cases of each class, at most a block.
-        kept: Folder where the answers are kept.
-    """
+    """Yield the cases of a block of seeds, the classes in turn; answers are kept in a folder."""
     turns = [[(k, seed + n) for n in range(min(counts.get(k, 0), BLOCK))] for k in KINDS]
     for turn in itertools.zip_longest(*turns):
         for kind, one in filter(None, turn):

@@ -15,7 +15,8 @@ import json
 import math
 import re
 import sys
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,27 +32,33 @@ STATE = Path("build/reliability.json")
 TABLE = Path("docs/results/reliability.md")
 SHORT_STATE = Path("build/reliability-short.json")
 SHORT_TABLE = Path("build/reliability-short.md")
-PARTS = ("soak", "pty", "canopen", "faults", "encoders", "kills", "network", "fuzz")
-OF_PART = {
-    "soak": r"firmware core, ",
-    "pty": r"firmware process ",
-    "canopen": r"EPOS4 fake ",
-    "faults": r"\d+ faults |samples mis-stamped|crashes|\d+ trips: |\d+ dead hosts ",
-    "encoders": r"\d+ motions with all encoders ",
-    "kills": r"\d+ recorders killed",
-    "network": r"listening ",
-    "fuzz": r"fuzzed decoders",
-}
-"""How the figures of a part's rows begin."""
-_GOALS_S = {"soak": 3600, "pty": 600, "canopen": 60}
-_FULL = {"soak": ("virtual", 3600), "pty": ("real", 600), "canopen": ("canopen", 60)} | {
-    "faults": ("faults", 1000),
-    "encoders": ("rides", 640),
-    "kills": ("kills", 200),
-}
-"""By part, the option that says how much of it is measured, and its goal."""
 SAFE_S, WATCHDOG_S = 0.020, 0.052
 FARTHEST_RAD = math.radians(5.0)
+
+Figures = dict[str, Any]
+Row = tuple[str, str, str, str]
+"""Figure, what was measured, goal, and whether it was met."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is measured by itself.
+
+    Attributes:
+        unmeasured: Its figure while it was never measured.
+        begins: Pattern of how the figures of its rows begin.
+        measure: Measures it as the command line asks.
+        rows: Makes the rows of its figures.
+        option: Option that says how much of it is measured; empty without one.
+        goal: Its goal, in the unit of the option.
+    """
+
+    unmeasured: str
+    begins: str
+    measure: Callable[[argparse.Namespace], Figures]
+    rows: Callable[[Figures], list[Row]]
+    option: str = ""
+    goal: int = 0
 
 
 def main() -> int:
@@ -68,12 +75,17 @@ def main() -> int:
     unknown = set(options.parts) - set(PARTS)
     if unknown:
         parser.error(f"unknown part {', '.join(sorted(unknown))}")
-    parts = options.parts or PARTS
-    short = any(is_short(part, options) for part in parts)
+    asked = {name: PARTS[name] for name in options.parts or PARTS}
+    short = any(p.option and getattr(options, p.option) < p.goal for p in asked.values())
     state, table = (SHORT_STATE, SHORT_TABLE) if short else (STATE, TABLE)
-    for part in parts:
-        sys.stderr.write(f"{part} ...\n")
-        _keep(state, part, _MEASURES[part](options))
+    for name, part in asked.items():
+        sys.stderr.write(f"{name} ...\n")
+        figures, now = part.measure(options), Provenance.now(SEED)
+        made = {"made": f"{now.date}, {now.commit}, {now.seed}"}
+        state.parent.mkdir(exist_ok=True)
+        write_text_atomic(
+            state, json.dumps({**_kept(state), name: figures | made}, indent=1) + "\n"
+        )
     earlier = TABLE.read_text() if TABLE.is_file() else ""
     write_text_atomic(table, written(_kept(state), earlier))
     why = f"; a short run, {TABLE} is as it was" if short else ""
@@ -81,113 +93,28 @@ def main() -> int:
     return 0
 
 
-def is_short(part: str, options: argparse.Namespace) -> bool:
-    """Return whether less of a part is asked for than its goal."""
-    if part not in _FULL:
-        return False
-    option, goal = _FULL[part]
-    return bool(getattr(options, option) < goal)
-
-
-def _kept(state: Path) -> dict[str, Any]:
+def _kept(state: Path) -> dict[str, Figures]:
     """Return the figures of every part that was ever measured."""
-    figures: dict[str, Any] = json.loads(state.read_text()) if state.is_file() else {}
+    figures: dict[str, Figures] = json.loads(state.read_text()) if state.is_file() else {}
     return figures
 
 
-def _keep(state: Path, part: str, figures: dict[str, Any]) -> None:
-    state.parent.mkdir(exist_ok=True)
-    kept = {**_kept(state), part: figures | _made()}
-    write_text_atomic(state, json.dumps(kept, indent=1) + "\n")
-
-
-def _made() -> dict[str, str]:
-    """Return when and from what a part's figures were made."""
-    now = Provenance.now(SEED)
-    return {"made": f"{now.date}, {now.commit}, {now.seed}"}
-
-
-def _faults(options: argparse.Namespace) -> dict[str, Any]:
-    outcomes = list(faults.inject(options.faults))
-    silence = ("host killed", "cable cut")
-    safe = [o for o in outcomes if o.safe_after_s is not None and o.kind not in silence]
-    silent = [o for o in outcomes if o.kind in silence]
-    return {
-        "count": len(outcomes),
-        "kinds": len({o.kind for o in outcomes}),
-        "detected": sum(o.detected for o in outcomes),
-        "named": sum(o.named for o in outcomes),
-        "mis_stamped": sum(o.mis_stamped for o in outcomes),
-        "crashes": sum(bool(o.crash) for o in outcomes),
-        "trips": len(safe),
-        "slowest_safe_s": max(o.safe_after_s or 0.0 for o in safe),
-        "silences": len(silent),
-        "slowest_silent_s": max(
-            np.inf if o.safe_after_s is None else o.safe_after_s for o in silent
-        ),
-        "missed": sorted({f"{o.kind} {o.crash}".strip() for o in outcomes if not o.named}),
-    }
-
-
-def _encoders(options: argparse.Namespace) -> dict[str, Any]:
-    """Half of the motions begin in the last 0.4 rad and are slow; a quarter as many are sound."""
-    dead = [dead_encoders.ride(k // 2, slow=k % 2 == 0) for k in range(options.rides)]
-    sound = [dead_encoders.ride(k, dead=False).trip for k in range(options.rides // 4)]
-    return {
-        "count": len(dead),
-        "farthest_rad": max(ride.beyond_rad for ride in dead),
-        "beyond": sum(ride.beyond_rad > FARTHEST_RAD for ride in dead),
-        "sound": len(sound),
-        "false": sum(trip is Trip.ENCODER_FROZEN for trip in sound),
-    }
-
-
-def _kills(options: argparse.Namespace) -> dict[str, Any]:
-    killed = kills.kill_many(options.kills)
-    lost_s = [one.lost_s for one in killed]
-    return {
-        "count": len(killed),
-        "most_lost_s": max(lost_s),
-        "median_lost_s": float(np.median(lost_s)),
-    }
-
-
-_MEASURES = {
-    "soak": lambda o: asdict(soak.soak("simulated", o.virtual, "firmware core, virtual time")),
-    "pty": lambda o: asdict(soak.soak("pty", o.real, "firmware process on a pty, real time")),
-    "canopen": lambda o: asdict(
-        soak.soak("canopen_virtual", o.canopen, "EPOS4 fake on a virtual CAN bus, real time")
-    ),
-    "faults": _faults,
-    "encoders": _encoders,
-    "kills": _kills,
-    "network": lambda o: listening.measure(),
-    "fuzz": lambda o: {},  # its own command measures it; here it is only reported
-}
-
-
-def written(figures: dict[str, Any], earlier: str) -> str:
+def written(figures: dict[str, Figures], earlier: str) -> str:
     """Return the page; parts without figures keep their rows of the earlier one."""
     tallies = fuzz.load(fuzz.STATE)
     done = sum(tally.inputs for tally in tallies.values())
     fuzzed = done >= fuzz.TOTAL or any(tally.failures for tally in tallies.values())
-    parts = {
-        "soak": _soak_rows(figures.get("soak"), "soak"),
-        "pty": _soak_rows(figures.get("pty"), "pty"),
-        "canopen": _soak_rows(figures.get("canopen"), "canopen"),
-        "faults": _fault_rows(figures.get("faults")),
-        "encoders": _encoder_rows(figures.get("encoders")),
-        "kills": _kill_rows(figures.get("kills")),
-        "network": _network_rows(figures.get("network")),
-        "fuzz": _fuzz_rows(tallies),
-    }
-    measured = {*figures, *(["fuzz"] if fuzzed else [])}
+    if fuzzed:
+        figures = {"fuzz": {}} | figures
     summary, _, decoders = earlier.partition("## Fuzzed decoders")
     rows = []
-    for part, new in parts.items():
-        kept = [] if part in measured else _rows(summary, OF_PART[part])
-        made = figures.get(part, {}).get("made", "")
-        rows += kept or [f"| {a} | {b} | {c} | {d} | {made} |" for a, b, c, d in new]
+    for name, part in PARTS.items():
+        kept = [] if name in figures else _rows(summary, part.begins)
+        new: list[Row] = [(part.unmeasured, "not measured", "", "**no**")]
+        if name in figures or name == "fuzz":
+            new = part.rows(figures.get(name, {}))
+        made = figures.get(name, {}).get("made", "")
+        rows += kept or [f"| {' | '.join(cells)} | {made} |" for cells in new]
     lines = [
         "# Reliability",
         "",
@@ -224,46 +151,66 @@ def _decoder_rows(tallies: dict[str, fuzz.Tally]) -> list[str]:
     return rows
 
 
-def _row(what: str, measured: str, goal: str, met: bool) -> tuple[str, str, str, str]:
+def _row(what: str, measured: str, goal: str, met: bool) -> Row:
     return what, measured, goal, "yes" if met else "**no**"
 
 
-def _soak_rows(s: dict[str, Any] | None, part: str) -> list[tuple[str, str, str, str]]:
-    if s is None:
-        return [(part, "not measured", "", "**no**")]
-    goal_s = _GOALS_S[part]
-    rows = [
-        _row(
-            f"{s['where']}: samples lost",
-            f"{s['lost']} of {s['samples']} in {s['duration_s']:.0f} s; link troubles:"
-            f" {s['troubles']}" + (f"; ended by a trip: {s['trip']}" if s.get("trip") else ""),
-            f"0 in {goal_s} s, with the watchdog of a real rig (50 ms)",
-            s["lost"] == 0 and s["duration_s"] >= 0.99 * goal_s,
-        )
-    ]
-    speed = s["duration_s"] / s["elapsed_s"]
-    if part == "soak":
-        return [*rows, (f"{s['where']}: speed", f"{speed:.0f} times real time", "", "")]
+def _soak_rows(s: Figures, goal_s: int) -> list[Row]:
+    where, speed = s["where"], s["duration_s"] / s["elapsed_s"]
+    trip = f"; ended by a trip: {s['trip']}" if s.get("trip") else ""
+    lost = _row(
+        f"{where}: samples lost",
+        f"{s['lost']} of {s['samples']} in {s['duration_s']:.0f} s; link troubles:"
+        f" {s['troubles']}{trip}",
+        f"0 in {goal_s} s, with the watchdog of a real rig (50 ms)",
+        s["lost"] == 0 and s["duration_s"] >= 0.99 * goal_s,
+    )
+    if where.endswith("virtual time"):
+        return [lost, (f"{where}: speed", f"{speed:.0f} times real time", "", "")]
     p50, p99, p999, top = s["latency_ms"] or [np.nan] * 4
-    told = f"{p50:.2f} / {p99:.2f} / {p999:.2f} / {top:.2f} ms"
+    latency = f"{p50:.2f} / {p99:.2f} / {p999:.2f} / {top:.2f} ms"
+    longest, computed, waited = s["pause_ms"]
+    pause = f"{longest:.1f} ms; of it {computed:.1f} ms computing, {waited:.1f} ms without"
     share = f"{100 * s['processor_ratio']:.1f} % of a core"
     return [
-        *rows,
-        _row(f"{s['where']}: pace", f"{speed:.3f} times real time", "1", speed > 0.99),
-        (f"{s['where']}: latency p50 / p99 / p99.9 / max", told, "", ""),
-        (f"{s['where']}: longest pause between two commands", _pause(s), "", ""),
-        _row(f"{s['where']}: reader", share, "under 10 %", s["processor_ratio"] < 0.1),
+        lost,
+        _row(f"{where}: pace", f"{speed:.3f} times real time", "1", speed > 0.99),
+        (f"{where}: latency p50 / p99 / p99.9 / max", latency, "", ""),
+        (f"{where}: longest pause between two commands", f"{pause} processor", "", ""),
+        _row(f"{where}: reader", share, "under 10 %", s["processor_ratio"] < 0.1),
     ]
 
 
-def _pause(s: dict[str, Any]) -> str:
-    longest, computed, waited = s["pause_ms"]
-    return f"{longest:.1f} ms; of it {computed:.1f} ms computing, {waited:.1f} ms without processor"
+def _soak(name: str, config: str, option: str, goal_s: int, where: str) -> Part:
+    def measure(options: argparse.Namespace) -> Figures:
+        return asdict(soak.soak(config, getattr(options, option), where))
+
+    return Part(name, where, measure, lambda s: _soak_rows(s, goal_s), option, goal_s)
 
 
-def _fault_rows(f: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
-    if f is None:
-        return [("injected faults", "not measured", "", "**no**")]
+def _faults(options: argparse.Namespace) -> Figures:
+    outcomes = list(faults.inject(options.faults))
+    silence = ("host killed", "cable cut")
+    safe = [o for o in outcomes if o.safe_after_s is not None and o.kind not in silence]
+    silent = [o for o in outcomes if o.kind in silence]
+    return {
+        "count": len(outcomes),
+        "kinds": len({o.kind for o in outcomes}),
+        "detected": sum(o.detected for o in outcomes),
+        "named": sum(o.named for o in outcomes),
+        "mis_stamped": sum(o.mis_stamped for o in outcomes),
+        "crashes": sum(bool(o.crash) for o in outcomes),
+        "trips": len(safe),
+        "slowest_safe_s": max(o.safe_after_s or 0.0 for o in safe),
+        "silences": len(silent),
+        "slowest_silent_s": max(
+            np.inf if o.safe_after_s is None else o.safe_after_s for o in silent
+        ),
+        "missed": sorted({f"{o.kind} {o.crash}".strip() for o in outcomes if not o.named}),
+    }
+
+
+def _fault_rows(f: Figures) -> list[Row]:
     total = f["count"]
     missed = f"; not named: {'; '.join(f['missed'])}" if f["missed"] else ""
     return [
@@ -290,9 +237,20 @@ def _fault_rows(f: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
     ]
 
 
-def _encoder_rows(e: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
-    if e is None:
-        return [("encoders that all die", "not measured", "", "**no**")]
+def _encoders(options: argparse.Namespace) -> Figures:
+    """Half of the motions begin in the last 0.4 rad and are slow; a quarter as many are sound."""
+    dead = [dead_encoders.ride(k // 2, slow=k % 2 == 0) for k in range(options.rides)]
+    sound = [dead_encoders.ride(k, dead=False).trip for k in range(options.rides // 4)]
+    return {
+        "count": len(dead),
+        "farthest_rad": max(ride.beyond_rad for ride in dead),
+        "beyond": sum(ride.beyond_rad > FARTHEST_RAD for ride in dead),
+        "sound": len(sound),
+        "false": sum(trip is Trip.ENCODER_FROZEN for trip in sound),
+    }
+
+
+def _encoder_rows(e: Figures) -> list[Row]:
     return [
         _row(
             f"{e['count']} motions with all encoders dying on the way: beyond the travel",
@@ -309,18 +267,24 @@ def _encoder_rows(e: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
     ]
 
 
-def _kill_rows(k: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
-    if k is None:
-        return [("killed recorders", "not measured", "", "**no**")]
+def _kills(options: argparse.Namespace) -> Figures:
+    killed = kills.kill_many(options.kills)
+    lost_s = [one.lost_s for one in killed]
+    return {
+        "count": len(killed),
+        "most_lost_s": max(lost_s),
+        "median_lost_s": float(np.median(lost_s)),
+    }
+
+
+def _kill_rows(k: Figures) -> list[Row]:
     told = f"most {k['most_lost_s']:.3f} s, median {k['median_lost_s']:.3f} s"
     met = k["most_lost_s"] <= 0.25 and k["count"] >= 200
     what = f"{k['count']} recorders killed: lost, all files repaired, nothing earlier changed"
     return [_row(what, told, "0.25 s in 200", met)]
 
 
-def _network_rows(n: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
-    if n is None:
-        return [("listening sockets", "not measured", "", "**no**")]
+def _network_rows(n: Figures) -> list[Row]:
     unasked, asked = n["unasked"], n["asked"]
     inside = all(listening.is_loopback(address) for address in asked)
     rigs = ", ".join(listening.CONFIGS)
@@ -340,13 +304,45 @@ def _network_rows(n: dict[str, Any] | None) -> list[tuple[str, str, str, str]]:
     ]
 
 
-def _fuzz_rows(tallies: dict[str, fuzz.Tally]) -> list[tuple[str, str, str, str]]:
+def _fuzz_rows(_: Figures) -> list[Row]:
+    """Return the row of what the fuzzing's own command has kept."""
+    tallies = fuzz.load(fuzz.STATE)
     done = sum(t.inputs for t in tallies.values())
     bad = sum(len(t.failures) for t in tallies.values())
     least = min(t.inputs for t in tallies.values())
     told = f"{done} inputs, at least {least} each, {bad} failures"
     met = done >= fuzz.TOTAL and least >= fuzz.LEAST and not bad
     return [_row("fuzzed decoders", told, "10 million, 100,000 each, 0 failures", met)]
+
+
+PARTS = {
+    "soak": _soak("soak", "simulated", "virtual", 3600, "firmware core, virtual time"),
+    "pty": _soak("pty", "pty", "real", 600, "firmware process on a pty, real time"),
+    "canopen": _soak(
+        "canopen", "canopen_virtual", "canopen", 60, "EPOS4 fake on a virtual CAN bus, real time"
+    ),
+    "faults": Part(
+        "injected faults",
+        r"\d+ faults |samples mis-stamped|crashes|\d+ trips: |\d+ dead hosts ",
+        _faults,
+        _fault_rows,
+        "faults",
+        1000,
+    ),
+    "encoders": Part(
+        "encoders that all die",
+        r"\d+ motions with all encoders ",
+        _encoders,
+        _encoder_rows,
+        "rides",
+        640,
+    ),
+    "kills": Part("killed recorders", r"\d+ recorders killed", _kills, _kill_rows, "kills", 200),
+    "network": Part(
+        "listening sockets", r"listening ", lambda o: listening.measure(), _network_rows
+    ),
+    "fuzz": Part("", r"fuzzed decoders", lambda o: {}, _fuzz_rows),
+}
 
 
 if __name__ == "__main__":

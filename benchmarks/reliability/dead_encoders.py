@@ -66,7 +66,6 @@ class Ride:
 
     Attributes:
         beyond_rad: Farthest the spindle was beyond its travel.
-        trip: What the board tripped over.
     """
 
     beyond_rad: float

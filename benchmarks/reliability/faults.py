@@ -84,7 +84,6 @@ class Outcome:
     """Result of one fault.
 
     Attributes:
-        kind: What was injected.
         detected: Whether the program noticed.
         named: Whether it said what it was: the trip's own code, an error, or counters that rise
             with this fault of the link alone. Where a protocol does not distinguish two faults,

@@ -40,12 +40,7 @@ with LogWriter(Path(sys.argv[1]), RunInfo("killed"), [stream]) as writer:
 
 @dataclass(frozen=True)
 class Killed:
-    """What one killed recorder left.
-
-    Attributes:
-        handed_over: Samples the writer had been given.
-        kept: Samples in the repaired file.
-    """
+    """What one killed recorder left."""
 
     handed_over: int
     kept: int

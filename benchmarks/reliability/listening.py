@@ -16,10 +16,7 @@ LOOK_S = 0.05
 
 
 def heard(words: list[str]) -> set[str]:
-    """Return the addresses that a command and its processes listen on while it runs.
-
-    Args:
-        words: What is typed behind `rig`.
+    """Return the addresses that words typed behind `rig`, and its processes, listen on meanwhile.
 
     Raises:
         subprocess.CalledProcessError: The command fails.

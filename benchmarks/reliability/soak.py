@@ -25,12 +25,8 @@ class Soak:
     """Result of a soak test.
 
     Attributes:
-        where: What the session ran on.
         duration_s: Time of the rig, s.
-        samples: Samples read.
-        lost: Samples lost.
         troubles: Counters of the link that are not 0, in words.
-        elapsed_s: Real time, s.
         processor_ratio: Processor time of this process over real time.
         latency_ms: Percentiles 50, 99, 99.9 and 100 of the time from a sample's tick to its being
             read and converted; None where time is virtual or nothing was read.

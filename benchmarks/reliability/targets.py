@@ -45,7 +45,6 @@ class Target:
     """One decoder.
 
     Attributes:
-        name: What it decodes.
         seeds: Makes good inputs, which are mutated.
         run: Decodes an input and holds what it accepts against the oracle; returns whether it
             accepted anything, or raises one of `REFUSALS`.

@@ -51,13 +51,7 @@ def build(
 ) -> Built | None:
     """Draw a rig and hide effects in it; None where it does not work.
 
-    Args:
-        seed: Seed of the sensors' noise.
-        kind: Kind of the case.
-        random: Source of everything else.
-        names: Recipes of the effects.
-        load: Load of the protocol where the kind fixes it.
-        ratio: Gear ratio instead of the drawn one.
+    The seed is of the noise; load and gear ratio are drawn where they are None.
     """
     plant = draw_plant(random, ratio)
     controller = draw_controller(random, plant)

@@ -32,7 +32,6 @@ class Case:
     """One simulated campaign with its answer.
 
     Attributes:
-        seed: Its seed.
         kind: One of `KINDS`.
         stage: The rig, its protocol and sensors.
         switched: The effects, with their amplitudes.

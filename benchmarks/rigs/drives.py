@@ -16,13 +16,7 @@ BANK_OF_LAGS = 3
 
 
 def wave(random: Random, order: int, sidebands: bool) -> FloatArray:
-    """Return a wave over one turn: an order, some of its harmonics, and sidebands once a turn.
-
-    Args:
-        random: Source of the draw.
-        order: Whole periods a turn.
-        sidebands: Whether its amplitude is modulated once a turn.
-    """
+    """Return a wave over one turn: an order, some harmonics, and sidebands once a turn."""
     turn = 2.0 * np.pi * np.linspace(0.0, 1.0, 2048)
     total = np.sin(order * turn + random.uniform(0.0, 2.0 * np.pi))
     for harmonic in (2, 3):

@@ -121,12 +121,7 @@ def over(random: Random, low: float, high: float) -> float:
 
 
 def draw_plant(random: Random, ratio: float | None = None) -> Plant:
-    """Draw a rig.
-
-    Args:
-        random: Source of the draw.
-        ratio: Gear ratio instead of the drawn one.
-    """
+    """Draw a rig, but for a gear ratio that is given."""
     drawn_ratio = over(random, 5.0, 150.0)
     n = drawn_ratio if ratio is None else ratio
     pull = over(random, 0.5, 1.8)

@@ -37,7 +37,6 @@ class Plan:
     """One run as it is asked for.
 
     Attributes:
-        name: Name of the run.
         setpoints: Angle, speed and acceleration of the spindle at 1 kHz from the lead on, (n, 3).
         level_n_m: Load torque asked for, without the unit's spring, shape (n,).
         load: The load unit in this run.
@@ -62,9 +61,7 @@ class Protocol:
     Attributes:
         motions: Kinds of motion, of `MOTIONS`.
         load: One of `LOADS` or `SHAPED`.
-        runs: Number of runs.
         duration_s: Of each.
-        levels: Number of load levels.
     """
 
     motions: tuple[str, ...]
@@ -77,14 +74,7 @@ class Protocol:
 def draw_protocol(
     random: Random, plant: Plant, load: str | None = None, rests: bool | None = None
 ) -> tuple[Protocol, tuple[Plan, ...]]:
-    """Draw a protocol and its runs.
-
-    Args:
-        random: Source of the draw.
-        plant: The rig that plays it.
-        load: One of `LOADS` or `SHAPED` instead of a drawn one of `LOADS`.
-        rests: Whether some motions rest; drawn when None.
-    """
+    """Draw a protocol for a rig, and its runs; a load or rests that are given are not drawn."""
     runs = int(random.integers(8, 21))
     duration = float(np.round(min(random.uniform(8.0, 20.0), max(LONGEST_S / runs, 8.0)), 1))
     rests = bool(random.random() < 0.4) if rests is None else rests

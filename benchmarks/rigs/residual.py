@@ -53,7 +53,6 @@ class Fitted:
     """A declared equation fitted on a campaign.
 
     Attributes:
-        equation: One of `EQUATIONS`.
         widths: Width of the friction's sign, where there is one.
         weights: Of the declared columns, signed.
         residuals: What is left of each run, its mean removed, shape (n,).
@@ -100,10 +99,7 @@ def prepare(recording: Recording, ratio: float) -> Prepared:
 def columns_of(run: Prepared, equation: str, widths: Sequence[float]) -> FloatArray:
     """Return an equation's declared columns at the samples that count, shape (n, k), offset free.
 
-    Args:
-        run: The run.
-        equation: The equation.
-        widths: Shape parameters of its terms, in order.
+    `widths` are the shape parameters of its terms, in order.
     """
     rest, blocks, places = list(widths), [], run.places[equation]
     for term in declared(equation).terms:

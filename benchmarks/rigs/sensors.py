@@ -127,13 +127,9 @@ def read(
     errors: Mapping[str, FloatArray],
     noise: Sequence[FloatArray] | None,
 ) -> dict[str, FloatArray]:
-    """Return the readings of a run's sensors.
+    """Return the readings of a run's sensors of what is true, shape (n, 6 or more).
 
-    Args:
-        chain: The sensors.
-        true: What there is, columns as `READINGS`, shape (n, 6 or more).
-        errors: Reading to what a faulty sensor adds to it, shape (n,).
-        noise: Of each sensor, from `noise_of`; None for none, and no steps of the converters.
+    Faults add `errors` to readings. Without noise the converters have no steps.
     """
     t = np.arange(len(true)) * TICK_S
     found = {}

@@ -59,11 +59,8 @@ class Stage:
     """A rig, its protocol and its sensors.
 
     Attributes:
-        plant: The rig.
         controller: Kind and gains.
         protocol: How its runs were made up.
-        plans: The runs.
-        chain: The sensors.
         seed: Seed of the noise.
         clean: Runs without effects that were played.
         noise: Noise of runs that was drawn.
@@ -119,13 +116,7 @@ class Stage:
     def record(
         self, index: int, switched: Sequence[Switched] = (), silent: bool = False
     ) -> Recording:
-        """Return one run's recording.
-
-        Args:
-            index: Place of the run.
-            switched: Effects that are on.
-            silent: Without sensor noise, lags and steps of the converters.
-        """
+        """Return one run's recording; a silent one is without sensor noise, lags and steps."""
         plan, moved = self.plans[index], self.moved(index, switched)
         errors = self.errors(index, moved, switched)
         chain = self.chain.on_time if silent else self.chain

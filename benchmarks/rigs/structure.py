@@ -28,10 +28,8 @@ class HiddenTruth:
         place: Part of the machine: motor shaft, gear, spindle, cable, jaw, pulley, or a sensor.
         family: What it should be called; `unknown` outside the catalogue.
         variables: What it depends on.
-        runs: Places of the runs that have it.
         strength: Residual of the declared equation that shows it best, root mean square over those
             runs, with this effect over that without any.
-        equation: That equation.
         recipe: What it was drawn by, for people.
         amplitude: Its amplitude, in the unit of its place.
         synonyms: Families that name the same physics by another model of it.
@@ -82,13 +80,7 @@ class Truth:
 def columns(
     stage: Stage, effects: Sequence[Switched], clean: Mapping[str, Fitted]
 ) -> dict[str, tuple[FloatArray, ...]]:
-    """Return each equation's true columns, one array (n, effects) a run, filtered.
-
-    Args:
-        stage: The rig.
-        effects: The effects, all on.
-        clean: The declared equations fitted without them.
-    """
+    """Return each equation's true columns, all effects on: filtered, (n, effects) a run."""
     found: dict[str, list[FloatArray]] = {equation: [] for equation in EQUATIONS}
     low_pass = residual.declared("motor").low_pass
     for index in stage.every:
@@ -135,13 +127,7 @@ def _shown_by_fault(
 def oracle(
     runs: Sequence[Prepared], added: Columns, declared: Mapping[str, Fitted]
 ) -> dict[str, Fitted]:
-    """Fit the equations with the true columns and the declared ones.
-
-    Args:
-        runs: The runs.
-        added: From `columns`.
-        declared: Fits of the declared columns alone, which stand where there are no others.
-    """
+    """Fit the equations with the true columns; where there are none, the declared fits stand."""
     found = {}
     for equation in EQUATIONS:
         there = any(np.any(a) for a in added[equation])

@@ -21,14 +21,7 @@ def page(
     stored: Sequence[CalibrationRecord],
     provenance: Provenance,
 ) -> str:
-    """Return the page of HTML.
-
-    Args:
-        records: The records of the session, by hash.
-        conclusion: Its conclusion.
-        stored: All records of the store.
-        provenance: When and from what this was made.
-    """
+    """Return the page of HTML: records of a session by hash, held against all of the store."""
     first = next(iter(records.values()))
     charts = [_residuals(conclusion.residuals)]
     tables = []

@@ -36,10 +36,7 @@ CONFIDENCE = (
 def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
     """Return the page of HTML, which needs nothing outside itself.
 
-    Args:
-        diagnosis: The answer.
-        signals: The signals of the held-out test runs; an equation without has no signal charts.
-        provenance: When and from what this was made.
+    An equation without signals has no signal charts.
     """
     drawn = charts(diagnosis, signals)
     sealed = diagnosis.sealed

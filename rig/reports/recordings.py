@@ -27,10 +27,7 @@ COLOURS = 6
 def page(campaign: Campaign, title: str, provenance: Provenance) -> str:
     """Return the page of HTML, which needs nothing outside itself.
 
-    Args:
-        campaign: The runs, those left out of evidence too; one is held at a time.
-        title: Title.
-        provenance: When and from what this was made.
+    Runs left out of evidence are on it too; one run is held at a time.
     """
     drawn: dict[str, list[dict[str, Any]]] = {}
     rows = []

@@ -1,12 +1,15 @@
 """Studies over families of hidden torque: which arm has which, and methods compared by family."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, NOT_IN_CATALOGUE, OWN
 from rig.output.table import TextTable
+
+WITHIN = 0.25
+"""A number lands near a paper's when it differs by at most this share of it."""
 
 NOTE = (
     "Error of ours over that of the paper's method on the same arm, median over its arms; below 1"
@@ -20,6 +23,17 @@ NOTE = (
 def arm_of(number: int, families: Sequence[str] = FAMILIES) -> tuple[int, str]:
     """Return the seed and the family of hidden torque of a study's arm, by its number from 0."""
     return number // len(families), families[number % len(families)]
+
+
+def near(found: Iterable[float], stated: Iterable[float | None]) -> list[bool | None]:
+    """Return whether each number lands near a paper's; None where the paper's is not known."""
+    pairs = zip(found, stated, strict=True)
+    return [None if s is None else bool(abs(here / s - 1) <= WITHIN) for here, s in pairs]
+
+
+def in_words(answers: Iterable[bool | None]) -> list[str]:
+    """Return `yes`, `no`, or nothing for what is not known."""
+    return [{True: "yes", False: "no", None: ""}[answer] for answer in answers]
 
 
 def ratios(
@@ -47,12 +61,7 @@ def ratios(
 
 
 def middle_and_ends(method: str, values: FloatArray) -> list[list[str]]:
-    """Return two rows of a table: a method's medians over arms, and its least and largest values.
-
-    Args:
-        method: Name of the method.
-        values: Shape (arms, columns).
-    """
+    """Return two rows of a method's values (arms, columns): medians, and least and largest."""
     ends = zip(values.min(axis=0), values.max(axis=0), strict=True)
     return [
         [f"{method}, median", *(f"{value:.2f}" for value in np.median(values, axis=0))],

@@ -104,12 +104,8 @@ def in_processes(
 ) -> Iterator[tuple[Task, T]]:
     """Yield tasks with their results as they are done, each worker on one at a time.
 
-    Args:
-        one: Does one task.
-        tasks: The tasks.
-        workers: Processes.
-        start: Called first in each.
-        goes_on: Whether another task may begin; those at work end.
+    `start` is called first in each process. When `goes_on` denies it no further task begins, and
+    those at work end.
     """
     queue = iter(tasks)
     running: dict[Future[T], Task] = {}

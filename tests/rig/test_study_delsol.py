@@ -6,9 +6,8 @@ import pytest
 from rig.arm.hidden import FAMILIES
 from rig.output.provenance import Provenance
 from rig.studies.delsol import study as delsol
-from rig.studies.delsol.diagnosis import PULLS, Named
 from rig.studies.delsol.page import page
-from rig.studies.delsol.study import DelSolStudy
+from rig.studies.delsol.study import PULLS, DelSolStudy, Named
 
 pytestmark = pytest.mark.long
 

@@ -16,7 +16,7 @@ from rig.studies.seeds import Keeper, kept_outcomes
 from rig.studies.wrench.study import SERIES, TABLES
 from rig.studies.zhang.study import PAPER as ZHANG
 from rig.studies.zhang.study import PAPER_FORCE_N, PAPER_MOMENT_N_M
-from rig.studies.zhao.paper import PAPER_COEFFICIENTS, PAPER_DELAYS_MS, PAPER_ERRORS_N
+from rig.studies.zhao.methods import PAPER_COEFFICIENTS, PAPER_DELAYS_MS, PAPER_ERRORS_N
 
 PAPERS = ("oneill", "pique", "delsol", "zhang", "zhao")
 

@@ -16,9 +16,16 @@ from rig.grasper.plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis
 from rig.studies.seeds import Keeper
 from rig.studies.zhao import study as zhao
 from rig.studies.zhao.haptics import run_haptics
-from rig.studies.zhao.methods import Lacking, axes_of, declared, fitted, lacking
+from rig.studies.zhao.methods import (
+    DOFS,
+    PAPER_ERRORS_N,
+    Lacking,
+    axes_of,
+    declared,
+    fitted,
+    lacking,
+)
 from rig.studies.zhao.page import page
-from rig.studies.zhao.paper import DOFS, PAPER_ERRORS_N
 
 pytestmark = pytest.mark.long
 

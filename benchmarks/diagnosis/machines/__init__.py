@@ -51,7 +51,6 @@ class HandOver:
     """One way to hand a machine's recordings over.
 
     Attributes:
-        name: Name of the case.
         machine: Name of the shipped mapping.
         model: Name of the declared model.
         target: Channel that the model explains.
@@ -59,7 +58,6 @@ class HandOver:
         renamed: Channel to another name.
         only: Conditions of the runs that are taken.
         known: Family of the effect that is known to be undeclared, or none.
-        note: What others reached.
     """
 
     name: str

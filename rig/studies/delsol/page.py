@@ -12,21 +12,22 @@ from rig.output.figures import paired_bars
 from rig.output.page import Page
 from rig.output.table import TextTable
 from rig.studies.coverage import coverage
-from rig.studies.delsol.diagnosis import JOINTS, PULLS, Named
 from rig.studies.delsol.hydraulic_arm import HYDRAULIC, RUNS
 from rig.studies.delsol.study import (
     DISCARDED,
+    JOINTS,
     OURS,
     PAPER,
     PEAK_N,
     PEAK_PERCENT,
+    PULLS,
     TABLE_1_HZ,
     TABLE_2_N_M,
     TABLE_5_N,
-    WITHIN,
     DelSolStudy,
+    Named,
 )
-from rig.studies.families import middle_and_ends, ratios, verdict
+from rig.studies.families import WITHIN, in_words, middle_and_ends, near, ratios, verdict
 
 TITLE = "External forces of a hydraulic arm: del Sol et al. 2014 on simulated arms"
 
@@ -98,8 +99,8 @@ def page(study: DelSolStudy) -> Page:
     for method, word in ((PAPER, "within"), (DISCARDED, "with points discarded, within")):
         *rms, impact_n, sliding_n = np.median(_errors(study, method)[:: len(FAMILIES)], axis=0)
         errors = (impact_n, 100 * impact_n / PEAK_N, sliding_n)
-        residual.append([f"{word} {WITHIN:.0%} of the paper", *_near(rms, TABLE_2_N_M)])
-        forces.append([f"{word} {WITHIN:.0%} of the paper", *_near(errors, stated)])
+        residual.append([f"{word} {WITHIN:.0%} of the paper", *in_words(near(rms, TABLE_2_N_M))])
+        forces.append([f"{word} {WITHIN:.0%} of the paper", *in_words(near(errors, stated))])
     peak = f"The paper's impact peaks at {PEAK_N:.0f} N"
     count = f"{study.seeds} arms with the simulation's own friction"
     columns = [f"{name} residual" for name in joints] + ["impact force", "sliding force"]
@@ -168,7 +169,3 @@ def _names(finding: Named, families: Collection[str]) -> bool:
 
 def _has_hoses(arm: Sequence[Named]) -> bool:
     return any(f.joint == 1 and f.family in PULLS for f in arm)
-
-
-def _near(found: Sequence[float], paper: Sequence[float]) -> list[str]:
-    return ["yes" if abs(f / p - 1) <= WITHIN else "no" for f, p in zip(found, paper, strict=True)]

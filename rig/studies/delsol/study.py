@@ -11,28 +11,41 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimation.arm.balances import equations
+from estimation.arm.effects import on_joint
 from estimation.arm.identification import damped_around
-from estimation.arm.motion import Motion, periodic_motion
+from estimation.arm.motion import JointNames, Motion, periodic_motion
 from estimation.arm.regressor import regressor
+from estimation.arm.shared import laid_out
 from estimation.arm.wrench import tip_jacobians
+from estimation.causes.verdict import answer
+from estimation.diagnosis.split import split
 from estimation.filters import LowPass, zero_phase
+from estimation.model import Term
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES
+from rig.arm.simulated import recorded
 from rig.output.provenance import Provenance
-from rig.studies.delsol.diagnosis import JOINTS, Named, diagnosed, found_columns
 from rig.studies.delsol.hydraulic_arm import (
     HIGHEST_HZ,
     HYDRAULIC,
     RATE_HZ,
     REACH,
+    SECONDS,
     HydraulicArm,
     draw,
+    free_motions,
     measured_torque,
 )
 from rig.studies.families import arm_of
 from rig.studies.seeds import Keeper, kept_outcomes
 
 SCHEMA = "rig.study.delsol/4"
+
+JOINTS = len(HYDRAULIC.joints)
+NAMES = tuple(JointNames(k + 1, prismatic=False) for k in range(JOINTS))
+PULLS = ("spring.position", "friction.position")
+"""What the catalogue calls the pull and the rub of hoses or wires."""
 
 TABLE_1_HZ = ((0.031, 0.396), (0.100, 0.800), (0.064, 0.611), (0.101, 0.909), (0.102, 1.313))
 TABLE_2_N_M = (2.671, 8.950, 4.483, 7.091, 2.483)
@@ -52,7 +65,6 @@ LARGEST_CONDITION = 100.0
 SWINGS = 4
 POSES = 2
 DAMPING = 0.3
-WITHIN = 0.25
 LOW_PASS = LowPass(cutoff_hz=5.0, order=3)
 
 
@@ -73,16 +85,37 @@ class Outcome:
     sliding_n: float
 
 
+Effects = tuple[tuple[int, Term], ...]
+"""Effects found, each with its joint, from 0."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """One finding of the diagnosis.
+
+    Attributes:
+        family: Its name in the catalogue; `unknown` where it is not named.
+        alternatives: Names that it could have as well.
+        before_n_m: RMS error on the runs set aside before it, after what was found earlier, N m.
+        after_n_m: The same with it, N m.
+    """
+
+    joint: int
+    family: str
+    verdict: str
+    alternatives: tuple[str, ...]
+    before_n_m: float
+    after_n_m: float
+
+
 @dataclass(frozen=True)
 class DelSolStudy:
     """Results of the study.
 
     Attributes:
-        schema: Name of this layout.
         seeds: Arms of each family.
         outcomes: By method, one an arm, in the order of their numbers.
         named: What the diagnosis named on each arm.
-        provenance: When and from what this was made.
     """
 
     schema: str
@@ -101,11 +134,7 @@ class Seed:
 
 
 def run(seeds: int, keeper: Keeper) -> DelSolStudy:
-    """Do the study on arms of every family of hidden friction.
-
-    Args:
-        seeds: Arms of each family, from seed 0.
-        keeper: Keeps the outcome of each arm.
+    """Do the study on so many arms of every family, from seed 0.
 
     Raises:
         OSError: The folder cannot be written.
@@ -152,6 +181,59 @@ def one_arm(number: int) -> Seed:
             sliding_n=errors["sliding"],
         )
     return Seed(outcomes, named)
+
+
+def diagnosed(arm: HydraulicArm, rng: np.random.Generator) -> tuple[tuple[Named, ...], Effects]:
+    """Move an arm freely and diagnose its joints; return the result and its effects.
+
+    The joints are torque equations of the project's own diagnosis, declared by the paper's model.
+    One run in three is held out before any fit.
+    """
+    still = np.zeros((round(SECONDS * RATE_HZ), 3))
+    recordings = [
+        recorded(f"free {k}", motion.position, measured_torque(arm, motion, still, rng), RATE_HZ)
+        for k, motion in enumerate(free_motions(rng))
+    ]
+    sealed = split(recordings)
+    balances = equations(HYDRAULIC, NAMES)
+    whole = laid_out(balances, recordings, sealed.discover)
+    found = answer(whole, balances.models, sealed)
+    told = tuple(
+        Named(
+            int(finding.balance.removeprefix("joint.")),
+            finding.family,
+            finding.verdict,
+            finding.alternatives,
+            finding.rmse_before,
+            finding.rmse_after,
+        )
+        for finding in found.diagnosis.findings
+    )
+    declared = {model.balance: len(model.terms) for model in balances.models}
+    joints = [f"joint.{name.number}" for name in NAMES]
+    # a model that needs channels that a motion alone does not give is not used
+    given = {c for name in NAMES for c in (name.position, name.velocity, name.acceleration)}
+    effects = tuple(
+        (joints.index(model.balance), term)
+        for model in found.models
+        for term in model.terms[declared[model.balance] :]
+        if {*term.channels.values()} <= given
+    )
+    return told, effects
+
+
+def found_columns(effects: Effects, motion: Motion) -> FloatArray:
+    """Return the columns of effects found along a motion, shape (n, joints, columns)."""
+    channels = {}
+    for k, name in enumerate(NAMES):
+        channels[name.position] = motion.position[:, k]
+        channels[name.velocity] = motion.velocity[:, k]
+        channels[name.acceleration] = motion.acceleration[:, k]
+    parts = [
+        on_joint(term.sign * term.columns(channels, term.numbers(term.effect.shape)), k, JOINTS)
+        for k, term in effects
+    ]
+    return np.concatenate([np.zeros((len(motion), JOINTS, 0)), *parts], axis=2)
 
 
 def swings(rng: np.random.Generator) -> list[Motion]:

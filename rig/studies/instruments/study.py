@@ -11,17 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from estimation.bank.interval import covered_share
-from estimation.bank.states import Bank
 from estimation.campaign import Campaign
-from estimation.estimator import Recipe
 from estimation.estimators.adaptation import adapted_states, evidence, reduced
-from estimation.estimators.bank import BankEstimator, BankRecipe
-from estimation.estimators.network import STATE_INPUTS, NetworkRecipe
-from estimation.networks.training import Settings, has_torch
+from estimation.estimators.bank import BankEstimator
 from rig.models.adapt import Adaptation, open_source, run_adaptation
 from rig.output.provenance import Provenance
-from rig.studies.oneill.kinds import EVERY, LOAD, PAPER_INPUTS
-from rig.studies.oneill.paper import PROXIMAL as TARGET
+from rig.studies.oneill.kinds import recipes
+
+KINDS = ("products of physical states", "network with physical states", "paper's network")
+"""Which kinds of estimators are adapted; networks where torch is installed."""
 
 USED = (("11",), ("22",), ("00", "11", "22"), ("03", "21", "42"))
 """Runs adapted with."""
@@ -44,7 +42,6 @@ class DrawnRow:
     """States adapted with many choices of so many runs, N m.
 
     Attributes:
-        instrument: The instrument.
         runs: Runs adapted with at a time.
         rmse_n_m: Error on the runs not used, by choice, rising.
         covered: Mean over the choices of the share of samples inside their interval; None without.
@@ -61,11 +58,8 @@ class InstrumentStudy:
     """Results.
 
     Attributes:
-        schema: Name of this layout.
         source: Instrument the estimators were fitted on.
-        rows: The rows.
         drawn: What the choice of the runs makes of them.
-        provenance: When and from what this was made.
     """
 
     schema: str
@@ -73,18 +67,6 @@ class InstrumentStudy:
     rows: tuple[InstrumentRow, ...]
     drawn: tuple[DrawnRow, ...]
     provenance: Provenance
-
-
-def recipes(networks: bool) -> dict[str, Recipe]:
-    """Return the recipe of each kind; networks only if requested and torch is installed."""
-    found: dict[str, Recipe] = {"products of physical states": BankRecipe(TARGET, Bank(LOAD))}
-    if networks and has_torch():
-        inputs, few = (*STATE_INPUTS, LOAD), Settings(nodes=12)
-        found |= {
-            "network with physical states": NetworkRecipe(inputs, TARGET, few, every=EVERY),
-            "paper's network": NetworkRecipe(PAPER_INPUTS, TARGET, every=EVERY),
-        }
-    return found
 
 
 def run_instruments(
@@ -95,22 +77,15 @@ def run_instruments(
     seed: int = 0,
     on_row: Callable[[int, int], None] = lambda done, total: None,
 ) -> InstrumentStudy:
-    """Fit each kind on the source and adapt it to each other instrument.
-
-    Args:
-        source: Name and runs of the instrument that estimators are fitted on.
-        others: Name and runs of the others.
-        used: Names of the runs adapted with, one row each.
-        networks: Whether to train networks too.
-        seed: Seed of the folds of the new fits.
-        on_row: Called with the number of rows done and their total.
+    """Fit each kind on the source and adapt it to each other instrument, by each choice of runs.
 
     Raises:
         UsageError: A run is not there.
         MissingChannelError: A run lacks a channel.
     """
     name, campaign = source
-    wanted = recipes(networks)
+    known = recipes()
+    wanted = {kind: known[kind] for kind in (KINDS if networks else KINDS[:1]) if kind in known}
     total = len(wanted) * len(others) * len(used)
     rows: list[InstrumentRow] = []
     choices: list[DrawnRow] = []
@@ -138,14 +113,7 @@ def run_instruments(
 def drawn(
     source: BankEstimator, instrument: str, campaign: Campaign, seed: int
 ) -> tuple[DrawnRow, ...]:
-    """Adapt with each single run, and with threes drawn at random; flagged runs are left out.
-
-    Args:
-        source: The source's estimator.
-        instrument: Name of the other one.
-        campaign: Its runs.
-        seed: Seed of the threes.
-    """
+    """Adapt with each single run, and with threes drawn at random; flagged runs are left out."""
     whole = [evidence(source, recording) for recording in campaign.evidence]
     runs = reduced(source, [run for run in whole if run is not None and run.flagged == 0])
     if len(runs) <= THREE:

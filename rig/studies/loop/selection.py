@@ -33,7 +33,6 @@ class Chosen:
     """A model and what its last effect gained.
 
     Attributes:
-        model: The fitted model.
         gain: Share of the squared error of the model before it, on training runs left out.
     """
 

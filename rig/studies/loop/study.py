@@ -108,7 +108,6 @@ class Row:
     """The answer to a task.
 
     Attributes:
-        task: The task.
         linear: Error of the linear model on the test runs, means included, N m.
         steps: Effects in the order they were added.
         parameters: Named parameters of the last model.
@@ -137,11 +136,8 @@ class LoopStudy:
     """The whole study.
 
     Attributes:
-        rows: One a task.
         sealed: The split, the same for every task.
         left_out: Runs left out of evidence, with the reason.
-        source: Source of the data.
-        provenance: When, from which commit and seed.
     """
 
     rows: tuple[Row, ...]
@@ -157,13 +153,7 @@ def run_study(
     tasks: Sequence[Task] = TASKS,
     on_stage: Callable[[str], None] = lambda _: None,
 ) -> LoopStudy:
-    """Close the loop on a folder of recordings.
-
-    Args:
-        data: File, folder or archive of recordings.
-        seed: Seed of the split.
-        tasks: Rows to make.
-        on_stage: Told what happens, in words.
+    """Close the loop on a file, folder or archive of recordings.
 
     Raises:
         UsageError: The path does not exist.

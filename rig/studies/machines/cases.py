@@ -15,7 +15,6 @@ class Case:
     """One machine, or one part of it.
 
     Attributes:
-        name: What it is called.
         machine: Shipped machine.
         folder: Folder of its recordings in the data, or `machine-FOLDER.tar.xz`; also the name of
             the page that says what is declared, published and suspected.

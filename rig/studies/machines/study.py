@@ -31,8 +31,6 @@ class Row:
     """One equation of a machine.
 
     Attributes:
-        case: Name of the machine.
-        equation: Name of the equation.
         published: Published error, in words.
         card: Page of the machine.
         runs: Runs that trained, and that were held out.
@@ -59,11 +57,8 @@ class MachineStudy:
     """The study.
 
     Attributes:
-        rows: One an equation.
         reproduced: The published estimates of EMPS made again; empty without its data.
         skipped: Machines without data, and equations that could not be diagnosed, in words.
-        seconds: Time it took.
-        provenance: Version and seed.
     """
 
     rows: tuple[Row, ...]
@@ -76,12 +71,7 @@ class MachineStudy:
 def run_study(
     data: Path, seed: int = 0, on_stage: Callable[[str], None] = lambda _: None
 ) -> MachineStudy:
-    """Diagnose every machine whose recordings are there.
-
-    Args:
-        data: Folder with a folder or an archive a machine.
-        seed: Seed of the splits.
-        on_stage: Called with what begins, in words.
+    """Diagnose every machine that has a folder or an archive of recordings in a folder.
 
     Raises:
         DataError: Recordings cannot be read as the machine's file states.

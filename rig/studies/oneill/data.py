@@ -32,10 +32,7 @@ class Source:
     """Data for the study.
 
     Attributes:
-        campaign: The runs.
-        name: What the data is, for the reader.
         measured: Whether it was measured on the paper's instrument.
-        notes: Remarks for the reader.
     """
 
     campaign: Campaign
@@ -111,7 +108,7 @@ class ClosingTable:
 
     Attributes:
         columns: Names of the columns: channels, conditions, and channels after `CAUSAL`.
-        values: Shape (n, columns); may be a file mapped into memory.
+        values: Shape (n, columns).
         run: Index of each sample's run, shape (n,).
         names: Names of the runs.
         conditions: Condition to the value of each run, shape (runs,); NaN where it is not stated.
@@ -160,21 +157,6 @@ class ClosingTable:
             name: hashlib.sha256(np.ascontiguousarray(values).tobytes()).digest()
             for name, values in zip(self.columns, self.values.T, strict=True)
         }
-
-    def save(self, path: Path) -> None:
-        """Write the table next to `path`, the values so that they can be mapped into memory."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        for suffix, values in ((".npy", self.values), (".run.npy", self.run)):
-            part = path.with_name(f".{path.name}{suffix}")
-            np.save(part, values, allow_pickle=False)
-            part.replace(path.with_name(path.name + suffix))
-
-    @classmethod
-    def mapped(cls, path: Path, columns: tuple[str, ...]) -> "ClosingTable":
-        """Open a saved table without reading it; what is known of its runs is not kept."""
-        values = np.load(path.with_name(path.name + ".npy"), mmap_mode="r", allow_pickle=False)
-        run = np.load(path.with_name(path.name + ".run.npy"), allow_pickle=False)
-        return cls(columns, values, run)
 
 
 def closing_table(

@@ -38,7 +38,6 @@ class KindRow:
     """Error of one kind of estimator on runs held out, N m.
 
     Attributes:
-        kind: Its name.
         filters: `zero-phase` or `live`.
         score: Errors over the closing samples of all runs, each held out once.
     """
@@ -72,11 +71,6 @@ def run_kinds(
     campaign: Campaign, seed: int = 0, on_fit: Callable[[int, int], None] = lambda done, total: None
 ) -> tuple[KindRow, ...]:
     """Fit and score every kind.
-
-    Args:
-        campaign: Raw runs.
-        seed: Seed of the folds.
-        on_fit: Called with the number of fits done and their total.
 
     Raises:
         MissingChannelError: A run lacks a channel.

@@ -6,7 +6,7 @@ name made of the data and of all settings; a study that was interrupted goes on 
 
 import hashlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from estimation.campaign import Campaign
 from estimation.networks import network as net
 from estimation.networks.network import Network
 from estimation.networks.training import Settings, require_torch, train
+from estimation.recording import FloatArray
 from estimation.scores import Score, score
 from rig.output.provenance import Provenance
 from rig.studies.oneill.data import ClosingTable, closing_table, held_out_masks, pose_runs
@@ -45,15 +46,11 @@ class NetworkStudy:
     """Results.
 
     Attributes:
-        schema: Name of this layout.
         rows: What was trained.
         not_run: Jobs that were not, or not wholly, trained.
         samples: Closing samples by pose.
         peak_torque_n_m: Largest distal torque of the neutral pose.
         every: Every n-th closing sample of a pose was trained on, by pose.
-        settings: Settings of the training.
-        notes: Remarks for the reader.
-        provenance: When and from what this was made.
     """
 
     schema: str
@@ -78,15 +75,14 @@ class NetworkStudy:
         return rows[row].score.rmse if row in rows else None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Task:
     """One network to train: all a worker needs."""
 
     job: Job
-    train: Path  # of the mapped table
-    columns: tuple[str, ...]
     path: Path
-    rows: np.ndarray
+    rows: FloatArray
+    targets: FloatArray
     settings: Settings
 
 
@@ -116,13 +112,7 @@ class Trainer:
 
     def __init__(self, tables: dict[str, ClosingTable], training: Training) -> None:
         self.tables, self.training = tables, training
-        self._places = {
-            pose: training.state / f"{pose}-{table.digest(table.columns)}"
-            for pose, table in tables.items()
-        }
         self._masks: dict[tuple[str, str], list[np.ndarray]] = {}
-        for pose, table in tables.items():
-            table.save(self._places[pose])
 
     def step(self, pose: str) -> int:
         """Return which n-th samples of a pose are trained on: about as many for every pose."""
@@ -138,20 +128,18 @@ class Trainer:
             )
         return self._masks[key]
 
-    def tasks(self, job: Job) -> Iterator[Task]:
-        """Yield the networks of a job that are still to be trained."""
-        for part in job.stages:
-            for fold, mask in enumerate(self.masks(part)):
-                path = self.path(part, fold)
-                if not path.exists():
-                    yield Task(
-                        part,
-                        self._places[part.pose],
-                        self.tables[part.pose].columns,
-                        path,
-                        np.flatnonzero(~mask)[:: self.step(part.pose)],
-                        self._settings(part),
-                    )
+    def missing(self, job: Job) -> dict[Path, tuple[Job, int]]:
+        """Return the networks of a job that are still to be trained: file to part and fold."""
+        parts = [(part, fold) for part in job.stages for fold in range(len(self.masks(part)))]
+        paths = {self.path(*each): each for each in parts}
+        return {path: each for path, each in paths.items() if not path.exists()}
+
+    def task(self, path: Path, part: Job, fold: int) -> Task:
+        """Return a network's task with its rows and targets."""
+        table, kept = self.tables[part.pose], np.flatnonzero(~self.masks(part)[fold])
+        kept = kept[:: self.step(part.pose)]
+        rows, targets = table[part.inputs][kept], table[part.targets][kept]
+        return Task(part, path, rows, targets, self._settings(part))
 
     def _settings(self, job: Job) -> Settings:
         return replace(self.training.settings, nodes=job.nodes, seed=self.training.seed)
@@ -194,12 +182,7 @@ class Trainer:
 def network_tables(
     neutral: Campaign, folder: Path | None, on_run: Callable[[str], None] = lambda name: None
 ) -> tuple[dict[str, ClosingTable], tuple[str, ...]]:
-    """Return the closing samples by pose, and remarks about them.
-
-    Args:
-        neutral: The runs of experiments 1 and 2.
-        folder: Folder that may hold the folders or archives of experiment 3, or be next to them.
-        on_run: Called with each run's name when it has been processed.
+    """Return the closing samples by pose, and remarks about them; the folder is as of `pose_runs`.
 
     Raises:
         DataError: A run is damaged, or nothing is left.
@@ -222,10 +205,8 @@ def network_tables(
 
 def train_task(task: Task) -> None:
     """Train one network and keep it."""
-    table = ClosingTable.mapped(task.train, task.columns)
     names = (task.job.inputs, task.job.targets)
-    rows, targets = (table[columns][task.rows] for columns in names)
-    trained = train(rows, targets, names, task.settings)
+    trained = train(task.rows, task.targets, names, task.settings)
     arrays = {"converged": np.array(trained.converged), **net.to_arrays(trained.network)}
     net.write_arrays(task.path, SCHEMA, arrays)
 
@@ -241,13 +222,7 @@ def run_networks(
     notes: tuple[str, ...] = (),
     on_network: Callable[[int, int], None] = lambda done, total: None,
 ) -> NetworkStudy:
-    """Train what is not trained yet, and score all that is.
-
-    Args:
-        tables: Closing samples by pose.
-        training: How, and where the trained networks are kept.
-        notes: Remarks for the reader.
-        on_network: Called with the number of networks trained and their total.
+    """Train what is not trained yet on closing samples by pose, and score all that is.
 
     Raises:
         MissingExtraError: torch is missing.
@@ -256,13 +231,13 @@ def run_networks(
     require_torch()
     trainer = Trainer(tables, training)
     planned = [job for job in jobs(tuple(tables)) if trainer.masks(job)]
-    waiting = {task.path: task for job in planned for task in trainer.tasks(job)}
+    waiting = {path: each for job in planned for path, each in trainer.missing(job).items()}
     until_s = time.monotonic() + 60 * training.minutes
     if waiting:
         on_network(0, len(waiting))
     trained = in_processes(
         train_task,
-        waiting.values(),
+        (trainer.task(path, *each) for path, each in waiting.items()),
         training.workers,
         begin_learning,
         lambda: time.monotonic() < until_s,
@@ -272,7 +247,7 @@ def run_networks(
     rows: list[NetworkRow] = []
     not_run = []
     for job in planned:
-        if any(trainer.tasks(job)):
+        if trainer.missing(job):
             not_run.append(job)
         else:
             rows += trainer.rows(job)

@@ -3,6 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from markupsafe import Markup
+
+from estimation.recording import FloatArray
+from rig.output.figures import against, over_time
 from rig.output.page import Page
 from rig.output.table import TextTable, to_markdown
 from rig.studies.coverage import coverage
@@ -10,10 +15,9 @@ from rig.studies.oneill import goals
 from rig.studies.oneill import networks_page as networks
 from rig.studies.oneill import states_page as states
 from rig.studies.oneill import tables as paper
-from rig.studies.oneill.figures import draw
 from rig.studies.oneill.kinds import FILTERS, KindRow
 from rig.studies.oneill.networks import NetworkStudy
-from rig.studies.oneill.paper import HELD_OUT, PROTOCOLS
+from rig.studies.oneill.paper import HELD_OUT, PROTOCOLS, SHOWN
 from rig.studies.oneill.states import Shown, StateStudy
 from rig.studies.oneill.study import Study
 
@@ -50,15 +54,7 @@ def page(
     kinds: Sequence[KindRow] = (),
     shown: Mapping[str, Sequence[Shown]] | None = None,
 ) -> Page:
-    """Return the study's page: what is reached, the paper's tables, then all by what was held out.
-
-    Args:
-        study: The linear rows.
-        deep: The network rows, where they were trained.
-        physical: The estimates from physical states.
-        kinds: Every kind of estimator on the same folds.
-        shown: Target to what its figures are drawn from.
-    """
+    """Return the study's page: what is reached, the paper's tables, all by what was held out."""
     found = goals.reached(physical, deep) if physical is not None else []
     lead = list(goals.lead(found)) or [_lead(study)]
     tables = [*paper.tables(study, deep), _held_out_table(study)]
@@ -73,7 +69,7 @@ def page(
     if physical is not None:
         tables += states.tables(physical)
         notes += states.notes(physical)
-    drawn = draw(shown or {})
+    drawn = _drawn(shown or {})
     return OneillPage(
         TITLE,
         [*lead, *notes],
@@ -83,6 +79,54 @@ def page(
         len(lead),
         [caption for caption, _ in drawn.values()],
     )
+
+
+VARIABLES = {"spindle angle, rad": 0, "motor speed, rad/s": 2, "command (load)": 1}
+"""Channels of a row, by what the error is drawn over."""
+
+
+def _drawn(shown: Mapping[str, Sequence[Shown]]) -> dict[str, tuple[str, Markup]]:
+    """Return caption and figure by name, of the runs of each target."""
+    drawn = {}
+    for target, runs in shown.items():
+        name, unit, scale = SHOWN[target]
+        stem = f"oneill-{name.replace(' ', '-')}"
+        errors = [np.mean((run.after - run.truth) ** 2) for run in runs]
+        run = runs[int(np.argsort(errors)[len(errors) // 2])]
+        caption = (
+            f"{name.capitalize()}, closing samples of run {run.name}, the run of median error: the"
+            " sensor, a straight line through the command, and physical states, live, both"
+            " fitted on other runs."
+        )
+        series = {"sensor": run.truth, "line": run.before, "states": run.after}
+        time_s, lines = _gapped(run.time_s, {k: scale * v for k, v in series.items()})
+        figure = over_time(time_s, lines, f"{name}, {unit}", caption)
+        drawn[f"{stem}-time"] = caption, figure
+        caption = (
+            f"Error of the {name} on held-out runs: mean and the middle 90 % of the closing"
+            " samples; before: a straight line through the command; after: physical states, live."
+        )
+        before, after = (
+            scale * np.concatenate([getattr(run, which) - run.truth for run in runs])
+            for which in ("before", "after")
+        )
+        rows = np.concatenate([run.rows for run in runs])
+        variables = {label: rows[:, k] for label, k in VARIABLES.items()}
+        figure = against(variables, before, after, f"error, {unit}", caption)
+        drawn[f"{stem}-error"] = caption, figure
+    return drawn
+
+
+def _gapped(
+    time_s: FloatArray, series: dict[str, FloatArray]
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Put the samples on the run's own clock, with gaps where it does not close."""
+    period_s = float(np.median(np.diff(time_s)))
+    ticks = np.rint((time_s - time_s[0]) / period_s).astype(np.int64)
+    lines = {name: np.full(ticks[-1] + 1, np.nan) for name in series}
+    for name, values in series.items():
+        lines[name][ticks] = values
+    return time_s[0] + period_s * np.arange(ticks[-1] + 1), lines
 
 
 def _mn_m(torque_n_m: float) -> str:

@@ -101,14 +101,7 @@ def scored(
     truths: Sequence[FloatArray],
     conditions: Sequence[Mapping[str, float | str]],
 ) -> StateRow:
-    """Score the estimates of runs held out.
-
-    Args:
-        job: What was fitted and held out.
-        estimates: Of each run.
-        truths: The target of each run.
-        conditions: What each run states.
-    """
+    """Score the estimates of runs held out; estimates, truths and conditions are one a run."""
     errors = [e.value - truth for e, truth in zip(estimates, truths, strict=True)]
     covered = [np.abs(e) <= own.half_width for own, e in zip(estimates, errors, strict=True)]
     inside = np.concatenate([own.inside for own in estimates])

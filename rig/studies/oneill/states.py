@@ -35,10 +35,7 @@ class StateStudy:
     """Results.
 
     Attributes:
-        schema: Name of this layout.
-        rows: The rows.
         weights: Number of weights of the neutral pose's estimator.
-        notes: Remarks for the reader.
     """
 
     schema: str
@@ -52,7 +49,6 @@ class Shown:
     """Estimates of one target on the closing samples of a run held out, in its SI unit.
 
     Attributes:
-        name: The run.
         time_s: Shape (n,).
         rows: Filtered channels of the bank, shape (n, channels).
         truth: The target without lag, shape (n,).
@@ -102,15 +98,9 @@ def run_states(
     on_row: Callable[[int, int], None] = lambda done, total: None,
     on_shown: Callable[[str, list[Shown]], None] | None = None,
 ) -> StateStudy:
-    """Fit and score all rows.
+    """Fit and score all rows; the folder is as of `pose_runs`.
 
-    Args:
-        neutral: Runs of experiments 1 and 2.
-        folder: Folder that may hold the parts of experiment 3, or be next to them.
-        seed: Seed of the folds.
-        on_row: Called with the number of rows done and their total.
-        on_shown: Called with a target and what its figures are drawn from; nothing is made for
-            them if None.
+    `on_shown` is called with a target and what its figures are drawn from, made only for it.
 
     Raises:
         MissingChannelError: A run lacks a channel.

@@ -40,9 +40,7 @@ class Row:
     Attributes:
         surrogate: Short name of the torque surrogate.
         protocol: Short name of the protocol, see `PROTOCOLS`.
-        runs: Number of runs.
         gain: Fitted gain; None where several fits were made.
-        gain_unit: Its unit.
         offset_n_m: Fitted offset; None where several fits were made.
         score: Errors in N m.
     """
@@ -61,10 +59,7 @@ class Study:
     """Results of the study.
 
     Attributes:
-        schema: Name of this layout.
-        source: What the data is.
         measured: Whether the data was measured on the paper's instrument.
-        notes: Remarks for a comparison.
         closing_samples: Closing samples of all runs after the paper's processing.
         paper_samples: The paper's count.
         public_samples: The count the public data is known to give.
@@ -75,7 +70,6 @@ class Study:
         others_reach_n_m: RMSE of others' reproduction of the authors' way.
         rmse_by_run_n_m: Run-wise error of each run with the measured current, or with what there
             is in its place.
-        provenance: When and from what this was made.
     """
 
     schema: str
@@ -97,12 +91,7 @@ class Study:
 def run_study(
     source: Source, *, seed: int = 0, on_run: Callable[[str], None] = lambda name: None
 ) -> Study:
-    """Do the study.
-
-    Args:
-        source: Runs with a spindle angle, a proximal torque and at least one surrogate.
-        seed: Seed of the random split and of the folds.
-        on_run: Called with each run's name when it has been processed.
+    """Do the study on runs with a spindle angle, a proximal torque and at least one surrogate.
 
     Raises:
         DataError: No surrogate, too few runs, or no closing sample.
@@ -168,11 +157,7 @@ def _surrogates(campaign: Campaign, notes: list[str]) -> dict[str, str]:
 
 
 def fit_line(surrogate: FloatArray, torque: FloatArray) -> Polynomial:
-    """Fit the paper's line by least squares: torque = gain x surrogate + offset, SI units.
-
-    Args:
-        surrogate: Shape (n,).
-        torque: Shape (n,), N m.
+    """Fit the paper's line by least squares: torque (n,) = gain x surrogate (n,) + offset, SI.
 
     Raises:
         StudyError: Fewer than two samples, or the surrogate does not vary.

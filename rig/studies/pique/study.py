@@ -41,10 +41,6 @@ class Row:
     """One model, fitted on one path and tested on another.
 
     Attributes:
-        model: Which model.
-        fitted_on: Path of the fit.
-        tested_on: Path of the test.
-        parameters: Number of parameters.
         condition: Condition number of the fit's weighted columns, each of unit length; None of a
             damped or bounded fit, whose damping or bounds set it.
         nrmsd_percent: Error of each joint on the test path, % of its torque's range.
@@ -68,7 +64,6 @@ class Parameter:
     """One identified base parameter of the thesis' model.
 
     Attributes:
-        name: The combination.
         value: By weighted least squares.
         standard_error: Of that value; includes noise only.
         consistent: By the physically consistent fit.
@@ -85,14 +80,10 @@ class Study:
     """Results of the study.
 
     Attributes:
-        schema: Name of this layout.
-        arm: The arm's table.
         paths: The two paths; the search fits the first and tests on the second.
         rows: The models, each in both directions, then on further runs.
         thesis: The thesis' own errors, %.
-        trials: What the search tried.
         parameters: Identified parameters of the thesis' model on the first path, SI units.
-        provenance: When and from what this was made.
     """
 
     schema: str

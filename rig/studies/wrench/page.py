@@ -13,7 +13,7 @@ from rig.output.figures import paired_bars
 from rig.output.page import Page
 from rig.output.table import TextTable
 from rig.studies.coverage import coverage
-from rig.studies.families import middle_and_ends, ratios, verdict
+from rig.studies.families import WITHIN, in_words, middle_and_ends, near, ratios, verdict
 from rig.studies.wrench.study import (
     BODY,
     CAUSAL,
@@ -23,7 +23,6 @@ from rig.studies.wrench.study import (
     TABLES,
     THESIS,
     TWISTED,
-    WITHIN,
     WrenchStudy,
 )
 
@@ -77,10 +76,11 @@ def page(study: WrenchStudy) -> Page:
         ADJUSTED,
         coverage("pique", "wrench"),
     ]
-    near = [word for table in TABLES for word in _near(study, table)]
+    landed = [word for table in TABLES for word in _near(study, table)]
     lead = (
         f"{verdict(_ratios(study))} On the arms that were matched to it the thesis' own method"
-        f" lands within {WITHIN:.0%} of the thesis in {sum(near)} of {len(near)} columns."
+        f" lands within {WITHIN:.0%} of the thesis in {landed.count(True)} of {len(landed)}"
+        " columns."
     )
     return Page(TITLE, [lead, *NOTES], tables, study.provenance, lambda: _figures(study))
 
@@ -108,14 +108,13 @@ def _ratios(study: WrenchStudy, method: str = OURS) -> Mapping[str, FloatArray]:
     return {f: np.hstack([ratio(f, table) for table in TABLES]) for f in FAMILIES}
 
 
-def _near(study: WrenchStudy, table: str) -> list[bool]:
-    middle = np.median(study.errors(OWN, table, THESIS), axis=0)
-    return [bool(near) for near in np.abs(middle / TABLES[table] - 1) <= WITHIN]
+def _near(study: WrenchStudy, table: str) -> list[bool | None]:
+    return near(np.median(study.errors(OWN, table, THESIS), axis=0), TABLES[table])
 
 
 def _table(study: WrenchStudy, name: str, paper: tuple[float, ...]) -> TextTable:
     rows = [["thesis", *(f"{value:.2f}" for value in paper)], *_of_methods(study, name)]
-    rows.append(["within 25 % of the thesis", *("yes" if f else "no" for f in _near(study, name))])
+    rows.append(["within 25 % of the thesis", *in_words(_near(study, name))])
     title = f"Table {name}: NRMSD, %, {study.seeds} arms with the simulation's own hidden torque"
     return TextTable(title, ["", *_columns(name)], rows)
 

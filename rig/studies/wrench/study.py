@@ -76,7 +76,6 @@ meets its table 3.3."""
 CUT = slice(100, -100)
 WINDOW, ORDER = 25, 3
 """Samples and degree of the causal window: a quarter of a second, an eighth late."""
-WITHIN = 0.25
 
 JOINTS_ALONE = replace(PSM, wrist=None, wrist_coupling=())
 """The arm by its joints: the simulated one has no cables between them, and none are searched."""
@@ -102,10 +101,8 @@ class WrenchStudy:
     """Results of the simulated study.
 
     Attributes:
-        schema: Name of this layout.
         seeds: Arms of each family.
         arms: All arms, in the order of their numbers.
-        provenance: When and from what this was made.
     """
 
     schema: str
@@ -120,11 +117,7 @@ class WrenchStudy:
 
 
 def run(seeds: int, keeper: Keeper) -> WrenchStudy:
-    """Do the study on arms of every family of hidden torque.
-
-    Args:
-        seeds: Arms of each family, from seed 0.
-        keeper: Keeps the outcome of each arm.
+    """Do the study on so many arms of every family, from seed 0.
 
     Raises:
         OSError: The folder cannot be written.

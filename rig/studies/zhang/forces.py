@@ -12,15 +12,15 @@ from rig.studies.zhang.free import NETWORKS, OURS, SETTLE, Cells
 from rig.studies.zhang.networks import JointNetwork
 from rig.studies.zhang.physics import Physics
 from rig.studies.zhang.psm import GRIPPER, RATE_HZ, Psm, PsmRun, simulate
-from rig.studies.zhang.psm_grasp import (
+from rig.studies.zhang.psm_motion import (
     ARM_M,
     CONFIGURATIONS_DEG,
+    LEAD_SAMPLES,
     Grasp,
     configurations,
     contact_path,
     grasp_and_release,
 )
-from rig.studies.zhang.psm_motion import LEAD_SAMPLES
 
 EVERY = 5
 """Of the samples, so many are kept of what is drawn over time."""

@@ -69,15 +69,7 @@ def states(run: PsmRun, names: Sequence[str], every: int = 1) -> FloatArray:
 def trained(
     joint: int, runs: Sequence[PsmRun], validation: Sequence[PsmRun], gripper: bool, seed: int
 ) -> JointNetwork:
-    """Train a joint's network in free space.
-
-    Args:
-        joint: The joint, from 0.
-        runs: To train on.
-        validation: To choose the best step on.
-        gripper: Whether the gripper moves in them.
-        seed: Of the first weights.
-    """
+    """Train a joint's (from 0) network in free space; validation runs choose the best step."""
     names, settings = input_names(joint, gripper), replace(SETTINGS, seed=seed)
     return _learnt(joint, runs, validation, names, settings)
 

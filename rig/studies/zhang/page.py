@@ -11,7 +11,7 @@ from rig.output.figures import bars, over_time
 from rig.output.page import Page
 from rig.output.table import TextTable
 from rig.studies.coverage import coverage
-from rig.studies.families import ratios, verdict
+from rig.studies.families import WITHIN, in_words, ratios, verdict
 from rig.studies.zhang.free import (
     BARE,
     FLOOR,
@@ -24,13 +24,12 @@ from rig.studies.zhang.free import (
     SHORT,
 )
 from rig.studies.zhang.psm import KINDS
-from rig.studies.zhang.psm_grasp import CONFIGURATIONS_DEG
+from rig.studies.zhang.psm_motion import CONFIGURATIONS_DEG
 from rig.studies.zhang.study import (
     PAPER,
     PAPER_FORCE_N,
     PAPER_GRASP_N,
     PAPER_MOMENT_N_M,
-    WITHIN,
     ZhangStudy,
     worst_axes,
 )
@@ -111,11 +110,11 @@ def page(study: ZhangStudy) -> Page:
         coverage("zhang"),
     ]
     near = [word for condition in PAPER for word in study.near(condition) if word is not None]
-    near += study.near_in_contact()
+    near += map(bool, study.near_in_contact())
     lead = (
         f"{verdict(_ratios(study))} On the arms that were matched to it the paper's networks land"
-        f" within {WITHIN:.0%} of the paper in {sum(near)} of {len(near)} numbers (median over"
-        f" arms){_missed(study)}."
+        f" within {WITHIN:.0%} of the paper in {near.count(True)} of {len(near)} numbers (median"
+        f" over arms){_missed(study)}."
     )
     return Page(TITLE, [lead, *NOTES], tables, study.provenance, lambda: _figures(study))
 
@@ -188,10 +187,6 @@ def _range(study: ZhangStudy, cell: str, digits: int = 2) -> list[str]:
     ]
 
 
-def _words(near: Sequence[bool | None]) -> list[str]:
-    return [{True: "yes", False: "no", None: ""}[word] for word in near]
-
-
 def _stated(numbers: Sequence[float | None]) -> list[str]:
     return ["lost" if number is None else f"{number:.2f}" for number in numbers]
 
@@ -212,7 +207,7 @@ def _table_1(study: ZhangStudy) -> TextTable:
         rows += [
             [f"{condition}: paper", *_stated(PAPER[cell])],
             [f"{condition}: its method here", *_range(study, f"{cell} | {NETWORKS}")],
-            [f"{condition}: within {WITHIN:.0%}", *_words(study.near(cell))],
+            [f"{condition}: within {WITHIN:.0%}", *in_words(study.near(cell))],
         ]
     title = "Table I: NRMSE of torque in free space, %"
     note = "M: gripper moving, C: closed. Median (least to greatest) over the arms."
@@ -251,7 +246,7 @@ def _table_2(study: ZhangStudy) -> TextTable:
             shown = (_range(study, f"{cell} | {method}")[0] for cell in cells)
             rows.append([f"{when}: {who}", *shown])
             if method == NETWORKS:
-                near = (_words(study.near(cell))[0] for cell in cells)
+                near = (in_words(study.near(cell))[0] for cell in cells)
                 rows.append([f"{when}: within {WITHIN:.0%}", *near])
     after = (
         [study.values(f"II after | {name} | {who}") for who in (OURS, NETWORKS)] for name in OTHERS
@@ -269,7 +264,7 @@ def _grasp(study: ZhangStudy) -> TextTable:
     rows = [
         ["paper", *_stated(PAPER[cell])],
         ["its method here", *_range(study, f"{cell} | {NETWORKS}")],
-        [f"within {WITHIN:.0%}", *_words(study.near(cell))],
+        [f"within {WITHIN:.0%}", *in_words(study.near(cell))],
         [OURS, *_range(study, f"{cell} | {OURS}")],
     ]
     title, columns = "Figure 8: grasping and letting go for 13 s", ["RMSE, N", "NRMSE, %"]
@@ -296,7 +291,7 @@ def _contact(study: ZhangStudy) -> TextTable:
         name = f"{cell} | {method}"
         worst = (f"{value:.3f}" for value in worst_axes(study.median(name)))
         rows.append([method, *_range(study, name, 3), *worst])
-    rows.append([f"within {WITHIN:.0%}", *[""] * 7, *_words(study.near_in_contact())])
+    rows.append([f"within {WITHIN:.0%}", *[""] * 7, *in_words(study.near_in_contact())])
     axes = ["Fx, N", "Fy, N", "Fz, N", "Tx, N m", "Ty, N m", "Tz, N m", "grasp, N"]
     columns = ["", *axes, "worst force", "worst moment", "held grasp"]
     note = (

@@ -147,9 +147,7 @@ class Physics:
     def __call__(self, run: PsmRun, network: bool = True) -> FloatArray:
         """Return the torque of each sample in free space, shape (n, 7).
 
-        Args:
-            run: A run; of its torque only the gripper's is looked at, for the leaks.
-            network: Whether to add what the networks give.
+        Of the run's torque only the gripper's is looked at, for the leaks.
         """
         torque: FloatArray = columns_of(self.arm, self.effects, run) @ self.values
         if network:
@@ -215,10 +213,7 @@ def fitted(
 def rest_rows(arm: Arm, joint: int, motion: Motion) -> FloatArray:
     """Return the states that the network on a joint's rest takes, shape (n, inputs).
 
-    Args:
-        arm: The arm with its instrument's nominal coupling.
-        joint: The joint, from 0.
-        motion: Its motion, gripper included, walked from its start.
+    The motion has the gripper too, and is walked from its start.
     """
     wrist = len(PSM.joints) if arm.wrist is None else arm.wrist
     if joint < wrist:
@@ -234,11 +229,9 @@ def rest_rows(arm: Arm, joint: int, motion: Motion) -> FloatArray:
 
 
 def rest_network(rows: FloatArray, left: FloatArray) -> Network | None:
-    """Return a network on a model's residual; None where it improves held-out segments too little.
+    """Return a network from rows (n, inputs) to a residual (n,).
 
-    Args:
-        rows: Its inputs, shape (n, inputs).
-        left: Residual, shape (n,).
+    None where it improves held-out segments too little.
     """
     piece = np.arange(len(rows)) * 3 * HELD_OUT // len(rows)
     out = piece % HELD_OUT == HELD_OUT - 1

@@ -73,7 +73,6 @@ class Kind:
     """An instrument family as it is drawn around.
 
     Attributes:
-        name: Name of the instrument.
         model: Model number, by which its nominal coupling is known.
         open_rad: Angle to which its gripper opens; closed is 0.
         offset_n_m: Torque of the resting gripper.

@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, OWN
 from rig.arm.simulated import draw_arm
 from rig.output.provenance import Provenance
-from rig.studies.families import arm_of
+from rig.studies.families import arm_of, near
 from rig.studies.seeds import Keeper, begin_learning, kept_outcomes
 from rig.studies.zhang import free
 from rig.studies.zhang.forces import Learnt, grasps, in_contact, turning
@@ -45,8 +45,6 @@ PAPER: dict[str, tuple[float | None, ...]] = {
 PAPER_FORCE_N, PAPER_MOMENT_N_M, PAPER_GRASP_N = 1.4, (0.04, 0.06), 0.1
 """Largest RMSE of an axis in contact; of the moment, the abstract's and section IV-D's."""
 
-WITHIN = 0.25
-
 
 @dataclass(frozen=True)
 class Outcome:
@@ -68,13 +66,11 @@ class ZhangStudy:
     """Results of the study.
 
     Attributes:
-        schema: Name of this layout.
         seeds: Arms of each family of hidden torque.
         outcomes: Of each arm, in the order of their numbers, its errors by
             `experiment | condition | method`.
         traces: Forces over time of the first arm, by `experiment | what`.
         effects: Of each effect found, on how many arms.
-        provenance: When and from what this was made.
     """
 
     schema: str
@@ -98,20 +94,13 @@ class ZhangStudy:
 
         The median over the arms that were matched counts; None where the paper's is not known.
         """
-        found = self.median(f"{condition} | {NETWORKS}")
-        return [
-            None if stated is None else bool(abs(here / stated - 1) <= WITHIN)
-            for here, stated in zip(found, PAPER[condition], strict=True)
-        ]
+        return near(self.median(f"{condition} | {NETWORKS}"), PAPER[condition])
 
-    def near_in_contact(self) -> tuple[bool, bool, bool]:
-        """Whether force, moment (by either of its numbers) and grasp land near the paper's."""
+    def near_in_contact(self) -> list[bool | None]:
+        """Return whether force, moment (by either of its numbers) and grasp land near."""
         force, moment, grasp = worst_axes(self.median(f"contact | wrench, grasp | {NETWORKS}"))
-        return (
-            abs(force / PAPER_FORCE_N - 1) <= WITHIN,
-            any(abs(moment / stated - 1) <= WITHIN for stated in PAPER_MOMENT_N_M),
-            abs(grasp / PAPER_GRASP_N - 1) <= WITHIN,
-        )
+        either = any(near([moment] * len(PAPER_MOMENT_N_M), PAPER_MOMENT_N_M))
+        return [*near([force], [PAPER_FORCE_N]), either, *near([grasp], [PAPER_GRASP_N])]
 
 
 def worst_axes(contact: FloatArray) -> tuple[float, float, float]:
@@ -142,11 +131,7 @@ def one_arm(number: int) -> Outcome:
 
 
 def run(seeds: int, keeper: Keeper) -> ZhangStudy:
-    """Do the study on arms of every family of hidden torque.
-
-    Args:
-        seeds: Arms of each family, from seed 0.
-        keeper: Keeps the outcome of each arm, and makes each on one core.
+    """Do the study on so many arms of every family, from seed 0.
 
     Raises:
         MissingExtraError: torch or Pinocchio is missing.

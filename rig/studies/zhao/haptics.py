@@ -43,7 +43,6 @@ class Stiffness:
     """One place or material.
 
     Attributes:
-        name: Name.
         true_n_rad: What it is, force at the tip over joint angle.
         grasps_n_rad: What each grasp gave.
     """
@@ -63,11 +62,8 @@ class Answer:
     """The result of one method.
 
     Attributes:
-        method: Name of the method.
-        materials: The three materials.
         order_confidence: Confidence that neighbours in the found order differ, the least of them.
         order_is_right: Whether the order is the true one.
-        places: The seven places.
         found: Place with the inclusion, from 0.
         true: Where it is.
         place_confidence: Confidence that this place is stiffer than the stiffest other.
@@ -86,15 +82,7 @@ class Answer:
 def haptics_of(
     prototype: str, seeds: int, spread: float, model: Model, keeper: Keeper
 ) -> list[tuple[Answer, ...]]:
-    """Return the answers on graspers of one make, one tuple a seed, in their order.
-
-    Args:
-        prototype: `third`, `journal` or `ball`.
-        seeds: Number of graspers, from seed 0.
-        spread: Spread of the hidden parameters from grasper to grasper.
-        model: The declared model with the effects that ours adds.
-        keeper: Keeps each grasper.
-    """
+    """Return the answers on graspers of one make of `PROTOTYPES`, one tuple a seed, in order."""
     one = partial(run_haptics, prototype, spread, model)
     name = f"{SCHEMA} {prototype} {spread:g}"
     return kept_outcomes(tuple[Answer, ...], one, seeds, name, keeper)

@@ -24,7 +24,22 @@ from rig.grasper.current_force import CurrentForce, angle_led
 from rig.grasper.hidden import OWN, with_family
 from rig.grasper.inputs import end_of_hold, hold, periodic
 from rig.grasper.plant import RATE_HZ, AxisParameters, Prototype, play_axis, vary
-from rig.studies.zhao.paper import INPUTS, LEVELS_N, LONG_S, SHORT_S
+
+DOFS = ("grasp", "pitch", "yaw")
+INPUTS = ("long", "short", "periodic")
+LEVELS_N = (0.5, 1.0, 1.5, 2.0)
+LONG_S, SHORT_S = 26.0, 2.0
+
+PAPER_COEFFICIENTS: Mapping[str, float | None] = {"grasp": 1.28, "pitch": None, "yaw": 1.55}
+"""One over Table 2; the pitch's is missing in our copy of the text."""
+PAPER_ERRORS_N: Mapping[str, tuple[float, float, float]] = {
+    "grasp": (0.24, 0.46, 0.49),
+    "pitch": (0.14, 0.37, 0.71),
+    "yaw": (-0.03, 0.07, 0.05),
+}
+"""Table 3, in the order of `INPUTS`."""
+PAPER_DELAYS_MS: Mapping[str, float] = {"grasp": 0.0, "pitch": -20.0, "yaw": 0.0}
+"""Table 4."""
 
 FILTER = LowPass(cutoff_hz=25.0, order=2)
 EVERY = 8

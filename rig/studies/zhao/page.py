@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 from estimation.model_file import parse
 from estimation.recording import FloatArray
@@ -16,14 +15,25 @@ from rig.output.page import Page
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable
 from rig.studies.coverage import coverage
-from rig.studies.families import ratios, verdict
+from rig.studies.families import WITHIN, in_words, near, ratios, verdict
 from rig.studies.zhao.haptics import LEVEL, Answer
-from rig.studies.zhao.methods import FILTER, Outcome, axes_of, fitted, of_model, record, target_of
-from rig.studies.zhao.paper import DOFS, INPUTS, PAPER_COEFFICIENTS, PAPER_DELAYS_MS, PAPER_ERRORS_N
+from rig.studies.zhao.methods import (
+    DOFS,
+    FILTER,
+    INPUTS,
+    PAPER_COEFFICIENTS,
+    PAPER_DELAYS_MS,
+    PAPER_ERRORS_N,
+    Outcome,
+    axes_of,
+    fitted,
+    of_model,
+    record,
+    target_of,
+)
 from rig.studies.zhao.study import LOOKED_AT, Cell, Study
 
 TITLE = "Force from motor current: Tables 2 to 4 of Zhao and Nelson 2016, on simulated graspers"
-NEAR = 0.25
 LEAST_N = 0.03
 THIRD = PROTOTYPES["third"].name
 """The prototype that the paper's tables are of."""
@@ -46,12 +56,7 @@ ADJUSTED = TextTable(
 
 
 def page(study: Study, haptics: Sequence[Sequence[Answer]] = ()) -> Page:
-    """Return the study's page.
-
-    Args:
-        study: The study.
-        haptics: The haptic experiments, one list of answers a grasper.
-    """
+    """Return the study's page, with the answers of the haptic experiments on each grasper."""
     tests = [f"{dof}, {kind}" for dof in DOFS for kind in INPUTS]
     graspers = len(study.cells[DOFS[0]]) // len(FAMILIES)
     title = (
@@ -76,8 +81,8 @@ def page(study: Study, haptics: Sequence[Sequence[Answer]] = ()) -> Page:
 def _lead(study: Study) -> str:
     near = (
         f" On the graspers that were matched to it ({study.prototype}) the paper's method lands"
-        f" within {NEAR:.0%} of the paper's errors in"
-        f" {sum(int(_near(study, dof).sum()) for dof in DOFS)} of 9 cells (mean)."
+        f" within {WITHIN:.0%} of the paper's errors in"
+        f" {sum(_near(study, dof).count(True) for dof in DOFS)} of 9 cells (mean)."
         if study.prototype == THIRD
         else f" The paper states no errors of this prototype ({study.prototype})."
     )
@@ -161,11 +166,9 @@ def _found(study: Study) -> TextTable:
     return TextTable("Found by the diagnosis, and added", ["hidden friction", *DOFS], rows)
 
 
-def _near(study: Study, dof: str) -> NDArray[np.bool_]:
+def _near(study: Study, dof: str) -> list[bool | None]:
     """Return whether the mean of the paper's method is near the paper, by kind of input."""
-    stated = np.array(PAPER_ERRORS_N[dof])
-    found = _values(study, dof, lambda cell: cell.paper).mean(axis=0)
-    return np.asarray(np.abs(found - stated) <= NEAR * np.abs(stated))
+    return near(_values(study, dof, lambda cell: cell.paper).mean(axis=0), PAPER_ERRORS_N[dof])
 
 
 def _range(values: FloatArray, form: str = "{:+.2f}") -> str:
@@ -192,12 +195,12 @@ def _errors(study: Study) -> TextTable:
             _values(study, dof, of)
             for of in (lambda c: c.paper, lambda c: c.ours, lambda c: c.undeclared)
         )
-        for k, (kind, near) in enumerate(zip(INPUTS, _near(study, dof), strict=True)):
+        for k, (kind, lands) in enumerate(zip(INPUTS, in_words(_near(study, dof)), strict=True)):
             stated = f"{PAPER_ERRORS_N[dof][k]:+.2f}" if is_stated else "not stated"
-            lands = ("yes" if near else "no") if is_stated else ""
-            errors = _range(ours[:, k]), _range(bare[:, k])
-            rows.append([f"{dof}, {kind}", stated, _range(paper[:, k]), lands, *errors])
-    columns = ["test", "paper, N", "its method here, N", f"within {NEAR:.0%}", "ours, N"]
+            errors = [_range(paper[:, k]), lands if is_stated else ""]
+            errors += [_range(ours[:, k]), _range(bare[:, k])]
+            rows.append([f"{dof}, {kind}", stated, *errors])
+    columns = ["test", "paper, N", "its method here, N", f"within {WITHIN:.0%}", "ours, N"]
     columns.append("declared model alone, N")
     return TextTable("Table 3: estimation error", columns, rows, "Mean (least to greatest).")
 

@@ -17,6 +17,7 @@ from rig.grasper.plant import PROTOTYPES
 from rig.studies.families import arm_of
 from rig.studies.seeds import Keeper, kept_outcomes
 from rig.studies.zhao.methods import (
+    DOFS,
     Axes,
     Lacking,
     Outcome,
@@ -30,7 +31,6 @@ from rig.studies.zhao.methods import (
     report_runs,
     slope,
 )
-from rig.studies.zhao.paper import DOFS
 
 SCHEMA = "rig.study.zhao/2"
 
@@ -64,8 +64,6 @@ class Study:
     """The whole study.
 
     Attributes:
-        prototype: Name of the prototype.
-        spread: Spread of the hidden parameters.
         cells: Degree of freedom to its cells, one a grasper, in the order of their numbers.
         lacking: Family and degree of freedom to what the diagnosis found on the grasper it looked
             at, and what was therefore added to ours.
@@ -105,14 +103,7 @@ def measure(dof: str, axes: Axes, seed: int, model: Model) -> Cell:
 
 
 def run_study(prototype: str, seeds: int, spread: float, keeper: Keeper) -> Study:
-    """Run the three experiments on graspers of one make.
-
-    Args:
-        prototype: `third`, `journal` or `ball`.
-        seeds: Graspers of each family of hidden friction, from seed 0.
-        spread: Spread of the hidden parameters from grasper to grasper.
-        keeper: Keeps each of three diagnoses a family, and each grasper.
-    """
+    """Run the three experiments on graspers of one make of `PROTOTYPES`, `seeds` of each family."""
     name = f"{SCHEMA} {prototype} {spread:g}"
     every = len(FAMILIES) * len(DOFS)
     diagnosed = partial(look, prototype, spread)
