@@ -1,6 +1,7 @@
 """One case: recordings whose hidden effect is known, and how an answer about them is judged."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,15 @@ that was changed afterwards with it."""
 
 SURE = 0.9
 """Confidence from which a wrong statement counts as sure and wrong."""
+
+
+def in_turn(
+    kinds: Iterable[str], counts: Mapping[str, int], make: Callable[[str, int], "Case"]
+) -> Iterator["Case"]:
+    """Yield the cases of each kind by number, the kinds in turn: half of them shows every kind."""
+    of_kind = [[(kind, k) for k in range(counts.get(kind, 0))] for kind in kinds]
+    for turn in itertools.zip_longest(*of_kind):
+        yield from (make(*each) for each in turn if each is not None)
 
 
 def write_recordings(folder: Path, recordings: Iterable[Recording]) -> None:

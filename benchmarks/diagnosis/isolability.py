@@ -70,10 +70,9 @@ def main() -> int:
 
 def area_under_curve(scores: Sequence[float], labels: Sequence[bool]) -> float:
     """Return the probability that a pair with the label has the larger score, ties half."""
-    there = np.array(labels)
-    ranks, count = stats.rankdata(scores), int(there.sum())
-    least = count * (count + 1) / 2
-    return float((ranks[there].sum() - least) / (count * (len(there) - count)))
+    there, values = np.array(labels), np.array(scores)
+    larger = stats.mannwhitneyu(values[there], values[~there]).statistic
+    return float(larger / (there.sum() * (~there).sum()))
 
 
 def _single(folder: Path, answers: Path) -> Iterator[tuple[str, str, list[str], set[str]]]:

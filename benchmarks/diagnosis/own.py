@@ -5,7 +5,6 @@ case's folder holds logs and nothing else, under a name that gives nothing away.
 """
 
 import hashlib
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis import scoring
-from benchmarks.diagnosis.case import KINDS, Case, write_recordings
+from benchmarks.diagnosis.case import KINDS, Case, in_turn, write_recordings
 from benchmarks.diagnosis.truths import CATALOGUED, OUTSIDE, TRUTHS
 from estimation.recording import FloatArray, Recording
 from rig.protocols import trajectory
@@ -287,13 +286,11 @@ def _steady(index: int) -> RunPlan:
 
 
 def cases(seed: int, counts: Mapping[str, int] = COUNTS) -> Iterator[Case]:
-    """Yield the cases of a seed, the classes in turn, so that half a measurement shows them all."""
-    of_kind = [[_case(kind, k, seed) for k in range(counts.get(kind, 0))] for kind in KINDS]
-    for turn in itertools.zip_longest(*of_kind):
-        yield from (case for case in turn if case is not None)
+    """Yield the cases of a seed, the classes in turn."""
+    return in_turn(KINDS, counts, partial(_case, seed))
 
 
-def _case(kind: str, number: int, seed: int) -> Case:
+def _case(seed: int, kind: str, number: int) -> Case:
     answer = draw(kind, number, seed)
     truth = truth_of(answer)
     case = Case(

@@ -6,7 +6,6 @@ simulated forwards: a smooth motion is drawn, and the drive that it takes is wor
 """
 
 import csv
-import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -16,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis import scoring
-from benchmarks.diagnosis.case import BLOCK, MACHINE_FILE, Case
+from benchmarks.diagnosis.case import BLOCK, MACHINE_FILE, Case, in_turn
 from estimation.files import write_text_atomic
 from estimation.recording import FloatArray
 
@@ -305,13 +304,14 @@ class Stranger:
 
 def cases(seed: int, counts: Mapping[str, int], kept: Path) -> Iterator[Case]:
     """Yield the cases of a block of seeds, the classes in turn; answers are kept in a folder."""
-    turns = [[(k, seed + n) for n in range(min(counts.get(k, 0), BLOCK))] for k in KINDS]
-    for turn in itertools.zip_longest(*turns):
-        for kind, one in filter(None, turn):
-            yield _case(kind, one, kept / f"stranger-{kind}-{one}.json")
+    most = {kind: min(count, BLOCK) for kind, count in counts.items()}
+    return in_turn(KINDS, most, lambda kind, k: _case(kind, seed + k, kept))
 
 
-def _case(kind: str, seed: int, kept: Path) -> Case:
+def _case(kind: str, seed: int, folder_of_answers: Path) -> Case:
+    name = f"stranger-{kind}-{seed}"
+    kept = folder_of_answers / f"{name}.json"
+
     def write(folder: Path) -> None:
         kept.parent.mkdir(parents=True, exist_ok=True)
         write_text_atomic(kept, json.dumps(draw(seed, kind, folder)))
@@ -322,7 +322,7 @@ def _case(kind: str, seed: int, kept: Path) -> Case:
         return scoring.judge(scoring.Truth(kind, hidden, ()), report)
 
     options = ("--machine", f"{{case}}/{MACHINE_FILE}")
-    return Case(f"stranger-{kind}-{seed}", kind, write, judge, options=options)
+    return Case(name, kind, write, judge, options=options)
 
 
 def draw(seed: int, kind: str, folder: Path) -> list[list[list[object]]]:

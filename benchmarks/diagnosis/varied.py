@@ -1,6 +1,5 @@
 """Cases whose rig, protocol and hidden forms are all drawn at random (`benchmarks.rigs`)."""
 
-import itertools
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ from benchmarks.diagnosis.case import (
     Case,
     Judgement,
     Report,
+    in_turn,
     write_recordings,
 )
 from benchmarks.diagnosis.truths import same_on_one_rig
@@ -38,11 +38,8 @@ def cases(
         gear_ratio: One gear ratio for all rigs; by default each has its own, and its machine file
             is handed over.
     """
-    of_kind = [[seed + k for k in range(min(counts.get(kind, 0), BLOCK))] for kind in KINDS]
-    for turn in itertools.zip_longest(*of_kind):
-        for kind, one in zip(KINDS, turn, strict=True):
-            if one is not None:
-                yield _case(_Lazy(one, kind, gear_ratio, kept))
+    most = {kind: min(count, BLOCK) for kind, count in counts.items()}
+    return in_turn(KINDS, most, lambda kind, k: _case(_Lazy(seed + k, kind, gear_ratio, kept)))
 
 
 @dataclass(frozen=True)

@@ -11,25 +11,22 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.reliability.encoder_faults import (
+    BLOCK,
     JAW,
     MOTOR,
     PER_RAD,
     SPINDLE,
     TICK_FUNCTION,
+    armed,
     frozen,
 )
-from drivers.teensy.core import FirmwareBoard
-from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Trip
-from drivers.transport.simulated import SimulatedTransport
 from rig.configuration.config import load_config
-from rig.machines.choose import machine_of
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.hidden import draw
 from rig.simulation.parameters import PlantParameters, vary
 from rig.simulation.places import SPINDLE_ANGLE
 
-BLOCK = 50
 MOVES = 120
 REST = 6
 """Blocks in which the host sends setpoints, and in which it then is silent."""
@@ -83,9 +80,7 @@ def ride(seed: int, slow: bool = True, dead: bool = True, library: Path | None =
         library: The firmware library; the built one when None.
     """
     rng = np.random.default_rng(seed)
-    config = load_config(Path("reference"))
-    machine = machine_of(config)
-    travel_rad = config.reference_limits.spindle_angle_rad
+    travel_rad = load_config(Path("reference")).reference_limits.spindle_angle_rad
     left_rad = rng.uniform(0.02, 0.4 if slow else 2 * travel_rad)
     speed_rad_s = math.exp(rng.uniform(math.log(0.005), math.log(0.3 if slow else 2.0)))
     sense, since = rng.choice([-1, 1]), int(rng.integers(100, 1500))
@@ -99,13 +94,10 @@ def ride(seed: int, slow: bool = True, dead: bool = True, library: Path | None =
         seed=seed,
         start_count=round(start_rad * PER_RAD[SPINDLE]),
     )
-    board = FirmwareBoard(DeadFrom(bench, since) if dead else bench, library=library)
     gone_rad = speed_rad_s * np.clip(np.arange(MOVES * BLOCK) * 1e-3 - 0.05, 0, None)
     angle_rad = start_rad + sense * np.clip(gone_rad, 0, max(left_rad - short_rad, 0.0))
     targets = np.round(angle_rad * PER_RAD[SPINDLE]).astype(np.int32)
-    logger = TeensyLogger(SimulatedTransport(board, step_s=BLOCK * 1e-3))
-    logger.start()
-    logger.arm(machine.gains(config), machine.board_limits(config, config.calibration_set()))
+    logger = armed(DeadFrom(bench, since) if dead else bench, library)
     beyond_rad = 0.0
     for block in [*np.split(targets, MOVES), *[None] * (REST if dead else 0)]:
         if logger.trip().code is Trip.NONE and block is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import CommandRefusedError
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import FirmwareBench, FirmwareBoard
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Trip
 from drivers.transport.simulated import SimulatedTransport
@@ -85,9 +85,9 @@ def frozen(*columns: int, since: int = FAULT_TICK, counted_tenths: int = 0) -> F
     return fault
 
 
-def losing(*columns: int, since: int = FAULT_TICK) -> Fault:
+def losing(*columns: int) -> Fault:
     """Return the fault of encoders that lose every tenth count."""
-    return frozen(*columns, since=since, counted_tenths=9)
+    return frozen(*columns, counted_tenths=9)
 
 
 def reversed_encoder(column: int) -> Fault:
@@ -148,6 +148,17 @@ FAULTS: dict[str, tuple[Fault, set[Trip]]] = {
 }
 
 
+def armed(bench: FirmwareBench, library: Path | None) -> TeensyLogger:
+    """Return the logger of a board under the gains and limits of the reference rig."""
+    config = load_config(Path("reference"))
+    machine = machine_of(config)
+    board = FirmwareBoard(bench, library=library)
+    logger = TeensyLogger(SimulatedTransport(board, step_s=BLOCK * 1e-3))
+    logger.start()
+    logger.arm(machine.gains(config), machine.board_limits(config, config.calibration_set()))
+    return logger
+
+
 def ride(
     fault: Fault,
     ticks: int = 4000,
@@ -160,17 +171,12 @@ def ride(
     Returns:
         The rig, the samples, and what the board tripped over.
     """
-    config = load_config(Path("reference"))
-    machine = machine_of(config)
     rig = SmallRig(fault, start_rad)
-    board = FirmwareBoard(rig, library=library)
     moved = np.arange(ticks) * 1e-3 * math.copysign(0.2, stop_rad - start_rad)
     target_rad = start_rad + np.clip(moved, *sorted((0.0, stop_rad - start_rad)))
     targets = np.round(target_rad * PER_RAD[SPINDLE]).astype(np.int32)
     samples = []
-    logger = TeensyLogger(SimulatedTransport(board, step_s=BLOCK * 1e-3))
-    logger.start()
-    logger.arm(machine.gains(config), machine.board_limits(config, config.calibration_set()))
+    logger = armed(rig, library)
     for first in range(0, ticks, BLOCK):
         block = targets[first : first + BLOCK]
         try:

@@ -4,7 +4,6 @@ The board is the firmware's core; its inputs are a script, so that every sample 
 at which tick it was taken. Everything is in virtual time.
 """
 
-import ctypes
 import random
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -14,6 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.reliability import encoder_faults
+from benchmarks.reliability.encoder_faults import (
+    CURRENT,
+    DISTAL,
+    JAW,
+    MOTOR,
+    PROXIMAL,
+    SPINDLE,
+    TICK_FUNCTION,
+)
 from benchmarks.reliability.fault_names import EVIDENCE, SAID
 from drivers.errors import DriverError
 from drivers.registry import fakes
@@ -26,9 +34,6 @@ from rig.bench.session import Session
 from rig.configuration.config import Config, load_config
 from rig.errors import RigError
 
-MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT = range(6)
-"""Columns of the board's inputs."""
-_TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p)
 STEP_S = 0.005
 MOTOR_STEP = 3
 HOLD = np.full(1500, -1.0)
@@ -123,7 +128,7 @@ class ScriptedRig:
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
         """Run the script; see `drivers.teensy.core.FirmwareBench.advance_with_board`."""
-        tick = _TICK(tick_address)
+        tick = TICK_FUNCTION(tick_address)
         outputs = np.zeros(2, np.int32)
         for k in range(ticks):
             armed = self.board is not None and self.board.in_force
@@ -255,7 +260,7 @@ def _safety_fault(kind: str, after_ticks: int, config: Config) -> Outcome:
     except (RigError, DriverError) as error:
         said = str(error) + str(error.__context__ or "")
     if kind in ("host killed", "cable cut"):
-        return _after_silence(kind, board, said, ticks, motors, config)
+        return _after_silence(kind, board, said, _mis_stamped(ticks, motors))
     trip, _, _, allowed_s = SENSOR_FAULTS[kind]
     report = TeensyLogger(SimulatedTransport(board)).trip()
     assert bench.struck_at is not None
@@ -268,9 +273,7 @@ def _after_silence(
     kind: str,
     board: FirmwareBoard,
     said: str,
-    ticks: list[NDArray[np.int64]],
-    motors: list[NDArray[np.int64]],
-    config: Config,
+    mis_stamped: int,
 ) -> Outcome:
     board.advance(200)
     board.transmit()
@@ -282,7 +285,7 @@ def _after_silence(
     told = kind == "host killed" or "did not confirm" in said
     named = report.code is Trip.HOST_SILENT and told
     safe = None if armed else report.late_us * 1e-6
-    return Outcome(kind, not armed, named, _mis_stamped(ticks, motors), safe)
+    return Outcome(kind, not armed, named, mis_stamped, safe)
 
 
 def _mis_stamped(ticks: list[NDArray[np.int64]], motors: list[NDArray[np.int64]]) -> int:

@@ -5,6 +5,7 @@ import time
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -56,19 +57,9 @@ class Paced:
         self.longest_ms = (0.0, 0.0, 0.0)
         self.watches = False
 
-    @property
-    def url(self) -> str:
-        """Where it leads."""
-        return self._transport.url
-
-    @property
-    def now_s(self) -> float:
-        """Its clock."""
-        return self._transport.now_s
-
-    def read(self, timeout_s: float) -> bytes:
-        """Read as the transport does."""
-        return self._transport.read(timeout_s)
+    def __getattr__(self, name: str) -> Any:
+        """Return an attribute of the transport."""
+        return getattr(self._transport, name)
 
     def write(self, data: bytes) -> None:
         """Write, and keep the pause before it."""
@@ -78,10 +69,6 @@ class Paced:
             self.longest_ms = max(self.longest_ms, pause)
         self._last = now
         self._transport.write(data)
-
-    def close(self) -> None:
-        """Let go of it."""
-        self._transport.close()
 
 
 def _times_ms() -> tuple[float, float, float]:

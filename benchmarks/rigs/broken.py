@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe, order_over
 from benchmarks.rigs.drives import wave
 from benchmarks.rigs.hidden import Table
-from benchmarks.rigs.plant import Plant, over
+from benchmarks.rigs.plant import over
 from benchmarks.rigs.sensors import Fault
 from rig.simulation.forms import POINTS, Random, course, grid, power
 
@@ -25,7 +25,7 @@ PLACES = {
 LATE = ("sensor.delay", "sensor.lag")
 
 
-def gain(channel: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def gain(channel: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a gain that changes over the range."""
     word, variable, known = PLACES[channel]
     odd = bool(random.random() < 0.6)
@@ -34,7 +34,7 @@ def gain(channel: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     return Drawn(word, "sensor.gain_nonlinear", (known,), fault, 0.03 * ranges.size(variable))
 
 
-def drift(channel: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def drift(channel: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a zero that drifts in each run, or over the campaign."""
     word, variable, _ = PLACES[channel]
     within = bool(random.random() < 0.6)
@@ -44,7 +44,7 @@ def drift(channel: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     return Drawn(word, "sensor.drift", ("time",), fault, 0.03 * ranges.size(variable))
 
 
-def knocked(channel: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def knocked(channel: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a zero that steps at one moment of each run."""
     word, variable, _ = PLACES[channel]
     sharp = random.uniform(0.002, 0.015)
@@ -54,7 +54,7 @@ def knocked(channel: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn
     return Drawn(word, "change.step", ("time",), fault, 0.03 * ranges.size(variable))
 
 
-def crosstalk(channel: str, source: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def crosstalk(channel: str, source: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a reading that another quantity leaks into, nearly in proportion."""
     word, variable, _ = PLACES[channel]
     _, other, known = PLACES[source]
@@ -66,13 +66,13 @@ def crosstalk(channel: str, source: str, random: Random, ranges: Ranges, plant: 
     return Drawn(word, "sensor.crosstalk", (known,), fault, 0.03 * ranges.size(variable))
 
 
-def late(channel: str, kind: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def late(channel: str, kind: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a reading that comes late: a delay or a lag."""
     word, _, known = PLACES[channel]
     return Drawn(word, f"sensor.{kind}", (known, "time"), Fault(channel, kind), 3e-3, LATE)
 
 
-def creep(channel: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def creep(channel: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a share of the reading that comes slowly, over one to three times."""
     word, _, known = PLACES[channel]
     count = int(random.integers(1, 4))
@@ -81,7 +81,7 @@ def creep(channel: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     return Drawn(word, "sensor.creep", (known, "time"), fault, 0.05)
 
 
-def nonlinear(channel: str, most: int, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def nonlinear(channel: str, most: int, random: Random, ranges: Ranges) -> Drawn:
     """Draw an encoder's error along its own turn."""
     word, variable, known = PLACES[channel]
     shaft = variable.removesuffix("_angle")

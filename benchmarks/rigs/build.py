@@ -131,7 +131,7 @@ def _hidden(stage: Stage, kind: str, name: str, random: Random, ranges: Ranges) 
     beside = [k for k in stage.every if k not in runs]
     tried = tuple(sorted({*spread_over(runs, TRIED_RUNS), *spread_over(beside, 3)}))
     for _ in range(DRAWS):
-        drawn = RECIPES[name](random, ranges, stage.plant)
+        drawn = RECIPES[name](random, ranges)
         wanted = over(random, 1.2 * low, 0.85 * high) if low > 2 else over(random, 1.35, 1.75)
         start = Switched(drawn, 0.1 * drawn.guess, runs)
         found = amplitude_for(stage, start, wanted, tried, largest(drawn, stage))

@@ -48,6 +48,7 @@ class Ranges:
         usual: Variable to the median of its size, without sign.
         duration_s: Of a run.
         span_s: Of the campaign.
+        plant: The rig.
     """
 
     low: Mapping[str, float]
@@ -55,6 +56,12 @@ class Ranges:
     usual: Mapping[str, float]
     duration_s: float
     span_s: float
+    plant: Plant
+
+    def level(self, place: str) -> float:
+        """Return a tenth of the torque at a place."""
+        torque = 0.1 * self.plant.pull * self.plant.load_scale
+        return torque / self.plant.ratio if place == "motor" else torque
 
     def size(self, variable: str) -> float:
         """Return the largest usual size of a variable, without sign."""
@@ -84,7 +91,7 @@ class Ranges:
         return Table(variable, 0.0, (1.0 + MARGIN) * self.high[variable], form)
 
 
-Recipe = Callable[[Random, Ranges, Plant], Drawn]
+Recipe = Callable[[Random, Ranges], Drawn]
 
 
 def ranges_of(plant: Plant, runs: Sequence[FloatArray], starts_s: Sequence[float]) -> Ranges:
@@ -104,12 +111,8 @@ def ranges_of(plant: Plant, runs: Sequence[FloatArray], starts_s: Sequence[float
         ("jaw_speed", kernel.JAW_ANGLE),
     ):
         columns[name] = np.concatenate([np.gradient(run[:, key], TICK_S) for run in runs])
-    columns["acceleration"] = np.concatenate(
-        [
-            np.gradient(_smooth(np.gradient(r[:, kernel.SPINDLE_ANGLE], TICK_S)), TICK_S)
-            for r in runs
-        ]
-    )
+    spindle = [np.gradient(run[:, kernel.SPINDLE_ANGLE], TICK_S) for run in runs]
+    columns["acceleration"] = np.concatenate([np.gradient(_smooth(v), TICK_S) for v in spindle])
     columns["twist"] = columns["gear_torque"] / plant.gear_stiffness
     columns["stretch"] = columns["cable_torque"] / plant.cable_stiffness
     columns["motor_way"] = np.abs(columns["motor_speed"])
@@ -128,7 +131,7 @@ def ranges_of(plant: Plant, runs: Sequence[FloatArray], starts_s: Sequence[float
     usual = {name: float(np.median(np.abs(x[::7]))) for name, x in columns.items()}
     low |= {name: ends[0] for name, ends in fixed.items()}
     high |= {name: ends[1] for name, ends in fixed.items()}
-    return Ranges(low, high, usual, duration, span)
+    return Ranges(low, high, usual, duration, span, plant)
 
 
 def _smooth(values: FloatArray) -> FloatArray:

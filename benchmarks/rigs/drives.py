@@ -5,9 +5,9 @@ from functools import partial
 import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe, order_over
-from benchmarks.rigs.frictions import LOOPS, WORDS, level
+from benchmarks.rigs.frictions import LOOPS, WORDS
 from benchmarks.rigs.hidden import Hidden, Table
-from benchmarks.rigs.plant import Plant, over
+from benchmarks.rigs.plant import over
 from estimation.recording import FloatArray
 from rig.simulation.forms import Random, bank, bend, grid, power, rising
 
@@ -48,58 +48,58 @@ def turn_table(random: Random, ranges: Ranges, shaft: str, most: int) -> Table:
     return Table(f"{shaft}_angle", 0.0, TURN, form, periodic=True)
 
 
-def motor_ripple(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def motor_ripple(random: Random, ranges: Ranges) -> Drawn:
     """Draw cogging."""
     part = Hidden("motor", "table", (turn_table(random, ranges, "motor", 12),))
-    return Drawn(WORDS["motor"], "ripple.motor", ("motor_angle",), part, level(plant, "motor"))
+    return Drawn(WORDS["motor"], "ripple.motor", ("motor_angle",), part, ranges.level("motor"))
 
 
-def current_ripple(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def current_ripple(random: Random, ranges: Ranges) -> Drawn:
     """Draw a torque constant that ripples with the motor's turn."""
     part = Hidden("constant", "table", (turn_table(random, ranges, "motor", 12),))
     return Drawn(WORDS["motor"], "ripple.current", ("motor_angle", "current"), part, 0.1)
 
 
-def output_ripple(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def output_ripple(place: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a torque that repeats with the spindle's turn."""
     part = Hidden(place, "table", (turn_table(random, ranges, "spindle", 60),))
-    return Drawn(WORDS[place], "ripple.output", ("spindle_angle",), part, level(plant, place))
+    return Drawn(WORDS[place], "ripple.output", ("spindle_angle",), part, ranges.level(place))
 
 
-def eccentric(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def eccentric(random: Random, ranges: Ranges) -> Drawn:
     """Draw a lever arm of the gear that varies with the spindle's angle."""
     wheel = turn_table(random, ranges, "spindle", 16)
     load = ranges.sided("gear_torque", power(random, 0.9, 1.1), odd=True)
     part = Hidden("motor", "table", (wheel, load))
     return Drawn(
-        WORDS["motor"], "eccentric.load", ("spindle_angle", "load"), part, level(plant, "motor")
+        WORDS["motor"], "eccentric.load", ("spindle_angle", "load"), part, ranges.level("motor")
     )
 
 
-def pulley(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def pulley(random: Random, ranges: Ranges) -> Drawn:
     """Draw a pulley that is not round: it moves the cable and changes its own lever."""
     part = Hidden("pulley", "table", (turn_table(random, ranges, "spindle", 16),))
     others = ("coupling.kinematic", "ripple.output")
     return Drawn("pulley", "eccentric.load", ("spindle_angle", "load"), part, 0.01, others)
 
 
-def spring(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def spring(place: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a spring between a part and the ground, hardening or softening."""
     variable = "jaw_angle" if place == "jaw" else "spindle_angle"
     part = Hidden(place, "table", (ranges.table(variable, rising(random) - 0.5),))
     word = WORDS.get(place, "jaw")
-    return Drawn(word, "spring.position", (variable,), part, level(plant, place))
+    return Drawn(word, "spring.position", (variable,), part, ranges.level(place))
 
 
-def end_stop(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def end_stop(random: Random, ranges: Ranges) -> Drawn:
     """Draw a stop that is met near one end of the jaw's travel."""
     x = np.clip(grid() - random.uniform(0.6, 0.8), 0.0, None)
     form = (x / x.max()) ** random.uniform(1.0, 2.2)
     part = Hidden("jaw", "table", (ranges.table("jaw_angle", form),))
-    return Drawn("jaw", "spring.end_stop", ("jaw_angle",), part, level(plant, "jaw"))
+    return Drawn("jaw", "spring.end_stop", ("jaw_angle",), part, ranges.level("jaw"))
 
 
-def payload(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def payload(random: Random, ranges: Ranges) -> Drawn:
     """Draw a weight on the jaw whose arm is not quite that of a point."""
     x = np.linspace(-np.pi, np.pi, 513)
     form = np.sin(x + random.uniform(0.0, TURN)) * np.interp(
@@ -107,17 +107,17 @@ def payload(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     )
     table = Table("jaw_angle", -np.pi, np.pi, form)
     part = Hidden("jaw", "table", (table,))
-    return Drawn("jaw", "gravity.payload", ("jaw_angle",), part, 2.0 * level(plant, "jaw"))
+    return Drawn("jaw", "gravity.payload", ("jaw_angle",), part, 2.0 * ranges.level("jaw"))
 
 
-def saturation(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def saturation(random: Random, ranges: Ranges) -> Drawn:
     """Draw a torque constant that falls with the size of the current."""
     table = ranges.sided("current", power(random, 1.0, 2.5), odd=False)
     part = Hidden("constant", "table", (table,))
     return Drawn(WORDS["motor"], "motor.saturation", ("current",), part, 0.1)
 
 
-def thermal(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def thermal(random: Random, ranges: Ranges) -> Drawn:
     """Draw a torque constant that falls as the winding warms."""
     part = Hidden(
         "constant", "table", (ranges.table("heat", rising(random)),), heat_s=over(random, 1.5, 10.0)
@@ -125,7 +125,7 @@ def thermal(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     return Drawn(WORDS["motor"], "motor.thermal", ("current", "time"), part, 0.1)
 
 
-def backlash(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def backlash(random: Random, ranges: Ranges) -> Drawn:
     """Draw lost motion of the gear with edges that are more or less soft."""
     x = np.linspace(-8.0, 8.0, 1025)
     table = Table("twist", -8.0, 8.0, knee(random, x))
@@ -133,7 +133,7 @@ def backlash(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     return Drawn("gear", "transmission.backlash", ("load",), part, 0.05 * ranges.size("twist"))
 
 
-def stiffening(place: str, variable: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def stiffening(place: str, variable: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a spring that is not straight."""
     sign = 1.0 if random.random() < 0.5 else -1.0
     table = ranges.sided(variable, power(random, 1.6, 3.0), odd=True)
@@ -143,7 +143,7 @@ def stiffening(place: str, variable: str, random: Random, ranges: Ranges, plant:
     return Drawn(place, "transmission.stiffening", ("load",), part, guess)
 
 
-def relaxation(place: str, variable: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def relaxation(place: str, variable: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw a part of the deflection that comes with time, over several times."""
     count = int(random.integers(1, BANK_OF_LAGS + 1))
     times = np.sort([over(random, 0.08, 3.0) for _ in range(count)])
@@ -152,7 +152,7 @@ def relaxation(place: str, variable: str, random: Random, ranges: Ranges, plant:
     return Drawn(place, "transmission.relaxation", ("load", "time"), part, 0.15)
 
 
-def inner_loop(place: str, variable: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def inner_loop(place: str, variable: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw wires or teeth that rub on each other while a spring deflects."""
     reach = ranges.span(variable) * over(random, 0.04, 0.25)
     kind, reaches, weights = bank(random, reach)
@@ -166,7 +166,7 @@ def inner_loop(place: str, variable: str, random: Random, ranges: Ranges, plant:
     return Drawn(place, LOOPS[kind == "bouc_wen"], ("load", "history"), part, guess, LOOPS)
 
 
-def play(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def play(random: Random, ranges: Ranges) -> Drawn:
     """Draw play of the cable that is taken up after each reversal of the spindle."""
     count = int(random.integers(1, 4))
     reach = ranges.span("spindle_angle") * over(random, 0.01, 0.06)
@@ -180,7 +180,7 @@ def play(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     )  # fmt: skip
 
 
-def wavy(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def wavy(random: Random, ranges: Ranges) -> Drawn:
     """Draw a wave of the gear's position along the spindle's turn."""
     part = Hidden("gear", "table", (turn_table(random, ranges, "spindle", 40),))
     guess = 0.03 * ranges.size("twist")

@@ -7,8 +7,7 @@ import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe
 from benchmarks.rigs.hidden import Hidden, Table
-from benchmarks.rigs.plant import Plant, over
-from estimation.recording import FloatArray
+from benchmarks.rigs.plant import over
 from rig.simulation.forms import (
     BANK,
     Random,
@@ -30,12 +29,6 @@ LOADS = {"motor": "gear_torque", "spindle": "cable_torque"}
 LOOPS = ("hysteresis.presliding", "hysteresis.bouc_wen")
 
 
-def level(plant: Plant, place: str) -> float:
-    """Return a tenth of the torque at a place."""
-    torque = 0.1 * plant.pull * plant.load_scale
-    return torque / plant.ratio if place == "motor" else torque
-
-
 SAME = {"change.step": ("friction.coulomb",)}
 """Family to others with the same columns: declared friction may have another level in some runs."""
 
@@ -43,12 +36,12 @@ SAME = {"change.step": ("friction.coulomb",)}
 def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: Drawer) -> Recipe:
     """Return a recipe of friction whose level is a product of tables drawn by functions."""
 
-    def recipe(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+    def recipe(random: Random, ranges: Ranges) -> Drawn:
         made = tuple(table(random, ranges) for table in tables)
         dwell = over(random, 0.2, 1.5), over(random, 0.02, 0.3)
         part = Hidden(place, "table", made, friction=True, dwell_s=dwell)
         same = SAME.get(family, ())
-        return Drawn(WORDS[place], family, variables, part, level(plant, place), same)
+        return Drawn(WORDS[place], family, variables, part, ranges.level(place), same)
 
     return recipe
 
@@ -104,15 +97,8 @@ def rested(random: Random, ranges: Ranges) -> Table:
 def sided_share(random: Random, ranges: Ranges) -> Table:
     """Draw a factor that differs by the direction of the spindle."""
     share, width = random.uniform(0.15, 0.4), random.uniform(0.01, 0.05)
-    return ranges.table(
-        "spindle_speed",
-        1.0 + share * np.tanh(_centred(ranges, "spindle_speed") / width),
-    )
-
-
-def _centred(ranges: Ranges, variable: str) -> FloatArray:
-    """Return the grid of a variable's table in shares of its size, zero where it is zero."""
-    return np.asarray(ranges.table(variable).x / ranges.size(variable))
+    x = ranges.table("spindle_speed").x / ranges.size("spindle_speed")
+    return ranges.table("spindle_speed", 1.0 + share * np.tanh(x / width))
 
 
 def speeding(
@@ -121,18 +107,17 @@ def speeding(
     form: tuple[float, float, bool],
     random: Random,
     ranges: Ranges,
-    plant: Plant,
 ) -> Drawn:
     """Draw a torque that is a distorted power of the speed: least and most power, and if odd."""
     low, high, odd = form
     table = ranges.sided(f"{place}_speed", power(random, low, high), odd)
     return Drawn(
         WORDS[place], family, ("velocity",), Hidden(place, "table", (table,)),
-        level(plant, place),
+        ranges.level(place),
     )  # fmt: skip
 
 
-def load_viscous(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def load_viscous(random: Random, ranges: Ranges) -> Drawn:
     """Draw a loss of the gear that grows with load and speed."""
     tables = (
         ranges.sided("motor_speed", power(random, 0.7, 1.3), odd=True),
@@ -140,11 +125,11 @@ def load_viscous(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
     )
     return Drawn(
         WORDS["motor"], "friction.load_viscous", ("velocity", "load"),
-        Hidden("motor", "table", tables), level(plant, "motor"),
+        Hidden("motor", "table", tables), ranges.level("motor"),
     )  # fmt: skip
 
 
-def loop(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def loop(place: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw friction that builds up over a way after each reversal."""
     variable = f"{place}_angle"
     reach = ranges.span(variable) * over(random, 0.02, 0.15)
@@ -155,7 +140,7 @@ def loop(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
         reaches = reaches + np.tile(middle + spread, 2)
     part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=weights)
     family = LOOPS[kind == "bouc_wen"]
-    return Drawn(WORDS[place], family, (variable, "history"), part, level(plant, place), LOOPS)
+    return Drawn(WORDS[place], family, (variable, "history"), part, ranges.level(place), LOOPS)
 
 
 def _recipes() -> dict[str, Recipe]:

@@ -7,6 +7,7 @@ So its form is drawn, not written: no two cases share a formula.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -15,38 +16,63 @@ from numpy.typing import NDArray
 from estimation.recording import FloatArray
 from rig.simulation.forms import BANK
 
-VARIABLES = (
-    "one",
-    "motor_angle",
-    "motor_speed",
-    "spindle_angle",
-    "spindle_speed",
-    "jaw_angle",
-    "jaw_speed",
-    "current",
-    "gear_torque",
-    "cable_torque",
-    "run_time",
-    "campaign_time",
-    "acceleration",
-    "dwell",
-    "heat",
-    "jump",
-    "twist",
-    "stretch",
-    "motor_way",
-    "spindle_way",
-)
-"""What an effect's tables may be over, in the order of the compiled loop's array. `*_way` is the
-size of a speed; `jump` switches between 0 and 1 at random times; `dwell` is 1 after a long rest and
-falls as it slides; `heat` is the square of the current behind a lag."""
 
-PLACES = ("motor", "constant", "gear", "spindle", "cable", "jaw", "pulley")
-"""Where it acts: a torque against the motor, a share of the torque constant lost, twist of the gear
-beyond its spring's, a torque against the spindle, elongation of the cable beyond its spring's, a
-torque against the jaw in front of its sensor, cable wound beyond a round pulley's."""
+class Variable(IntEnum):
+    """What an effect's tables may be over, as places in the compiled loop's array.
 
-OPERATORS = ("table", "stops", "relays", "bouc_wen", "lags")
+    `*_WAY` is the size of a speed; `JUMP` switches between 0 and 1 at random times; `DWELL` is 1
+    after a long rest and falls as it slides; `HEAT` is the square of the current behind a lag.
+    """
+
+    ONE = 0
+    MOTOR_ANGLE = 1
+    MOTOR_SPEED = 2
+    SPINDLE_ANGLE = 3
+    SPINDLE_SPEED = 4
+    JAW_ANGLE = 5
+    JAW_SPEED = 6
+    CURRENT = 7
+    GEAR_TORQUE = 8
+    CABLE_TORQUE = 9
+    RUN_TIME = 10
+    CAMPAIGN_TIME = 11
+    ACCELERATION = 12
+    DWELL = 13
+    HEAT = 14
+    JUMP = 15
+    TWIST = 16
+    STRETCH = 17
+    MOTOR_WAY = 18
+    SPINDLE_WAY = 19
+
+
+class Place(IntEnum):
+    """Where an effect acts.
+
+    A torque against the motor, a share of the torque constant lost, twist of the gear beyond its
+    spring's, a torque against the spindle, elongation of the cable beyond its spring's, a torque
+    against the jaw in front of its sensor, cable wound beyond a round pulley's.
+    """
+
+    MOTOR = 0
+    CONSTANT = 1
+    GEAR = 2
+    SPINDLE = 3
+    CABLE = 4
+    JAW = 5
+    PULLEY = 6
+
+
+class Operator(IntEnum):
+    """What is done to an effect's first variable; all but a table have memory."""
+
+    TABLE = 0
+    STOPS = 1
+    RELAYS = 2
+    BOUC_WEN = 3
+    LAGS = 4
+
+
 MOST = 2  # Most effects at once
 TABLE_POINTS = 2048
 
@@ -83,8 +109,8 @@ class Hidden:
     """One hidden effect of the plant.
 
     Attributes:
-        place: One of `PLACES`.
-        operator: One of `OPERATORS`.
+        place: Name of a `Place`, in small letters.
+        operator: Name of an `Operator`.
         tables: Up to two factors; the first is the operator's variable where that has memory.
         friction: Whether it is a level of friction, which takes the sign of its place's speed.
         similar: Whether the table's width grows with the amplitude, as play's does.
@@ -134,12 +160,12 @@ def rows_of(effects: Sequence[Hidden], amplitudes: Sequence[float]) -> Rows:
     for k, (effect, amplitude) in enumerate(zip(effects, amplitudes, strict=True)):
         names = [t.variable for t in effect.tables] + ["one"] * (2 - len(effect.tables))
         rows.kinds[k, :4] = (
-            PLACES.index(effect.place),
-            OPERATORS.index(effect.operator),
+            Place[effect.place.upper()],
+            Operator[effect.operator.upper()],
             effect.friction,
             effect.similar,
         )
-        rows.kinds[k, 4:6] = [VARIABLES.index(name) for name in names]
+        rows.kinds[k, 4:6] = [Variable[name.upper()] for name in names]
         rows.kinds[k, 6] = len(effect.weights)
         rows.amplitudes[k] = amplitude
         for j, table in enumerate(effect.tables):

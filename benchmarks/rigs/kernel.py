@@ -21,6 +21,7 @@ import numba
 import numpy as np
 
 from benchmarks.rigs import hidden
+from benchmarks.rigs.hidden import Operator, Place, Variable
 from rig.simulation import plant as reference
 from rig.simulation.bench import hash_of
 from rig.simulation.forms import BANK
@@ -39,32 +40,8 @@ from rig.simulation.plant import TICK_S, braking, clip
 LOGGED = 8
 """Columns of a tick: the instant's true values, then the commands that act from it on."""
 
-(
-    ONE,
-    V_MOTOR_ANGLE,
-    V_MOTOR_SPEED,
-    V_SPINDLE_ANGLE,
-    V_SPINDLE_SPEED,
-    V_JAW_ANGLE,
-    V_JAW_SPEED,
-    V_CURRENT,
-    V_GEAR_TORQUE,
-    V_CABLE_TORQUE,
-    V_RUN_TIME,
-    V_CAMPAIGN_TIME,
-    V_ACCELERATION,
-    V_DWELL,
-    V_HEAT,
-    V_JUMP,
-    V_TWIST,
-    V_STRETCH,
-    V_MOTOR_WAY,
-    V_SPINDLE_WAY,
-) = range(len(hidden.VARIABLES))
-P_MOTOR, P_CONSTANT, P_GEAR, P_SPINDLE, P_CABLE, P_JAW, P_PULLEY = range(len(hidden.PLACES))
-TABLE, STOPS, RELAYS, BOUC_WEN, LAGS = range(len(hidden.OPERATORS))
 ACCELERATION_LAG_S = 4e-3
-POINTS, MOST = hidden.TABLE_POINTS, hidden.MOST
+POINTS, MOST, VARIABLES = hidden.TABLE_POINTS, hidden.MOST, len(Variable)
 
 
 @numba.njit()
@@ -89,26 +66,26 @@ def _slope(rows: Any, k: int, x: float) -> float:
 def _operated(rows: Any, k: int, x: float, memory: Any, last: Any, dt: float) -> float:
     """Return an effect's operator on its variable and move its memory by one step."""
     operator, count = rows.kinds[k, 1], rows.kinds[k, 6]
-    if operator == TABLE:
+    if operator == Operator.TABLE:
         if rows.kinds[k, 3]:  # similar: the table's width grows with the amplitude
             return _looked_up(rows, k, 0, x / rows.amplitudes[k])
         return _looked_up(rows, k, 0, x)
     moved = x - last[k]
     last[k] = x
     total = 0.0
-    if operator == STOPS:
+    if operator == Operator.STOPS:
         for j in range(count):
             reach = rows.reach[k, j]
             memory[k, j] = min(max(memory[k, j] + moved / reach, -1.0), 1.0)
             total += rows.weights[k, j] * memory[k, j]
-    elif operator == RELAYS:
+    elif operator == Operator.RELAYS:
         for j in range(count):
             if x > rows.reach[k, j]:
                 memory[k, j] = 1.0
             elif x < rows.reach[k, BANK + j]:
                 memory[k, j] = -1.0
             total += rows.weights[k, j] * memory[k, j]
-    elif operator == LAGS:
+    elif operator == Operator.LAGS:
         for j in range(count):
             memory[k, j] += (1.0 - math.exp(-dt / rows.reach[k, j])) * (x - memory[k, j])
             total += rows.weights[k, j] * memory[k, j]
@@ -127,7 +104,7 @@ def _operated(rows: Any, k: int, x: float, memory: Any, last: Any, dt: float) ->
 def _effect(rows: Any, k: int, x: Any, memory: Any, last: Any, dt: float) -> float:
     """Return the value that an effect adds at its place, without a friction's sign."""
     value = _operated(rows, k, x[rows.kinds[k, 4]], memory, last, dt)
-    if rows.kinds[k, 5] != ONE:
+    if rows.kinds[k, 5] != Variable.ONE:
         value *= _looked_up(rows, k, 1, x[rows.kinds[k, 5]])
     return float(rows.amplitudes[k] * value)
 
@@ -189,8 +166,8 @@ def _build(source: str) -> Callable[..., bool]:
         control = np.array([0.0, s, 0.0])
         memory, last = np.zeros((MOST, BANK)), np.zeros(MOST)
         first = True
-        x = np.zeros(len(hidden.VARIABLES))
-        x[V_DWELL] = 1.0
+        x = np.zeros(VARIABLES)
+        x[Variable.DWELL] = 1.0
         values, signs = np.zeros(MOST), np.zeros(MOST)
         torques, limits, speeds = np.zeros(3), np.zeros(3), np.zeros(3)  # motor, spindle, jaw
         widths = np.array([p.motor_width, p.spindle_width, p.spindle_width])
@@ -200,19 +177,19 @@ def _build(source: str) -> Callable[..., bool]:
             read = (m / p.ratio if c.from_motor > 0.0 else s) * count
             command = _command(c, control, setpoints[tick], math.floor(read + 0.5) / count)
             asked = levels[tick] + load.spring * (q - load.rest)
-            x[V_RUN_TIME] = (tick - times[0]) * TICK_S
-            x[V_CAMPAIGN_TIME] = times[1] + x[V_RUN_TIME]
-            x[V_JUMP] = jumps[tick]
+            x[Variable.RUN_TIME] = (tick - times[0]) * TICK_S
+            x[Variable.CAMPAIGN_TIME] = times[1] + x[Variable.RUN_TIME]
+            x[Variable.JUMP] = jumps[tick]
             for step in range(steps):
                 current += current_gain * (command - current)
                 loading += load_gain * (asked - loading)
-                x[V_MOTOR_ANGLE], x[V_MOTOR_SPEED] = m, wm
-                x[V_SPINDLE_ANGLE], x[V_SPINDLE_SPEED] = s, ws
-                x[V_JAW_ANGLE], x[V_JAW_SPEED], x[V_CURRENT] = q, wq, current
-                x[V_MOTOR_WAY], x[V_SPINDLE_WAY] = abs(wm), abs(ws)
+                x[Variable.MOTOR_ANGLE], x[Variable.MOTOR_SPEED] = m, wm
+                x[Variable.SPINDLE_ANGLE], x[Variable.SPINDLE_SPEED] = s, ws
+                x[Variable.JAW_ANGLE], x[Variable.JAW_SPEED], x[Variable.CURRENT] = q, wq, current
+                x[Variable.MOTOR_WAY], x[Variable.SPINDLE_WAY] = abs(wm), abs(ws)
                 twist, twist_rate = m / p.ratio - s, wm / p.ratio - ws
                 stretch, stretch_rate = p.pull * s + p.jaw_zero - q, p.pull * ws - wq
-                x[V_TWIST], x[V_STRETCH] = twist, stretch
+                x[Variable.TWIST], x[Variable.STRETCH] = twist, stretch
                 if first:
                     for k in range(rows.number):
                         last[k] = x[rows.kinds[k, 4]]
@@ -220,13 +197,13 @@ def _build(source: str) -> Callable[..., bool]:
                 lever = p.pull
                 for k in range(rows.number):
                     place = rows.kinds[k, 0]
-                    if place == P_GEAR:
+                    if place == Place.GEAR:
                         values[k] = _effect(rows, k, x, memory, last, dt)
                         twist -= values[k]
-                    elif place == P_CABLE:
+                    elif place == Place.CABLE:
                         values[k] = _effect(rows, k, x, memory, last, dt)
                         stretch -= values[k]
-                    elif place == P_PULLEY:
+                    elif place == Place.PULLEY:
                         values[k] = _effect(rows, k, x, memory, last, dt)
                         signs[k] = rows.amplitudes[k] * _slope(rows, k, s)
                         stretch += values[k]
@@ -234,7 +211,7 @@ def _build(source: str) -> Callable[..., bool]:
                         lever += signs[k]
                 T = p.gear_stiffness * twist + p.gear_damping * twist_rate
                 C = p.cable_stiffness * stretch + p.cable_damping * stretch_rate
-                x[V_GEAR_TORQUE], x[V_CABLE_TORQUE] = T, C
+                x[Variable.GEAR_TORQUE], x[Variable.CABLE_TORQUE] = T, C
 
                 constant = p.constant
                 torques[:] = 0.0
@@ -242,14 +219,14 @@ def _build(source: str) -> Callable[..., bool]:
                 speeds[0], speeds[1], speeds[2] = wm, ws, wq
                 for k in range(rows.number):
                     place, rubs = rows.kinds[k, 0], rows.kinds[k, 2] != 0
-                    if place in (P_GEAR, P_CABLE, P_PULLEY):
+                    if place in (Place.GEAR, Place.CABLE, Place.PULLEY):
                         continue
                     value = _effect(rows, k, x, memory, last, dt)
-                    if place == P_CONSTANT:
+                    if place == Place.CONSTANT:
                         values[k] = value * p.constant * current
                         constant -= p.constant * value
                         continue
-                    body = 0 if place == P_MOTOR else 1 if place == P_SPINDLE else 2
+                    body = 0 if place == Place.MOTOR else 1 if place == Place.SPINDLE else 2
                     if rubs:
                         value = max(value, -limits[body])
                         limits[body] += value
@@ -265,7 +242,7 @@ def _build(source: str) -> Callable[..., bool]:
                     out[tick, COMMAND], out[tick, LOAD] = command, asked
                     for k in range(rows.number):
                         added[tick, k] = values[k]
-                        if rows.kinds[k, 0] == P_PULLEY:
+                        if rows.kinds[k, 0] == Place.PULLEY:
                             added[tick, MOST + k] = signs[k] * C
 
                 share = dt / p.motor_inertia
@@ -276,7 +253,7 @@ def _build(source: str) -> Callable[..., bool]:
                 ws += share * (T - lever * C - p.spindle_viscous * ws - torques[1])
                 ws -= braking(ws, share * limits[1], p.spindle_width)
                 slowed += dt / ACCELERATION_LAG_S * ((ws - before) / dt - slowed)
-                x[V_ACCELERATION] = slowed
+                x[Variable.ACCELERATION] = slowed
                 share = dt / jaw_inertia
                 before = wq
                 wq += share * (C - loading - load.viscous * wq - torques[2])
@@ -287,10 +264,9 @@ def _build(source: str) -> Callable[..., bool]:
                 m += dt * wm
                 s += dt * ws
                 q += dt * wq
-                wear = abs(ws) / rows.times[1]
-                x[V_DWELL] += dt * ((1.0 - x[V_DWELL]) / rows.times[0] - x[V_DWELL] * wear)
-                heat = current**2
-                x[V_HEAT] += dt / rows.times[2] * (heat - x[V_HEAT])
+                wear, dwell = abs(ws) / rows.times[1], x[Variable.DWELL]
+                x[Variable.DWELL] += dt * ((1.0 - dwell) / rows.times[0] - dwell * wear)
+                x[Variable.HEAT] += dt / rows.times[2] * (current**2 - x[Variable.HEAT])
             if not (abs(wm) < 1e5 and abs(ws) < 1e4 and abs(wq) < 1e4):
                 return False
         return True

@@ -5,9 +5,8 @@ from functools import partial
 import numpy as np
 
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe
-from benchmarks.rigs.frictions import LOADS, WORDS, level, loaded, rubbing
+from benchmarks.rigs.frictions import LOADS, WORDS, loaded, rubbing
 from benchmarks.rigs.hidden import Hidden, Table
-from benchmarks.rigs.plant import Plant
 from rig.simulation.forms import Random, falling, grid, smooth, spots
 
 UNKNOWN = "unknown"
@@ -42,7 +41,7 @@ def jumping(random: Random, ranges: Ranges) -> Table:
     return Table("jump", 0.0, 1.0, grid())
 
 
-def beyond(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def beyond(place: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw drag on one part of the travel only."""
     x = grid() - random.uniform(0.35, 0.65)
     side = 0.5 + 0.5 * np.tanh(x / random.uniform(0.03, 0.1)) * random.choice([-1.0, 1.0])
@@ -51,10 +50,10 @@ def beyond(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
         ranges.table("spindle_angle", side),
     )
     part = Hidden(place, "table", tables)
-    return Drawn(WORDS[place], UNKNOWN, ("velocity", "spindle_angle"), part, level(plant, place))
+    return Drawn(WORDS[place], UNKNOWN, ("velocity", "spindle_angle"), part, ranges.level(place))
 
 
-def switching(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def switching(place: str, random: Random, ranges: Ranges) -> Drawn:
     """Draw friction that comes on at high speed and goes off at low speed."""
     fast = ranges.high[f"{place}_way"]
     reach = np.zeros(80)
@@ -64,19 +63,19 @@ def switching(place: str, random: Random, ranges: Ranges, plant: Plant) -> Drawn
         reach=reach, weights=np.ones(1),
     )  # fmt: skip
     variables = ("velocity", "history", "velocity_sign")
-    return Drawn(WORDS[place], UNKNOWN, variables, part, level(plant, place))
+    return Drawn(WORDS[place], UNKNOWN, variables, part, ranges.level(place))
 
 
-def notch(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def notch(random: Random, ranges: Ranges) -> Drawn:
     """Draw a notch that the jaw falls into."""
     form = np.gradient(spots(random, 1, 0.06, 0.14), grid())
     table = ranges.table("jaw_angle", form / np.max(np.abs(form)))
     return Drawn(
-        "jaw", UNKNOWN, ("jaw_angle",), Hidden("jaw", "table", (table,)), level(plant, "jaw")
+        "jaw", UNKNOWN, ("jaw_angle",), Hidden("jaw", "table", (table,)), ranges.level("jaw")
     )
 
 
-def folded(random: Random, ranges: Ranges, plant: Plant) -> Drawn:
+def folded(random: Random, ranges: Ranges) -> Drawn:
     """Draw a cable whose give under load differs along the travel, by no wave."""
     tables = (
         ranges.sided("stretch", lambda size: size, odd=True),
