@@ -116,7 +116,5 @@ def test_written_logs_read_back_equal(tmp_path):
 
 
 def test_ranges_of_seeds_are_apart():
-    for one, other in ((CALIBRATE, DEVELOP), (DEVELOP, JUDGE), (CALIBRATE, JUDGE)):
-        assert not any(seed in other for seed in (one[0], one[-1]))
-        assert not any(seed in one for seed in (other[0], other[-1]))
+    assert CALIBRATE.stop <= DEVELOP.start < DEVELOP.stop <= JUDGE.start
     assert [part_of(r[0]) for r in (CALIBRATE, DEVELOP, JUDGE)] == ["calibrate", "develop", "judge"]

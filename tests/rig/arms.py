@@ -2,10 +2,22 @@
 
 import numpy as np
 
+from estimation.arm.tables import PSM
 from estimation.recording import FloatArray, Recording
+
+RATE_HZ = 100.0
 
 REVOLUTE = ("angle_rad", "velocity_rad_s", "torque_n_m")
 PRISMATIC = ("position_m", "velocity_m_s", "force_n")
+
+
+def waving(seconds: float, slowest_hz: float, share: float, rng: np.random.Generator) -> FloatArray:
+    """Return positions (n, 7) of five waves each, over so much of half of the joints' ranges."""
+    phase = 2 * np.pi * slowest_hz * np.arange(0, seconds, 1 / RATE_HZ)[:, None]
+    waves = sum(np.sin(k * phase + rng.uniform(0, 6.28, 7)) / k for k in range(1, 6))
+    limits = [*((joint.lower, joint.upper) for joint in PSM.joints), (0.0, 1.0)]
+    lower, upper = np.array(limits).T
+    return (lower + upper) / 2 + share * (upper - lower) * waves
 
 
 def psm_recording(

@@ -6,14 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.networks.training import Settings, has_torch, train
-from estimation.scores import rmse
+from estimation.networks.training import Settings, has_torch
 from rig.errors import DataError
 from rig.studies.oneill import data, states_page
 from rig.studies.oneill import networks as study
 from rig.studies.oneill import networks_page as shown
 from rig.studies.oneill import states as oneill_states
-from rig.studies.oneill.data import CAUSAL, Source, closing_table, held_out_masks, open_reference
+from rig.studies.oneill.data import CAUSAL, Source, closing_table, held_out_masks
 from rig.studies.oneill.network_jobs import CHANNELS, jobs
 from rig.studies.oneill.networks import NetworkStudy, Training, run_networks
 from rig.studies.oneill.paper import DISTAL, JAW, PAPER, PROXIMAL
@@ -92,10 +91,6 @@ def deep(table, tmp_path_factory) -> NetworkStudy:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "jobs", few)
-        partial = run_networks({"neutral": table}, replace(training, minutes=0))
-        assert partial.rows == ()
-        assert partial.not_run
-        assert any("Not run" in note for note in shown.notes(partial))
         calls: list[tuple[int, int]] = []
         found = run_networks({"neutral": table}, training, on_network=lambda *c: calls.append(c))
         assert calls[-1][0] == calls[-1][1] > 0
@@ -129,26 +124,6 @@ def test_the_command_reports_what_it_could_not_train(tmp_path, monkeypatch, said
     assert json.loads(printed.out)["networks"]["rows"] == []
     assert "Not run" in printed.err
     assert "Not run" in (tmp_path / "d.md").read_text()
-
-
-@torch_only
-@pytest.mark.measured
-def test_physical_states_lower_the_error_on_a_fold_of_measured_runs(measured_data):
-    source = open_reference(measured_data)
-    table = closing_table(source.campaign.exclude({"07": "runaway"}).evidence, CHANNELS)
-    assert len(table.run) == 304_394
-    mask = held_out_masks(table, "run-wise", 0)[0]
-    job = next(j for j in jobs(("neutral",)) if j.targets == (PROXIMAL,))
-    states = replace(job, way="+ acceleration")
-    error = []
-    for one in (job, states):
-        rows, names = np.flatnonzero(~mask)[::60], (one.inputs, one.targets)
-        x, y = table[one.inputs], table[one.targets]
-        settings = Settings(nodes=one.nodes, iterations=60)
-        trained = train(x[rows], y[rows], names, settings)
-        error.append(rmse(trained.network(x[mask]), y[mask]))
-    assert error[0] == pytest.approx(6.6e-3, abs=1.2e-3)
-    assert error[1] < 0.65 * error[0]
 
 
 EFFECT = "load of the last 0.5 s"

@@ -11,7 +11,7 @@ from estimation.recording import Recording
 from rig.arm.payload import find_payload
 from rig.arm.simulated import draw_arm
 from rig.errors import DataError
-from tests.rig.arms import psm_recording
+from tests.rig.arms import RATE_HZ, psm_recording, waving
 
 pytestmark = pytest.mark.long
 
@@ -30,21 +30,13 @@ def test_the_measured_mass_is_found_and_none_where_there_is_none(measured_data, 
     assert "| one19_insertion_105g |" in out.read_text()
 
 
-RATE_HZ = 100.0
 ARM = draw_arm(np.random.default_rng(3)).values
 
 
 def made_run(name: str, seconds: float, period_s: float, mass_kg: float = 0.0) -> Recording:
     """A run of an arm that its model knows wholly, with a mass on its second link."""
     rng = np.random.default_rng(int(10 * period_s))
-    time = np.arange(0, seconds, 1 / RATE_HZ)
-    waves = sum(
-        np.sin(2 * np.pi * k / period_s * time[:, None] + rng.uniform(0, 6.28, 7)) / k
-        for k in range(1, 6)
-    )
-    limits = [*((joint.lower, joint.upper) for joint in PSM.joints), (0.0, 1.0)]
-    lower, upper = np.array(limits).T
-    position = (lower + upper) / 2 + 0.2 * (upper - lower) * waves
+    position = waving(seconds, 1 / period_s, 0.2, rng)
     motion = motion_of(position, 1 / RATE_HZ)
     loaded = PSM.with_payload(PointMass("weight", 2, (0.01, 0.535, -0.02), mass_kg))
     torque = regressor(PSM, motion) @ ARM + carried_torque(loaded, motion)

@@ -15,13 +15,12 @@ from rig.arm import search as arm_search
 from rig.errors import DataError
 from rig.importers.dvrk_psm import MOTOR_TO_JOINT
 from rig.studies.pique import study as pique
-from tests.rig.arms import psm_recording
+from tests.rig.arms import RATE_HZ, psm_recording, waving
 
 pytestmark = pytest.mark.long
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
 
-RATE_HZ = 100.0
 ROOT = Path(__file__).parents[2]
 HIDDEN = "presliding J2"
 TRIED = [e for e in candidates(PSM) if e.name.endswith(("J2", "hysteresis"))]
@@ -30,25 +29,13 @@ TRIED = [e for e in candidates(PSM) if e.name.endswith(("J2", "hysteresis"))]
 def made_path(name: str, seed: int, seconds: float = 20.0) -> Recording:
     """A path of an arm with known parameters, a hidden effect and a little noise."""
     rng = np.random.default_rng(seed)
-    time = np.arange(0, seconds, 1 / RATE_HZ)
-    waves = sum(
-        np.sin(2 * np.pi * 0.16 * k * time[:, None] + rng.uniform(0, 6.28, 7))
-        * rng.uniform(0.3, 1, 7)
-        / k
-        for k in range(1, 6)
-    )
-    waves /= np.abs(waves).max(axis=0)
-    lower, upper = (np.array([*(getattr(j, n) for j in PSM.joints), e]) for n, e in LIMITS)
-    position = (lower + upper) / 2 + 0.4 * (upper - lower) * waves
+    position = waving(seconds, 0.16, 0.2, rng)
     motion = motion_of(position, 1 / RATE_HZ, arm_search.FINE)
     torque = regressor(PSM, motion) @ np.random.default_rng(1).uniform(0.05, 1, 68)
     (hidden,) = (e for e in candidates(PSM) if e.name == HIDDEN)
     torque += hidden.columns(motion)[:, :6] @ np.full(3, 0.15 * np.ptp(torque[:, 1]))
     torque += 0.002 * np.ptp(torque, axis=0) * rng.normal(size=torque.shape)
     return psm_recording(name, position, motion.velocity, torque, RATE_HZ)
-
-
-LIMITS = (("lower", 0.0), ("upper", 1.0))
 
 
 @pytest.fixture(scope="module")
