@@ -24,7 +24,7 @@ from rig.machines.shipped import place_of
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable, to_page
 from rig.reports.changes import lines, prediction_table
-from rig.studies.machines.cases import unpacked
+from rig.studies.machines.study import unpacked
 
 L_4, L_2, RIGHT = (
     f"mrdlab-Tool_{n}.tar.xz" for n in ("4_Maryland_L_4", "4_Maryland_L_2", "5_Maryland_L_2")

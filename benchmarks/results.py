@@ -86,13 +86,17 @@ _LOOP = (
 )
 _CORE = "firmware/core firmware/proofs"
 
+_SEEDS = "--state {state} --figures docs/figures --seeds"
+
+
+def _study(words: str, code: str, minutes: int, page: str = "") -> Page:
+    """Return the page of a study: its name, unless given, is the first of the command's words."""
+    name = page or words.split()[0]
+    return Page(name, f"rig study {words} --out docs/results/{name}.md", code, minutes)
+
+
 PAGES = (
-    Page(
-        "adapt",
-        "rig study instruments --data {data} --out docs/results/adapt.md",
-        f"rig/studies/instruments {_ESTIMATORS}",
-        10,
-    ),
+    _study("instruments --data {data}", f"rig/studies/instruments {_ESTIMATORS}", 10, "adapt"),
     Page(
         "archive",
         "python -m benchmarks.archive --out docs/results/archive.md",
@@ -127,13 +131,7 @@ PAGES = (
         f"firmware/proofs {_CORE}",
         6,
     ),
-    Page(
-        "delsol",
-        "rig study delsol --seeds 1 --state {state} --out docs/results/delsol.md"
-        " --figures docs/figures",
-        f"rig/studies/delsol {_ARM} {_DIAGNOSIS}",
-        30,
-    ),
+    _study(f"delsol {_SEEDS} 1", f"rig/studies/delsol {_ARM} {_DIAGNOSIS}", 30),
     Page(
         "diagnosis-numbers",
         "python -m benchmarks.diagnosis.calibrate",
@@ -141,9 +139,8 @@ PAGES = (
         60,
     ),
     Page("diagnosis-versions", "python -m benchmarks.diagnosis measure", _DIAGNOSIS, 60),
-    Page(
+    _study(
         "excitation",
-        "rig study excitation --out docs/results/excitation.md",
         "rig/arm/excitation.py estimation/arm/excitation.py estimation/arm/regressor.py",
         1,
     ),
@@ -154,73 +151,30 @@ PAGES = (
         f"benchmarks/diagnosis/isolability.py {_DIAGNOSIS}",
         2,
     ),
-    Page(
-        "intervals",
-        "rig study intervals --data {data} --out docs/results/intervals.md",
+    _study(
+        "intervals --data {data}",
         "rig/studies/instruments rig/importers estimation/bank estimation/estimators",
         10,
     ),
-    Page(
-        "loop",
-        f"rig study loop {_TOOL}_4_Maryland_L_4.tar.xz --out docs/results/loop.md",
-        _LOOP,
-        15,
-    ),
-    Page(
-        "loop-tool5",
-        f"rig study loop {_TOOL}_5_Maryland_L_2.tar.xz --out docs/results/loop-tool5.md",
-        _LOOP,
-        15,
-    ),
-    Page(
-        "machines",
-        "rig study machines {data}/machines --out docs/results/machines.md",
-        f"rig/studies/machines {_DIAGNOSIS}",
-        10,
-    ),
-    Page(
-        "oneill",
-        "rig study oneill --data {data} --states --kinds --networks --every 24 --state {state}"
-        " --figures docs/figures --out docs/results/oneill.md",
+    _study(f"loop {_TOOL}_4_Maryland_L_4.tar.xz", _LOOP, 15),
+    _study(f"loop {_TOOL}_5_Maryland_L_2.tar.xz", _LOOP, 15, "loop-tool5"),
+    _study("machines {data}/machines", f"rig/studies/machines {_DIAGNOSIS}", 10),
+    _study(
+        "oneill --data {data} --states --kinds --networks --every 24 --state {state}"
+        " --figures docs/figures",
         f"rig/studies/oneill {_ESTIMATORS}",
         60,
     ),
-    Page(
-        "payload",
-        "rig study payload --data {data}/psm --on one19_insertion_105g --on one19 --on one18"
-        " --out docs/results/payload.md",
-        _ARM,
-        1,
-    ),
-    Page(
-        "pique",
-        "rig study pique --data {data}/psm --also one19 --out docs/results/pique.md"
-        " --figures docs/figures",
+    _study("payload --data {data}/psm --on one19_insertion_105g --on one19 --on one18", _ARM, 1),
+    _study(
+        "pique --data {data}/psm --also one19 --figures docs/figures",
         f"rig/studies/pique {_ARM}",
         1,
     ),
     Page("reliability", "python -m benchmarks.reliability", "drivers firmware rig/recording", 90),
-    Page(
-        "wrench",
-        "rig study wrench --seeds 2 --state {state} --out docs/results/wrench.md"
-        " --figures docs/figures",
-        f"rig/studies/wrench {_ARM}",
-        30,
-    ),
-    Page(
-        "zhang",
-        "rig study zhang --seeds 1 --state {state} --out docs/results/zhang.md"
-        " --figures docs/figures",
-        f"rig/studies/zhang {_ARM}",
-        30,
-    ),
-    Page(
-        "zhao",
-        "rig study zhao --seeds 2 --state {state} --out docs/results/zhao.md"
-        " --figures docs/figures",
-        f"rig/studies/zhao rig/grasper {_DIAGNOSIS}",
-        6,
-    ),
+    _study(f"wrench {_SEEDS} 2", f"rig/studies/wrench {_ARM}", 30),
+    _study(f"zhang {_SEEDS} 1", f"rig/studies/zhang {_ARM}", 30),
+    _study(f"zhao {_SEEDS} 2", f"rig/studies/zhao rig/grasper {_DIAGNOSIS}", 6),
 )
 
 

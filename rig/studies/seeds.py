@@ -28,7 +28,6 @@ class Keeper:
     """Where the outcomes of a study are kept, and how they are made.
 
     Attributes:
-        state: Folder where outcomes are kept.
         workers: Processes; each does one seed at a time.
         on_seed: Called after each seed, also after one that was kept.
     """

@@ -9,8 +9,8 @@ from scipy.io import savemat
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import read_runs
 from rig.machines.shipped import place_of
-from rig.studies.machines import cases
 from rig.studies.machines.published import by_direction, standard
+from rig.studies.machines.study import CASES
 from tests.rig.test_own_machine_walk import ASYMMETRY, COULOMB, MASS, VISCOUS, drive_axis
 
 
@@ -40,7 +40,7 @@ def test_absent_machines_are_named_and_the_others_studied(data, answered):
     (row,) = found["rows"]
     assert (row["case"], row["equation"]) == ("EMPS", "carriage")
     assert np.isfinite(row["declared_percent"])
-    assert len(found["skipped"]) == len(cases.CASES) - 1
+    assert len(found["skipped"]) == len(CASES) - 1
     text = page.read_text()
     assert "no recordings in sts3215" in text
     assert "(../machines/emps.md)" in text

@@ -163,7 +163,7 @@ def one_arm(number: int) -> Seed:
         table = np.concatenate([columns_of(motion) for motion, _ in runs])
         torque = np.concatenate([torque for _, torque in runs])
         if method == DISCARDED:
-            kept = conditions(table) <= LARGEST_CONDITION
+            kept = np.linalg.cond(table) <= LARGEST_CONDITION  # of each point's rows
             table, torque = table[kept], torque[kept]
         values = damped_around(table, torque, np.zeros(table.shape[2]), DAMPING)
         left = torque - table @ values
@@ -282,13 +282,6 @@ def _around(pose: FloatArray, joint: int, size_rad: float, frequency_hz: float) 
 def paper_columns(motion: Motion) -> FloatArray:
     """Return the 96 columns of eight links, ten parameters and two frictions each."""
     return regressor(HYDRAULIC, motion)
-
-
-def conditions(table: FloatArray) -> FloatArray:
-    """Return the condition number of each point's rows, from (n, joints, parameters) to (n,)."""
-    squares = np.linalg.eigvalsh(table @ table.transpose(0, 2, 1))
-    ratio: FloatArray = squares[:, -1] / np.maximum(squares[:, 0], np.finfo(float).tiny)
-    return np.sqrt(ratio)
 
 
 def tip_force(motion: Motion, external: FloatArray) -> FloatArray:

@@ -40,10 +40,8 @@ class Held:
 
     Attributes:
         instrument: Whose runs; of an adapted estimator `source -> other`.
-        target: Channel that is estimated.
         left_out: `run`, `between` or `edge` of the levels of a condition, or the runs adapted with.
         runs: Runs held out; a run counts for each condition whose level was left out.
-        rmse: Error of the estimates.
         covered: Mean over runs of the share of samples inside their interval.
         median: Median over runs of that share.
         worst_run: Smallest share of a run.

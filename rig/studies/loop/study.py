@@ -34,11 +34,9 @@ class Task:
     Attributes:
         name: Target and regressor of the estimate.
         balance: Equation whose effects are searched.
-        target: Channel that is estimated.
         source: Channel of the linear model.
         measured: Channels an effect may read, besides the device's clock.
         instead: Channel to the one that plays its roles here.
-        samples: Which samples count.
         parameters: Named parameters at most.
         to_reach: Error to reach, N m.
         beyond: A better one, N m.
@@ -92,7 +90,6 @@ class Step:
 
     Attributes:
         effect: Id of its form.
-        parameters: Its parameters.
         gain: Share of squared error it removed from training runs left out.
         rmse: Error on the test runs with it and those before it, means included, N m.
     """
@@ -115,8 +112,6 @@ class Row:
         rmse_without_means: The same with each run's mean error removed.
         runs_improved: Test runs whose error fell.
         rmse_by_run: Test run to the error before and after, N m.
-        families: Families tried.
-        candidates: Grid points tried.
     """
 
     task: Task

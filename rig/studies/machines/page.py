@@ -2,8 +2,7 @@
 
 from rig.output.page import Page
 from rig.output.table import TextTable
-from rig.studies.machines.cases import CASES
-from rig.studies.machines.study import MachineStudy
+from rig.studies.machines.study import CASES, MachineStudy
 
 TITLE = "Machines that other people built"
 

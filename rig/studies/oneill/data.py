@@ -110,7 +110,6 @@ class ClosingTable:
         columns: Names of the columns: channels, conditions, and channels after `CAUSAL`.
         values: Shape (n, columns).
         run: Index of each sample's run, shape (n,).
-        names: Names of the runs.
         conditions: Condition to the value of each run, shape (runs,); NaN where it is not stated.
         excluded: Runs that are excluded, with the reason.
         flagged: Other runs of which a closing sample is flagged, with the reason.
@@ -241,12 +240,9 @@ def held_out_runs(
 
 
 def held_out_masks(table: ClosingTable, protocol: str, seed: int) -> list[NDArray[np.bool_]]:
-    """Return which samples each split of a protocol tests on; empty when it cannot be made.
+    """Return which samples each split of `random`, or of `held_out_runs`, tests on.
 
-    Args:
-        table: The samples.
-        protocol: `random`, or as of `held_out_runs`.
-        seed: Seed of `random` and `run-wise`.
+    Empty when it cannot be made.
     """
     if protocol == "random":
         mask = np.zeros(len(table.run), bool)

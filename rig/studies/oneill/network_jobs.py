@@ -38,7 +38,6 @@ class Job:
             with physical states, and `causal` for the last of them on channels filtered as live.
         surrogate: Key of `LOADS`.
         protocol: As for `held_out_masks`.
-        targets: Estimated channels.
     """
 
     pose: str

@@ -46,7 +46,6 @@ class NetworkStudy:
     """Results.
 
     Attributes:
-        rows: What was trained.
         not_run: Jobs that were not, or not wholly, trained.
         samples: Closing samples by pose.
         peak_torque_n_m: Largest distal torque of the neutral pose.

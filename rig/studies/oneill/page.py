@@ -14,7 +14,6 @@ from rig.studies.coverage import coverage
 from rig.studies.oneill import goals
 from rig.studies.oneill import networks_page as networks
 from rig.studies.oneill import states_page as states
-from rig.studies.oneill import tables as paper
 from rig.studies.oneill.kinds import FILTERS, KindRow
 from rig.studies.oneill.networks import NetworkStudy
 from rig.studies.oneill.paper import HELD_OUT, PROTOCOLS, SHOWN
@@ -57,7 +56,7 @@ def page(
     """Return the study's page: what is reached, the paper's tables, all by what was held out."""
     found = goals.reached(physical, deep) if physical is not None else []
     lead = list(goals.lead(found)) or [_lead(study)]
-    tables = [*paper.tables(study, deep), _held_out_table(study)]
+    tables = [*networks.paper_tables(study, deep), _held_out_table(study)]
     notes = [f"Data: {study.source}.", *_notes(study)]
     if found:
         tables.insert(0, goals.table(found))

@@ -27,7 +27,6 @@ class StateJob:
     Attributes:
         pose: Key of `POSES`.
         surrogate: Key of `LOADS`.
-        target: Channel that is estimated.
         filters: `zero-phase`, or `live` for inputs filtered causally.
         protocol: `run-wise`, `lofo` or `lopo`.
         without: Effect left out, a key of `EFFECTS`, or empty.
@@ -52,9 +51,7 @@ class Level:
     """One frequency or power level that was left out.
 
     Attributes:
-        value: The condition.
         samples: Closing samples held out.
-        rmse: Their error.
         covered: Share of them inside their interval.
     """
 
@@ -69,8 +66,6 @@ class StateRow:
     """Error of one job, in the target's SI unit.
 
     Attributes:
-        job: What was fitted and held out.
-        runs: Runs held out.
         score: Errors over all closing samples of the held-out runs.
         run_offset: Root mean square of the runs' mean errors.
         covered: Share of the samples inside their interval.

@@ -49,7 +49,6 @@ class Shown:
     """Estimates of one target on the closing samples of a run held out, in its SI unit.
 
     Attributes:
-        time_s: Shape (n,).
         rows: Filtered channels of the bank, shape (n, channels).
         truth: The target without lag, shape (n,).
         before: Estimate by a straight line through the surrogate, as in Table I of the paper.

@@ -42,7 +42,6 @@ class Row:
         protocol: Short name of the protocol, see `PROTOCOLS`.
         gain: Fitted gain; None where several fits were made.
         offset_n_m: Fitted offset; None where several fits were made.
-        score: Errors in N m.
     """
 
     surrogate: str
@@ -59,13 +58,10 @@ class Study:
     """Results of the study.
 
     Attributes:
-        measured: Whether the data was measured on the paper's instrument.
         closing_samples: Closing samples of all runs after the paper's processing.
-        paper_samples: The paper's count.
         public_samples: The count the public data is known to give.
         runs: Names of the runs behind the run-wise rows.
         left_out: Runs left out of these rows, with the reason.
-        rows: The linear fits.
         paper: The paper's rows by surrogate.
         others_reach_n_m: RMSE of others' reproduction of the authors' way.
         rmse_by_run_n_m: Run-wise error of each run with the measured current, or with what there

@@ -86,7 +86,6 @@ class Arm:
     """One arm's results.
 
     Attributes:
-        family: Its hidden torque.
         errors: NRMSD, %, by table and, in it, by method.
         effects: Names of the effects found within its excitation.
     """
@@ -102,7 +101,6 @@ class WrenchStudy:
 
     Attributes:
         seeds: Arms of each family.
-        arms: All arms, in the order of their numbers.
     """
 
     schema: str

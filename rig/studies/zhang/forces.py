@@ -8,7 +8,7 @@ from estimation.arm.tables import PSM
 from estimation.arm.wrench import body_jacobians, by_pseudo_inverse, in_tip_frame, most_likely
 from estimation.recording import FloatArray
 from rig.arm.simulated import contact
-from rig.studies.zhang.free import NETWORKS, OURS, SETTLE, Cells
+from rig.studies.zhang.free import NETWORKS, OURS, SETTLE, Cells, side_by_side
 from rig.studies.zhang.networks import JointNetwork
 from rig.studies.zhang.physics import Physics
 from rig.studies.zhang.psm import GRIPPER, RATE_HZ, Psm, PsmRun, simulate
@@ -31,10 +31,7 @@ class Learnt:
     """What is known of an arm with one instrument.
 
     Attributes:
-        psm: The arm.
         networks: Of joints 1 to 6, trained with the gripper moving and closed.
-        gripper: The gripper's network.
-        physics: Ours.
     """
 
     psm: Psm
@@ -44,7 +41,7 @@ class Learnt:
 
     def external(self, run: PsmRun) -> dict[str, FloatArray]:
         """Return the torque of a run minus that of free motion, by method, shape (n, 7)."""
-        free = np.column_stack([net(run) for net in (*self.networks, self.gripper)])
+        free = side_by_side((*self.networks, self.gripper), run)
         return {NETWORKS: run.torque - free, OURS: run.torque - self.physics(run)}
 
 

@@ -1,6 +1,8 @@
 """Torque in free space: Figure 3 and Tables I and II of Zhang et al. 2022 on one simulated arm."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,10 +91,23 @@ def table_1(splits: dict[str, Split], seed: int) -> tuple[tuple[JointNetwork, ..
     cells: Cells = {}
     for name, (runs, validation) in trainings.items():
         networks = tuple(trained(k, runs, validation, name != "C", seed) for k in range(GRIPPER))
-        for test, split in splits.items():
-            free = np.column_stack([network(split.test) for network in networks])
-            cells[f"I | {name} on {test} | {NETWORKS}"] = _nrmse(free, split.test)
+        cells |= _cells(splits, name, NETWORKS, partial(side_by_side, networks))
     return networks, cells
+
+
+def side_by_side(networks: Sequence[JointNetwork], run: PsmRun) -> FloatArray:
+    """Return the torque of a run in free space by a network a joint, shape (n, joints)."""
+    return np.column_stack([network(run) for network in networks])
+
+
+def _cells(
+    splits: dict[str, Split], trained_on: str, method: str, free_of: Callable[[PsmRun], FloatArray]
+) -> Cells:
+    """Return a method's errors on the test of each condition, %."""
+    return {
+        f"I | {trained_on} on {test} | {method}": _nrmse(free_of(split.test), split.test)
+        for test, split in splits.items()
+    }
 
 
 def fitted_physics(psm: Psm, splits: dict[str, Split]) -> tuple[Physics, Cells]:
@@ -103,12 +118,9 @@ def fitted_physics(psm: Psm, splits: dict[str, Split]) -> tuple[Physics, Cells]:
     )
     effects = find_effects(psm.table, first, second)
     physics = fitted(psm.table, effects, [splits[name].train.part(0, 2 * half) for name in "MC"])
-    cells: Cells = {}
-    for test, split in splits.items():
-        for method, network in ((BARE, False), (OURS, True)):
-            free = physics(split.test, network)[:, :GRIPPER]
-            cells[f"I | M+C on {test} | {method}"] = _nrmse(free, split.test)
-        cells[f"I | M+C on {test} | {FLOOR}"] = _noise(psm, split.test)
+    cells = {f"I | M+C on {name} | {FLOOR}": _noise(psm, s.test) for name, s in splits.items()}
+    cells |= _cells(splits, "M+C", BARE, lambda run: physics(run, network=False)[:, :GRIPPER])
+    cells |= _cells(splits, "M+C", OURS, lambda run: physics(run)[:, :GRIPPER])
     return physics, cells
 
 
@@ -122,11 +134,7 @@ def short_networks(splits: dict[str, Split], seed: int) -> Cells:
     runs = [splits[name].train.part(0, cut) for name in "MC"]
     validation = [splits[name].train.part(cut, samples) for name in "MC"]
     networks = [trained(k, runs, validation, True, seed) for k in range(GRIPPER)]
-    cells: Cells = {}
-    for test, split in splits.items():
-        free = np.column_stack([network(split.test) for network in networks])
-        cells[f"I | M+C on {test} | {SHORT}"] = _nrmse(free, split.test)
-    return cells
+    return _cells(splits, "M+C", SHORT, partial(side_by_side, networks))
 
 
 def _nrmse(free: FloatArray, run: PsmRun) -> tuple[float, ...]:

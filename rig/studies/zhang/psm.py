@@ -109,7 +109,6 @@ class Psm:
 
     Attributes:
         arm: The arm; its hidden strengths are not used but scale those here.
-        kind: The instrument's gripper, as drawn.
         memory: Friction with memory of joints 1 to 6, N m or N.
         cable_n_m: Friction with memory of the four motors and their cables.
         noise: Standard deviation of the noise of each joint, N m or N.

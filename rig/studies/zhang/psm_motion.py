@@ -66,16 +66,12 @@ def moving_gripper(rng: np.random.Generator, seconds: float, open_rad: float) ->
 
 
 def with_gripper(path: FloatArray, gripper: FloatArray | float, open_rad: float) -> Motion:
-    """Return the motion of a path and its gripper, after a lead in which the gripper closes.
+    """Return the motion of a path (n, 6) and its gripper, held at an angle, rad, or of shape (n,).
 
-    Args:
-        path: Of the six joints, shape (n, 6).
-        gripper: Of the gripper, shape (n,), or the angle at which it is held, rad.
-        open_rad: Where the gripper starts from.
+    Before it is a lead in which the gripper closes from `open_rad`.
     """
     held = np.broadcast_to(gripper, len(path))
-    ease = (1 - np.cos(np.linspace(0, np.pi, LEAD_SAMPLES))) / 2
-    closing = open_rad + ease * (held[0] - open_rad)
+    closing = _ease(np.array([open_rad]), held[:1], LEAD_SAMPLES)[:, 0]
     whole = np.vstack([np.repeat(path[:1], LEAD_SAMPLES, axis=0), path])
     position = np.column_stack([whole, np.concatenate([closing, held])])
     velocity = np.gradient(position, 1 / RATE_HZ, axis=0)

@@ -51,7 +51,6 @@ class Outcome:
     """Results of one arm.
 
     Attributes:
-        cells: Its errors.
         traces: Forces over time by `experiment | what`, N.
         effects: Names of the effects found on the arm with the Cadiere Forceps, in order.
     """

@@ -63,9 +63,7 @@ class Answer:
 
     Attributes:
         order_confidence: Confidence that neighbours in the found order differ, the least of them.
-        order_is_right: Whether the order is the true one.
         found: Place with the inclusion, from 0.
-        true: Where it is.
         place_confidence: Confidence that this place is stiffer than the stiffest other.
     """
 

@@ -1,6 +1,6 @@
 """The page of the study of Zhao and Nelson 2016."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from markupsafe import Markup
@@ -24,7 +24,6 @@ from rig.studies.zhao.methods import (
     PAPER_COEFFICIENTS,
     PAPER_DELAYS_MS,
     PAPER_ERRORS_N,
-    Outcome,
     axes_of,
     fitted,
     of_model,
@@ -140,21 +139,19 @@ def _own(study: Study, dof: str, family: str = OWN) -> Sequence[Cell]:
     return study.cells[dof][FAMILIES.index(family) :: len(FAMILIES)]
 
 
-def _values(study: Study, dof: str, of: Callable[[Cell], Outcome], family: str = OWN) -> FloatArray:
-    return np.array([of(cell).errors_n for cell in _own(study, dof, family)])
+def _values(study: Study, dof: str, method: str, family: str = OWN) -> FloatArray:
+    """Return the errors of a method of `Cell`, N, shape (graspers, 3)."""
+    return np.array([getattr(cell, method).errors_n for cell in _own(study, dof, family)])
 
 
 def _ratios(study: Study) -> Mapping[str, FloatArray]:
     """Return ours over the paper's method by family, shape (graspers, 9)."""
 
-    def errors(family: str, of: Callable[[Cell], Outcome]) -> FloatArray:
-        each = np.hstack([_values(study, dof, of, family) for dof in DOFS])
+    def errors(family: str, method: str) -> FloatArray:
+        each = np.hstack([_values(study, dof, method, family) for dof in DOFS])
         return np.maximum(np.abs(each), LEAST_N)
 
-    return {
-        family: errors(family, lambda c: c.ours) / errors(family, lambda c: c.paper)
-        for family in FAMILIES
-    }
+    return {family: errors(family, "ours") / errors(family, "paper") for family in FAMILIES}
 
 
 def _found(study: Study) -> TextTable:
@@ -168,7 +165,7 @@ def _found(study: Study) -> TextTable:
 
 def _near(study: Study, dof: str) -> list[bool | None]:
     """Return whether the mean of the paper's method is near the paper, by kind of input."""
-    return near(_values(study, dof, lambda cell: cell.paper).mean(axis=0), PAPER_ERRORS_N[dof])
+    return near(_values(study, dof, "paper").mean(axis=0), PAPER_ERRORS_N[dof])
 
 
 def _range(values: FloatArray, form: str = "{:+.2f}") -> str:
@@ -191,10 +188,7 @@ def _errors(study: Study) -> TextTable:
     is_stated = study.prototype == THIRD
     rows = []
     for dof in DOFS:
-        paper, ours, bare = (
-            _values(study, dof, of)
-            for of in (lambda c: c.paper, lambda c: c.ours, lambda c: c.undeclared)
-        )
+        paper, ours, bare = (_values(study, dof, m) for m in ("paper", "ours", "undeclared"))
         for k, (kind, lands) in enumerate(zip(INPUTS, in_words(_near(study, dof)), strict=True)):
             stated = f"{PAPER_ERRORS_N[dof][k]:+.2f}" if is_stated else "not stated"
             errors = [_range(paper[:, k]), lands if is_stated else ""]

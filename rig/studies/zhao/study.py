@@ -45,9 +45,7 @@ class Cell:
     """One degree of freedom of one grasper.
 
     Attributes:
-        seed: Seed of its hidden parameters.
         slope: Of the paper's estimate over force in long steady grasps; one over its coefficient.
-        paper: The paper's method.
         ours: The declared model with the added effects.
         undeclared: The declared model alone, fitted on the same runs.
     """
