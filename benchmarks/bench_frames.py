@@ -70,8 +70,3 @@ def _by_loop(stream: bytes) -> NDArray[np.void]:
         if crc_hqx(payload, 0xFFFF) == int.from_bytes(body[-2:], "little"):
             rows.append(_SAMPLE.unpack(payload))
     return np.array(rows, SAMPLE_DTYPE)
-
-
-if __name__ == "__main__":
-    for ratio in measure():
-        print(ratio)  # noqa: T201

@@ -62,9 +62,9 @@ class Search:
     found: list[tuple[int, str, list[str]]] = field(default_factory=list)
 
 
-def write_settings(path: Path, config: str = "reference") -> None:
-    """Write gains and limits of a shipped configuration as the program takes them."""
-    settings = load_config(Path(config))
+def write_settings(path: Path) -> None:
+    """Write gains and limits of the reference rig as the program takes them."""
+    settings = load_config(Path("reference"))
     machine = machine_of(settings)
     limits = machine.board_limits(settings, settings.calibration_set())
     path.write_bytes(settings_bytes(machine.profile, machine.gains(settings), limits))
