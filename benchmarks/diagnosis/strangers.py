@@ -8,8 +8,8 @@ simulated forwards: a smooth motion is drawn, and the drive that it takes is wor
 import csv
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -280,26 +280,17 @@ UNNAMED = {
 }
 
 
-@dataclass(frozen=True)
-class Stranger:
-    """A machine with what is hidden in it, drawn from a seed."""
+def is_geared(random: np.random.Generator) -> bool:
+    """Draw whether a machine has a transmission and a torque cell."""
+    return bool(random.random() < 0.45)
 
-    seed: int
-    kind: str
-    random: np.random.Generator = field(repr=False, compare=False)
 
-    @cached_property
-    def is_geared(self) -> bool:
-        """Whether it has a transmission and a torque cell."""
-        return bool(self.random.random() < 0.45)
-
-    @cached_property
-    def effect(self) -> tuple[str, Effect] | None:
-        """What is hidden; nothing in a clean case."""
-        chosen = UNNAMED if self.kind == "outside" else NAMED
-        fitting = {n: e for n, e in chosen.items() if e.fits(self.is_geared)}
-        name = list(fitting)[int(self.random.integers(len(fitting)))]
-        return None if self.kind == "clean" else (name, fitting[name])
+def _drawn_effect(kind: str, geared: bool, random: np.random.Generator) -> Effect | None:
+    """Draw an effect to hide; None in a clean case."""
+    every = UNNAMED if kind == "outside" else NAMED
+    fitting = [effect for effect in every.values() if effect.fits(geared)]
+    effect = fitting[int(random.integers(len(fitting)))]
+    return None if kind == "clean" else effect
 
 
 def cases(seed: int, counts: Mapping[str, int], kept: Path) -> Iterator[Case]:
@@ -332,8 +323,8 @@ def draw(seed: int, kind: str, folder: Path) -> list[list[list[object]]]:
         Families, equations and groups of variables of each, as `scoring.Hidden` takes them.
     """
     random = np.random.default_rng([seed, KINDS.index(kind), 7])
-    stranger = Stranger(seed, kind, random)
-    geared, chosen = stranger.is_geared, stranger.effect
+    geared = is_geared(random)
+    chosen = _drawn_effect(kind, geared, random)
     axis, other, joint = (str(random.choice(words)) for words in (AXES, OTHERS, JOINTS))
     unit = "rad" if geared or random.random() < 0.5 else "m"
     over = partial(_over, random)
@@ -385,10 +376,8 @@ def draw(seed: int, kind: str, folder: Path) -> list[list[list[object]]]:
         return []
     own = f"{axis}_{'position' if unit == 'm' else 'angle'}"
     place = {own, f"{other}_angle"} if geared else {own}
-    groups = [
-        sorted(place) if group == "position" else group.split() for group in chosen[1].variables
-    ]
-    return [[list(chosen[1].families), [axis, joint] if geared else [axis], groups]]
+    groups = [sorted(place) if group == "position" else group.split() for group in chosen.variables]
+    return [[list(chosen.families), [axis, joint] if geared else [axis], groups]]
 
 
 def _hand_over(
@@ -463,7 +452,7 @@ def _run(k: int, scale: Scale, stiffness: float, random: np.random.Generator) ->
 
 
 def _hidden(
-    chosen: tuple[str, Effect] | None,
+    chosen: Effect | None,
     scale: Scale,
     runs: list[Run],
     floor: Mapping[str, float],
@@ -473,9 +462,8 @@ def _hidden(
     out = [dict.fromkeys(floor, np.zeros(len(run.time_s))) for run in runs]
     if chosen is None:
         return out
-    _, effect = chosen
-    forms = [effect.form(scale, run) for run in runs]
+    forms = [chosen.form(scale, run) for run in runs]
     level = np.sqrt(np.mean([float(np.mean((f - np.mean(f)) ** 2)) for f in forms]))
     for extra, form in zip(out, forms, strict=True):
-        extra[effect.enters] = size * floor[effect.enters] * form / level
+        extra[chosen.enters] = size * floor[chosen.enters] * form / level
     return out

@@ -2,8 +2,8 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -39,59 +39,39 @@ def cases(
             is handed over.
     """
     most = {kind: min(count, BLOCK) for kind, count in counts.items()}
-    return in_turn(KINDS, most, lambda kind, k: _case(_Lazy(seed + k, kind, gear_ratio, kept)))
+    return in_turn(KINDS, most, lambda kind, k: _case(kind, seed + k, gear_ratio, kept))
 
 
-@dataclass(frozen=True)
-class _Lazy:
-    """A case that is drawn when it is needed."""
+def _case(kind: str, seed: int, gear_ratio: float | None, folder_of_answers: Path) -> Case:
+    """Return a case that is drawn when it is needed."""
+    name = f"{kind}-{seed}" + ("" if gear_ratio is None else f"-ratio-{gear_ratio:g}")
+    kept = folder_of_answers / f"{name}.json"
 
-    seed: int
-    kind: str
-    gear_ratio: float | None
-    kept: Path
+    @cache
+    def drawn() -> Drawn:
+        return draw(seed, kind, gear_ratio=gear_ratio)
 
-    @property
-    def name(self) -> str:
-        ratio = "" if self.gear_ratio is None else f"-ratio-{self.gear_ratio:g}"
-        return f"{self.kind}-{self.seed}{ratio}"
-
-    @cached_property
-    def drawn(self) -> Drawn:
-        return draw(self.seed, self.kind, gear_ratio=self.gear_ratio)
-
-    def truth(self) -> scoring.Truth:
-        path = self.kept / f"{self.name}.json"
-        if not path.exists():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_text_atomic(path, json.dumps(_described(self.drawn)))
-        content = json.loads(path.read_text())
-        hidden = [scoring.Hidden(*effect) for effect in content["hidden"]]
-        return scoring.Truth(self.kind, hidden, content["runs"], content["either"])
-
-    def write(self, folder: Path) -> None:
-        write_recordings(folder, self.drawn.recordings)
-        self._write_machine(folder)
-
-    def write_without(self, folder: Path) -> None:
-        write_recordings(folder, self.drawn.twin.evidence)
-        self._write_machine(folder)
-
-    def _write_machine(self, folder: Path) -> None:
-        if self.gear_ratio is None:
+    def write(folder: Path, without: bool = False) -> None:
+        write_recordings(folder, drawn().twin.evidence if without else drawn().recordings)
+        if gear_ratio is None:
             plant = plant_file.shipped_plant("reference")
-            ratio = self.drawn.stage.plant.ratio
+            ratio = drawn().stage.plant.ratio
             parts = [replace(t, ratio=ratio) if t.ratio else t for t in plant.transmissions]
             plant_file.write(replace(plant, transmissions=tuple(parts)), folder / MACHINE_FILE)
 
-    def judge(self, report: Report) -> Judgement:
-        return scoring.judge(self.truth(), report)
+    def judge(report: Report) -> Judgement:
+        if not kept.exists():
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            write_text_atomic(kept, json.dumps(_described(drawn())))
+        content = json.loads(kept.read_text())
+        hidden = [scoring.Hidden(*effect) for effect in content["hidden"]]
+        return scoring.judge(
+            scoring.Truth(kind, hidden, content["runs"], content["either"]), report
+        )
 
-
-def _case(lazy: _Lazy) -> Case:
-    without = None if lazy.kind == "clean" else lazy.write_without
-    options = ("--machine", f"{{case}}/{MACHINE_FILE}") if lazy.gear_ratio is None else ()
-    return Case(lazy.name, lazy.kind, lazy.write, lazy.judge, without, options=options)
+    write_without = None if kind == "clean" else partial(write, without=True)
+    options = ("--machine", f"{{case}}/{MACHINE_FILE}") if gear_ratio is None else ()
+    return Case(name, kind, write, judge, write_without, options=options)
 
 
 def _described(drawn: Drawn) -> dict[str, object]:
