@@ -77,7 +77,7 @@ def _parameter(seed: int, kind: str) -> Pair:
     known = float(getattr(stage.plant, name))
     moved = {name: factor * known} if kind == "parameter" else {}
     later = replace(
-        stage, plant=replace(stage.plant, **moved), seed=seed + SECOND, clean={}, noise={}
+        stage, plant=stage.plant._replace(**moved), seed=seed + SECOND, clean={}, noise={}
     )
     runs = spread_over(stage.every, RUNS)
     found = compare(

@@ -94,24 +94,15 @@ DRIVES = {"current_a": {"A": 1.0, "mA": 1e3}, "voltage_v": {"V": 1.0}, "pwm_rati
 
 @dataclass(frozen=True)
 class Run:
-    """One run, without its hidden effect.
-
-    Attributes:
-        time_s: From its first sample.
-        age_s: Time since the campaign began.
-        position: Of the driven axis.
-        speed: Of it.
-        load: Torque of the output; zero without one.
-        other: Angle of the output; zero without one.
-    """
+    """One run, without its hidden effect."""
 
     number: int
-    time_s: FloatArray
-    age_s: FloatArray
-    position: FloatArray
-    speed: FloatArray
-    load: FloatArray
-    other: FloatArray
+    time_s: FloatArray  # From its first sample
+    age_s: FloatArray  # Time since the campaign began
+    position: FloatArray  # Of the driven axis
+    speed: FloatArray  # Of it
+    load: FloatArray  # Torque of the output; zero without one
+    other: FloatArray  # Angle of the output; zero without one
 
 
 Form = Callable[["Scale", Run], FloatArray]
@@ -145,35 +136,20 @@ class Effect:
 
 @dataclass(frozen=True)
 class Scale:
-    """Sizes of a machine, as its forms need them.
+    """Sizes of a machine, as its forms need them."""
 
-    Attributes:
-        travel: Of the driven axis.
-        speed: Usual most speed of it.
-        width: Speed over which friction changes its sign.
-        load: Usual most torque of the output.
-        seconds: Length of a run.
-        last_s: Age at the end of the campaign.
-        runs: How many.
-        turns: Whether the driven axis is a shaft.
-        fastest_hz: Most periods of its motion a second.
-        rate_hz: Samples a second.
-        ratio: Of its transmission; 0 without one.
-        drawn: Numbers between 0 and 1 that the forms choose their shapes by.
-    """
-
-    travel: float
-    speed: float
-    width: float
-    load: float
-    seconds: float
-    last_s: float
-    runs: int
-    turns: bool
-    fastest_hz: float
-    rate_hz: float
-    ratio: float
-    drawn: FloatArray
+    travel: float  # Of the driven axis
+    speed: float  # Usual most speed of it
+    width: float  # Speed over which friction changes its sign
+    load: float  # Usual most torque of the output
+    seconds: float  # Length of a run
+    last_s: float  # Age at the end of the campaign
+    runs: int  # How many
+    turns: bool  # Whether the driven axis is a shaft
+    fastest_hz: float  # Most periods of its motion a second
+    rate_hz: float  # Samples a second
+    ratio: float  # Of its transmission; 0 without one
+    drawn: FloatArray  # Numbers between 0 and 1 that the forms choose their shapes by
 
 
 def _signed(scale: Scale, run: Run) -> FloatArray:

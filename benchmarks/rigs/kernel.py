@@ -41,7 +41,8 @@ LOGGED = 8
 """Columns of a tick: the instant's true values, then the commands that act from it on."""
 
 ACCELERATION_LAG_S = 4e-3
-POINTS, MOST, VARIABLES = hidden.TABLE_POINTS, hidden.MOST, len(Variable)
+POINTS, MOST = hidden.TABLE_POINTS, hidden.MOST
+VARIABLES = len(Variable)
 
 
 @numba.njit()

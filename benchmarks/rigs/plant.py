@@ -5,8 +5,7 @@ stretch under it), so that a rig that is ten times as large is still one that wo
 """
 
 import math
-from dataclasses import astuple, dataclass, fields
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,101 +17,52 @@ USUAL_SPEED_RAD_S = 1.5
 MOST_SUBSTEPS = 40
 
 
-@dataclass(frozen=True, slots=True)
-class Plant:
-    """A rig's mechanics, SI units, closing positive; the equations are `kernel`'s.
+class Plant(NamedTuple):
+    """A rig's mechanics, SI units, closing positive; the equations are `kernel`'s."""
 
-    Attributes:
-        ratio: Motor turns a spindle turn.
-        constant: Torque constant, N m/A.
-        motor_inertia: At the motor, kg m^2.
-        motor_viscous: At the motor, N m s/rad.
-        motor_friction: At the motor, N m.
-        motor_width: Motor speed within which friction changes sign; 0 is friction that sticks.
-        gear_stiffness: At the spindle, N m/rad.
-        gear_damping: At the spindle, N m s/rad.
-        spindle_inertia: kg m^2.
-        spindle_viscous: N m s/rad.
-        spindle_friction: N m.
-        spindle_width: As the motor's.
-        pull: Jaw angle a spindle angle.
-        cable_stiffness: At the jaw, N m/rad.
-        cable_damping: At the jaw, N m s/rad.
-        finger_inertia: In front of the jaw's torque sensor, kg m^2.
-        load_inertia: Behind it, kg m^2.
-        jaw_zero: Jaw angle at spindle angle zero, rad.
-        current_lag: Of the drive's current, s.
-        load_lag: Of the load's torque, s.
-        load_constant: Torque of the load unit, N m/A.
-        counts_per_turn: Of the controller's encoder.
-        substeps: Steps of the physics in a tick of 1 ms.
-        load_scale: Torque at the jaw that the rig is made for, N m.
-    """
-
-    ratio: float
-    constant: float
-    motor_inertia: float
-    motor_viscous: float
-    motor_friction: float
-    motor_width: float
-    gear_stiffness: float
-    gear_damping: float
-    spindle_inertia: float
-    spindle_viscous: float
-    spindle_friction: float
-    spindle_width: float
-    pull: float
-    cable_stiffness: float
-    cable_damping: float
-    finger_inertia: float
-    load_inertia: float
-    jaw_zero: float
-    current_lag: float
-    load_lag: float
-    load_constant: float
-    counts_per_turn: float
-    substeps: float
-    load_scale: float
+    ratio: float  # Motor turns a spindle turn
+    constant: float  # Torque constant, N m/A
+    motor_inertia: float  # At the motor, kg m^2
+    motor_viscous: float  # At the motor, N m s/rad
+    motor_friction: float  # At the motor, N m
+    motor_width: float  # Motor speed within which friction changes sign; 0 is friction that sticks
+    gear_stiffness: float  # At the spindle, N m/rad
+    gear_damping: float  # At the spindle, N m s/rad
+    spindle_inertia: float  # kg m^2
+    spindle_viscous: float  # N m s/rad
+    spindle_friction: float  # N m
+    spindle_width: float  # As the motor's
+    pull: float  # Jaw angle a spindle angle
+    cable_stiffness: float  # At the jaw, N m/rad
+    cable_damping: float  # At the jaw, N m s/rad
+    finger_inertia: float  # In front of the jaw's torque sensor, kg m^2
+    load_inertia: float  # Behind it, kg m^2
+    jaw_zero: float  # Jaw angle at spindle angle zero, rad
+    current_lag: float  # Of the drive's current, s
+    load_lag: float  # Of the load's torque, s
+    load_constant: float  # Torque of the load unit, N m/A
+    counts_per_turn: float  # Of the controller's encoder
+    substeps: float  # Steps of the physics in a tick of 1 ms
+    load_scale: float  # Torque at the jaw that the rig is made for, N m
 
 
 class Controller(NamedTuple):
-    """Gains in amperes and spindle radians; the kinds differ by which of them are zero.
+    """Gains in amperes and spindle radians; the kinds differ by which of them are zero."""
 
-    Attributes:
-        kp: A/rad.
-        kd: A s/rad.
-        ki: A/(rad s), cascaded A/rad.
-        forward: Share of the target's speed that is fed forward.
-        inertia_a_s2_rad: Current a target acceleration.
-        cascaded: 1 where a position loop sets the speed of an inner loop.
-        outer_rad_s: Gain of that position loop, 1/s.
-        speed_limit_rad_s: Limit of that speed.
-        speed_gain: Share of a new speed that the filter takes in a tick.
-        limit_a: Limit of the current.
-        from_motor: 1 where the motor's encoder is fed back, else the spindle's.
-    """
-
-    kp: float
-    kd: float
-    ki: float
-    forward: float
-    inertia_a_s2_rad: float
-    cascaded: float
-    outer_rad_s: float
-    speed_limit_rad_s: float
-    speed_gain: float
-    limit_a: float
-    from_motor: float
+    kp: float  # A/rad
+    kd: float  # A s/rad
+    ki: float  # A/(rad s), cascaded A/rad
+    forward: float  # Share of the target's speed that is fed forward
+    inertia_a_s2_rad: float  # Current a target acceleration
+    cascaded: float  # 1 where a position loop sets the speed of an inner loop
+    outer_rad_s: float  # Gain of that position loop, 1/s
+    speed_limit_rad_s: float  # Limit of that speed
+    speed_gain: float  # Share of a new speed that the filter takes in a tick
+    limit_a: float  # Limit of the current
+    from_motor: float  # 1 where the motor's encoder is fed back, else the spindle's
 
 
 CONTROLLERS = ("pi_feedforward", "pd", "current_limited", "cascaded")
-
-_Constants = NamedTuple("_Constants", [(item.name, float) for item in fields(Plant)])  # type: ignore[misc]
-
-
-def constants_of(plant: Plant) -> Any:
-    """Return a plant as the compiled loop takes it."""
-    return _Constants(*(float(value) for value in astuple(plant)))
 
 
 def over(random: Random, low: float, high: float) -> float:
@@ -167,8 +117,7 @@ def draw_plant(random: Random, ratio: float | None = None) -> Plant:
         substeps=1.0,
         load_scale=load,
     )
-    values = dict(zip([f.name for f in fields(Plant)], astuple(plant), strict=True))
-    return Plant(**{**values, "substeps": float(substeps_of(plant))})
+    return Plant(*map(float, plant._replace(substeps=substeps_of(plant))))
 
 
 def substeps_of(plant: Plant) -> int:

@@ -35,27 +35,16 @@ FORERUN_S = 3.0
 
 @dataclass(frozen=True)
 class Reading:
-    """One sensor, SI units.
+    """One sensor, SI units."""
 
-    Attributes:
-        quantum: Step of its converter.
-        white: Standard deviation of its white noise.
-        colour: Standard deviation of its coloured noise.
-        colour_s: Time within which that forgets.
-        walk: Random walk of its zero: standard deviation after 1 s.
-        offset: Zero of the campaign.
-        offset_width: Standard deviation of each run's own zero about that.
-        lag_s: First-order lag.
-    """
-
-    quantum: float
-    white: float = 0.0
-    colour: float = 0.0
-    colour_s: float = 0.05
-    walk: float = 0.0
-    offset: float = 0.0
-    offset_width: float = 0.0
-    lag_s: float = 0.0
+    quantum: float  # Step of its converter
+    white: float = 0.0  # Standard deviation of its white noise
+    colour: float = 0.0  # Standard deviation of its coloured noise
+    colour_s: float = 0.05  # Time within which that forgets
+    walk: float = 0.0  # Random walk of its zero: standard deviation after 1 s
+    offset: float = 0.0  # Zero of the campaign
+    offset_width: float = 0.0  # Standard deviation of each run's own zero about that
+    lag_s: float = 0.0  # First-order lag
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.rigs import kernel, residual
 from benchmarks.rigs.drawn import Drawn
 from benchmarks.rigs.hidden import MOST, Hidden, rows_of
-from benchmarks.rigs.plant import Controller, Plant, constants_of
+from benchmarks.rigs.plant import Controller, Plant
 from benchmarks.rigs.protocol import LEAD_S, Plan, Protocol
 from benchmarks.rigs.residual import Prepared
 from benchmarks.rigs.sensors import READINGS, Chain, Fault, error_of, noise_of, read
@@ -90,7 +90,7 @@ class Stage:
         n = len(plan.setpoints)
         out, added = np.zeros((n, kernel.LOGGED)), np.zeros((n, 2 * MOST))
         fine = kernel.play(
-            constants_of(self.plant), self.controller[1], plan.load, rows, plan.setpoints,
+            self.plant, self.controller[1], plan.load, rows, plan.setpoints,
             plan.level_n_m, plan.jumps, (float(FIRST), plan.start_s), out, added,
         )  # fmt: skip
         if not fine or not np.isfinite(out).all():
