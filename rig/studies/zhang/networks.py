@@ -90,13 +90,11 @@ def _learnt(
     settings: Settings,
     start: Network | None = None,
 ) -> JointNetwork:
-    (rows, torque), held_out = (_table(joint, some, names) for some in (runs, validation))
-    done = train(rows, torque, (names, ("torque",)), settings, validation=held_out, start=start)
+    def table(some: Sequence[PsmRun]) -> tuple[FloatArray, FloatArray]:
+        rows = np.concatenate([states(run, names, EVERY) for run in some])
+        return rows, np.concatenate([run.torque[::EVERY, [joint]] for run in some])
+
+    rows, torque = table(runs)
+    label = (names, ("torque",))
+    done = train(rows, torque, label, settings, validation=table(validation), start=start)
     return JointNetwork(joint, done.network)
-
-
-def _table(
-    joint: int, runs: Sequence[PsmRun], names: Sequence[str]
-) -> tuple[FloatArray, FloatArray]:
-    rows = np.concatenate([states(run, names, EVERY) for run in runs])
-    return rows, np.concatenate([run.torque[::EVERY, joint] for run in runs])[:, None]
