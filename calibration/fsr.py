@@ -134,7 +134,7 @@ def fit_fsr(
     covariance = block_diag(np.zeros((known, known)), fit.covariance)
     coefficients = _coefficients(fit, force_at_zero_n)
     names = {f"c{k}": value for k, value in enumerate(coefficients)}
-    kept = Fit.of("polynomial", names, covariance, fit.residual_rms, fit.size)
+    kept = Fit("polynomial", names, covariance, fit.residual_rms, fit.size)
     curve = FsrCurve(tuple(coefficients), low, high, kept, len(runs))
     fix = "Let the sensor rest between runs, and record again."
     drift = refuse_drift(fit, span, DRIFT_LIMIT, fix)

@@ -3,20 +3,22 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
 from calibration.errors import CalibrationError
 from calibration.linear import LinearCalibration
+from estimation.recording import FloatArray
 
 LINE = "line"
 """Form of a fit `(input - zero) * slope`; the only one that a session's set of lines can take."""
+
+Rows = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,31 +54,18 @@ class Fit:
         form: Meaning of the parameters, such as `line` (slope, zero) or `polynomial` (c0, c1, ...).
         parameters: Name to value, in the order of the names, which a record's file has too; SI
             units of the channel over the input's unit.
-        covariance: Of the parameters in the order in which they are given, then in the order of
-            the names, shape (p, p); empty where nothing is known, as for numbers copied from a
-            certificate.
+        covariance: Of the parameters in the order in which they are given, rows or an array of
+            shape (p, p); kept as rows in the order of the names. Empty where nothing is known, as
+            for numbers copied from a certificate.
         residual_rms: Root mean square of the residual, the channel's unit; None if not measured.
         points: Number of samples fitted on.
     """
 
     form: str
     parameters: Mapping[str, float]
-    covariance: tuple[tuple[float, ...], ...] = ()
+    covariance: Rows | FloatArray = ()
     residual_rms: float | None = None
     points: int = 0
-
-    @classmethod
-    def of(
-        cls,
-        form: str,
-        parameters: Mapping[str, float],
-        covariance: ArrayLike,
-        residual_rms: float | None,
-        points: int,
-    ) -> "Fit":
-        """Return a fit with the covariance as it was computed, an array of shape (p, p)."""
-        rows = np.asarray(covariance, dtype=float).tolist()
-        return cls(form, parameters, tuple(map(tuple, rows)), residual_rms, points)
 
     def extended(
         self, values: Mapping[str, float], deviations: Sequence[float] | None = None
@@ -90,7 +79,7 @@ class Fit:
         variances = np.square(np.zeros(len(values)) if deviations is None else deviations)
         covariance = block_diag(self.covariance, np.diag(variances))
         whole = {**self.parameters, **values}
-        return Fit.of(self.form, whole, covariance, self.residual_rms, self.points)
+        return replace(self, parameters=whole, covariance=covariance)
 
     def __post_init__(self) -> None:
         covariance = np.array(self.covariance, dtype=float)
@@ -105,13 +94,11 @@ class Fit:
                 f"{size} parameters need {size} x {size} finite numbers.",
             )
         names = list(self.parameters)
-        if names != sorted(names):
-            order = sorted(range(size), key=names.__getitem__)
-            ordered = {names[k]: self.parameters[names[k]] for k in order}
-            object.__setattr__(self, "parameters", ordered)
-            if covariance.size:
-                rows = covariance[np.ix_(order, order)].tolist()
-                object.__setattr__(self, "covariance", tuple(map(tuple, rows)))
+        order = sorted(range(size), key=names.__getitem__)
+        ordered = {names[k]: self.parameters[names[k]] for k in order}
+        rows = covariance[np.ix_(order, order)].tolist() if covariance.size else []
+        object.__setattr__(self, "parameters", ordered)
+        object.__setattr__(self, "covariance", tuple(map(tuple, rows)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,11 +200,9 @@ class CalibrationRecord:
         """
         try:
             raw: dict[str, Any] = json.loads(text)
-            fit = raw["fit"]
-            fit["covariance"] = tuple(tuple(row) for row in fit["covariance"])
             files = tuple(RawFile(**file) for file in raw["raw"])
-            validity = Validity(**raw["validity"])
-            return cls(**{**raw, "fit": Fit(**fit), "validity": validity, "raw": files})
+            own = {"fit": Fit(**raw["fit"]), "validity": Validity(**raw["validity"]), "raw": files}
+            return cls(**{**raw, **own})
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise CalibrationError(
                 "The text is not a calibration record.", f"{type(error).__name__}: {error}"

@@ -46,7 +46,7 @@ class Regression:
     def as_fit(self, form: str, *names: str) -> Fit:
         """Return it as a calibration record keeps it, its coefficients by name."""
         parameters = dict(zip(names, self.values.tolist(), strict=True))
-        return Fit.of(form, parameters, self.covariance, self.residual_rms, self.size)
+        return Fit(form, parameters, self.covariance, self.residual_rms, self.size)
 
 
 def regress(runs: Sequence[Run], least_runs: int = 3) -> Regression:

@@ -158,7 +158,7 @@ def fit_torque(steps: Sequence[Step]) -> TorqueResult:
     apart = -float(torques.mean()) * line.stderr**2
     spread = np.array([[line.stderr**2, apart], [apart, line.intercept_stderr**2]])
     turned = np.diag([-(slope**2), 1.0])
-    fit = Fit.of(
+    fit = Fit(
         LINE,
         {"slope": slope, "zero": zero},
         turned @ spread @ turned,

@@ -14,23 +14,6 @@ MINIMUM_SAMPLES = 100
 
 
 @dataclass(frozen=True, slots=True)
-class SensorZero:
-    """A sensor at rest.
-
-    Attributes:
-        channel: SI channel.
-        mean_counts: Mean reading, counts.
-        std_counts: Standard deviation of one reading, counts.
-        samples: Number of readings.
-    """
-
-    channel: str
-    mean_counts: float
-    std_counts: float
-    samples: int
-
-
-@dataclass(frozen=True, slots=True)
 class Drift:
     """How far a zero moved over a run.
 
@@ -51,8 +34,8 @@ class Drift:
     passes: bool
 
 
-def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dict[str, SensorZero]:
-    """Average the readings of every tared channel at rest.
+def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dict[str, float]:
+    """Return the mean reading at rest of every tared channel, counts.
 
     Args:
         counts: Structured raw counts, shape (n,).
@@ -76,22 +59,20 @@ def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dic
                 "A real sensor has noise; this one is not connected, or its input is stuck.",
                 "Check its plug and its supply.",
             )
-        zeros[name] = SensorZero(
-            name, float(readings.mean()), float(readings.std(ddof=1)), int(counts.size)
-        )
+        zeros[name] = float(readings.mean())
     return zeros
 
 
 def drift_verdicts(
-    before: Mapping[str, SensorZero],
-    after: Mapping[str, SensorZero],
+    before: Mapping[str, float],
+    after: Mapping[str, float],
     calibrations: CalibrationSet,
     limits: Mapping[str, float],
 ) -> list[Drift]:
     """Compare the zeros before and after a run.
 
     Args:
-        before: Zeros before the run.
+        before: Zeros before the run, counts.
         after: Zeros after it.
         calibrations: Slopes from counts to SI.
         limits: Channel to the largest change that passes, SI; a channel without one is not judged.
@@ -105,8 +86,8 @@ def drift_verdicts(
                 "Remove the limit, or set `tared = true` in the calibration.",
             )
         line = calibrations.channels[name]
-        first = (before[name].mean_counts - line.zero_counts) * line.slope
-        last = (after[name].mean_counts - line.zero_counts) * line.slope
+        first = (before[name] - line.zero_counts) * line.slope
+        last = (after[name] - line.zero_counts) * line.slope
         passes = abs(last - first) <= limit
         verdicts.append(Drift(name, unit_of(name), first, last, limit, passes))
     return verdicts

@@ -189,7 +189,7 @@ def fit_tool(gravity: ArrayLike, wrench: ArrayLike) -> Tool:
     names = [*(f"bias_{axis}" for axis in AXES), "mass_kg", *(f"centre_{k}_m" for k in "xyz")]
     values = np.array([*bias, mass, *centre]).tolist()
     parameters = dict(zip(names, values, strict=True))
-    fit = Fit.of("tool", parameters, covariance, force_left, len(down))
+    fit = Fit("tool", parameters, covariance, force_left, len(down))
     return Tool(bias, mass, centre, fit, torque_left)
 
 

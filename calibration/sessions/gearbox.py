@@ -106,7 +106,7 @@ def _as_fit(found: Regression, points: int) -> Fit:
     jacobian = np.diag([*slopes, 1.0])
     covariance = jacobian @ found.covariance @ jacobian.T
     parameters = {name: float(value) for name, value in values.items()}
-    return Fit.of("gearbox", parameters, covariance, found.residual_rms, points)
+    return Fit("gearbox", parameters, covariance, found.residual_rms, points)
 
 
 def _carries(torque_n_m: FloatArray, zero_n_m: float) -> NDArray[np.bool_]:

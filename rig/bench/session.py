@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.linear import CalibrationSet
-from calibration.zero import MINIMUM_SAMPLES, SensorZero, measure_zeros
+from calibration.zero import MINIMUM_SAMPLES, measure_zeros
 from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import Identity, Result, Trip, TripReport
@@ -157,7 +157,7 @@ class Session:
             remaining -= len(reading.time_s)
             yield reading
 
-    def take_zeros(self, duration_s: float) -> dict[str, SensorZero]:
+    def take_zeros(self, duration_s: float) -> dict[str, float]:
         """Measure the zeros of the disarmed rig and use them from now on.
 
         A slow device is read for longer, until it has given readings enough.
@@ -168,9 +168,8 @@ class Session:
         if any(line.tared for line in self.calibrations.channels.values()):
             duration_s = max(duration_s, MINIMUM_SAMPLES / self.machine.profile.rate_hz)
         counts = np.concatenate([reading.counts for reading in self.rest(duration_s)])
-        zeros = measure_zeros(counts, self.calibrations)
-        self.zeros = {name: zero.mean_counts for name, zero in zeros.items()}
-        return zeros
+        self.zeros = measure_zeros(counts, self.calibrations)
+        return self.zeros
 
     def watch(self) -> Iterator[Reading]:
         """Read the rig as it is, without arming or moving it, until the caller stops."""

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.zero import SensorZero
 from drivers.clock import rising
 from rig import __version__
 from rig.bench.companions import Beside, topic
@@ -125,6 +124,6 @@ class SessionLog(LogWriter):
             self.write(FLIGHT, rows, np.full(len(rows), self._newest_ns))
 
 
-def mean_counts(zeros: Mapping[str, SensorZero]) -> dict[str, float]:
+def mean_counts(zeros: Mapping[str, float]) -> dict[str, float]:
     """Return measured zeros as a log keeps them."""
-    return {f"{name}{ZERO_SUFFIX}": zero.mean_counts for name, zero in zeros.items()}
+    return {f"{name}{ZERO_SUFFIX}": zero for name, zero in zeros.items()}

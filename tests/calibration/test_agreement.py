@@ -86,7 +86,7 @@ def loaded_runs(channel="motor_current_a", gain=1.0, **kind):
 def record(constant):
     names = ("torque_constant_n_m_a", "friction_n_m", "damping_n_m_s_rad", "offset_n_m")
     parameters = dict(zip(names, (constant, 0, 0, 0), strict=True))
-    fit = Fit.of("current", parameters, 1e-8 * np.eye(4), 1e-3, 900)
+    fit = Fit("current", parameters, 1e-8 * np.eye(4), 1e-3, 900)
     return CalibrationRecord(
         "current", "spindle_torque_n_m", "motor_current_a", "2026-01-02T03:04:05+00:00", "A", fit
     )
