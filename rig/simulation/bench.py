@@ -32,7 +32,12 @@ from rig.simulation import (
     plant,
     sensors,
 )
-from rig.simulation.parameters import REFERENCE_GAINS, PlantParameters, SensorParameters
+from rig.simulation.parameters import (
+    REFERENCE_GAINS,
+    PlantParameters,
+    SensorParameters,
+    compiled,
+)
 
 REFERENCE_START_COUNT = 1366
 """Spindle count at which the reference campaign's runs start: 60 degrees open."""
@@ -160,14 +165,13 @@ class SimulatedBench:
     ) -> None:
         self.parameters = parameters or PlantParameters()
         self.sensors = sensors_parameters or SensorParameters()
-        self.effects = tuple(effects)
         self.ticks_done = 0
         start_rad = -(start_count + 0.5) * sensors.TURN_RAD / self.sensors.spindle_count_per_turn
         self._state = plant.rest_state(self.parameters, start_rad)
         self._rig = (
-            plant.constants_of(self.parameters),
-            sensors.scales_of(self.sensors),
-            hidden.table(self.effects),
+            compiled(self.parameters),
+            compiled(self.sensors),
+            hidden.table(effects),
             np.uint64(int.from_bytes(hashlib.sha256(str(seed).encode()).digest()[:8])),
         )
 

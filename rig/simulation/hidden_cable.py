@@ -11,63 +11,48 @@ from rig.simulation.hidden import FIRST, SECOND, STRENGTH, Row
 @numba.njit()
 def spindle_friction_n_m(
     effects: Any,
-    spindle_angle: float,
-    spindle_speed: float,
-    cable_torque: float,
+    angle_rad: float,
+    speed_rad_s: float,
+    cable_n_m: float,
     clock_s: float,
     age_s: float,
 ) -> float:
-    """Return the contribution of the hidden effects to the Coulomb level at the spindle.
+    """Return the hidden Coulomb friction at the spindle, given the torque that the cable carries.
 
-    Args:
-        effects: From `hidden.table`.
-        spindle_angle: rad.
-        spindle_speed: rad/s.
-        cable_torque: Torque the cable carries, at the jaw.
-        clock_s: Time since the bench was started.
-        age_s: State of the contact that ages.
+    The clock starts with the bench; the age is that of the contact of `cable_dwell`.
     """
-    extra = 0.0
-    extra += cable_position_friction_n_m(effects.cable_position_friction, spindle_angle)
-    extra += cable_growing_friction_n_m(effects.cable_growing_friction, spindle_angle)
-    extra += cable_load_notch_n_m(effects.cable_load_notch, spindle_angle, cable_torque)
-    extra += friction_step_n_m(effects.friction_step, clock_s)
-    extra += effects.cable_stiff[STRENGTH] * 20e-3
-    extra += cable_dwell_n_m(effects.cable_dwell, age_s)
-    row = effects.cable_capstan
-    extra += wrapped_n_m(row[STRENGTH] * row[FIRST], cable_torque, spindle_speed)
-    return float(extra)
+    capstan = effects.cable_capstan
+    return float(
+        cable_position_friction_n_m(effects.cable_position_friction, angle_rad)
+        + cable_growing_friction_n_m(effects.cable_growing_friction, angle_rad)
+        + cable_load_notch_n_m(effects.cable_load_notch, angle_rad, cable_n_m)
+        + friction_step_n_m(effects.friction_step, clock_s)
+        + effects.cable_stiff[STRENGTH] * 20e-3
+        + cable_dwell_n_m(effects.cable_dwell, age_s)
+        + wrapped_n_m(capstan[STRENGTH] * capstan[FIRST], cable_n_m, speed_rad_s)
+    )
 
 
 @numba.njit()
 def wrist_friction_n_m(
-    effects: Any, spindle_speed: float, cable_torque: float, wrist_angle: float
+    effects: Any, speed_rad_s: float, cable_n_m: float, wrist_rad: float
 ) -> float:
-    """Return the contribution of effects of the wrist to the Coulomb level at the spindle.
-
-    Args:
-        effects: From `hidden.table`.
-        spindle_speed: rad/s.
-        cable_torque: Torque the cable carries, at the jaw.
-        wrist_angle: Pitch of the wrist, rad.
-    """
-    extra = 0.0
+    """Return the hidden Coulomb friction at the spindle that depends on the wrist's pitch."""
     row = effects.wrist_capstan
-    wrap = row[STRENGTH] * row[FIRST] * abs(wrist_angle)
-    extra += wrapped_n_m(wrap, cable_torque, spindle_speed)
-    extra += wrist_pinch_n_m(effects.wrist_pinch, wrist_angle)
-    return extra
+    wrap = row[STRENGTH] * row[FIRST] * abs(wrist_rad)
+    pinch = wrist_pinch_n_m(effects.wrist_pinch, wrist_rad)
+    return wrapped_n_m(wrap, cable_n_m, speed_rad_s) + pinch
 
 
 @numba.njit()
-def jaw_torque_n_m(effects: Any, jaw_angle: float) -> float:
+def jaw_torque_n_m(effects: Any, jaw_angle_rad: float) -> float:
     """Return the hidden torque that opposes closing at the jaw."""
-    extra = 0.0
-    extra += jaw_spring_n_m(effects.jaw_spring, jaw_angle)
-    extra += end_stop_spring_n_m(effects.end_stop_spring, jaw_angle)
-    extra += jaw_detent_n_m(effects.jaw_detent, jaw_angle)
-    extra += jaw_weight_n_m(effects.jaw_weight, jaw_angle)
-    return extra
+    return (
+        jaw_spring_n_m(effects.jaw_spring, jaw_angle_rad)
+        + end_stop_spring_n_m(effects.end_stop_spring, jaw_angle_rad)
+        + jaw_detent_n_m(effects.jaw_detent, jaw_angle_rad)
+        + jaw_weight_n_m(effects.jaw_weight, jaw_angle_rad)
+    )
 
 
 @numba.njit()
@@ -165,24 +150,15 @@ def spindle_ripple_n_m(row: Row, spindle_angle_rad: float) -> float:
 
 
 @numba.njit()
-def eccentric_pulley_rad(row: Row, spindle_angle_rad: float) -> float:
-    """Cable wound beyond the round pulley's: 0.12 / n (sin(n q + p) + 0.15 sin(2 n q))."""
+def eccentric_pulley_rad(row: Row, spindle_angle_rad: float) -> tuple[float, float]:
+    """Cable wound beyond the round pulley's, 0.12 / n (sin(n q + p) + 0.15 sin(2 n q)); its slope.
+
+    The slope over the spindle's angle is the lever arm that it adds.
+    """
     angle = row[FIRST] * spindle_angle_rad
     wave = math.sin(angle + row[SECOND]) + 0.15 * math.sin(2.0 * angle)
-    return row[STRENGTH] * 0.12 / row[FIRST] * wave
-
-
-@numba.njit()
-def eccentric_pulley_slope(row: Row, spindle_angle_rad: float) -> float:
-    """Derivative of the cable wound with the spindle angle: the lever arm it adds."""
-    angle = row[FIRST] * spindle_angle_rad
-    return row[STRENGTH] * 0.12 * (math.cos(angle + row[SECOND]) + 0.3 * math.cos(2.0 * angle))
-
-
-@numba.njit()
-def jaw_mass_kg_m2(row: Row) -> float:
-    """Additional inertia of the jaw: 0.12 g m^2 at strength 1."""
-    return row[STRENGTH] * 1.2e-4
+    slope = row[STRENGTH] * 0.12 * (math.cos(angle + row[SECOND]) + 0.3 * math.cos(2.0 * angle))
+    return row[STRENGTH] * 0.12 / row[FIRST] * wave, slope
 
 
 @numba.njit()
@@ -226,16 +202,11 @@ def wrapped_n_m(wrap: float, cable_torque_n_m: float, spindle_speed: float) -> f
 
 
 @numba.njit()
-def wrist_pull_rad(row: Row, wrist_angle: float) -> float:
-    """Cable that the wrist winds: c (sin p + b (1 - cos p)), c = 0.025 at strength 1."""
+def wrist_pull_rad(row: Row, wrist_angle: float) -> tuple[float, float]:
+    """Cable that the wrist winds, c (sin p + b (1 - cos p)), c = 0.025; its slope."""
     bow = row[FIRST] * (1.0 - math.cos(wrist_angle))
-    return row[STRENGTH] * 0.025 * (math.sin(wrist_angle) + bow)
-
-
-@numba.njit()
-def wrist_pull_slope(row: Row, wrist_angle: float) -> float:
-    """Derivative of the cable wound with the wrist's pitch."""
-    return row[STRENGTH] * 0.025 * (math.cos(wrist_angle) + row[FIRST] * math.sin(wrist_angle))
+    slope = row[STRENGTH] * 0.025 * (math.cos(wrist_angle) + row[FIRST] * math.sin(wrist_angle))
+    return row[STRENGTH] * 0.025 * (math.sin(wrist_angle) + bow), slope
 
 
 @numba.njit()

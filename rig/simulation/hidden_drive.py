@@ -10,36 +10,26 @@ from rig.simulation.hidden import FIRST, SECOND, STRENGTH, Row
 
 @numba.njit()
 def motor_friction_n_m(
-    effects: Any, speed: float, spindle_angle: float, state: float, clock_s: float
+    effects: Any, speed_rad_s: float, spindle_angle_rad: float, state: float, clock_s: float
 ) -> float:
-    """Return the contribution of the hidden effects to the Coulomb level at the motor shaft.
-
-    Args:
-        effects: From `hidden.table`.
-        speed: Of the motor shaft, rad/s.
-        spindle_angle: rad.
-        state: State of the two-state friction, 0 or 1.
-        clock_s: Time since the bench was started.
-    """
-    extra = 0.0
-    extra += gear_stribeck_n_m(effects.gear_stribeck, speed)
-    extra += motor_asymmetry_n_m(effects.motor_asymmetry, speed)
-    extra += motor_drag_n_m(effects.motor_drag, speed)
-    extra += effects.gear_two_state[STRENGTH] * 0.35e-3 * state
-    extra += gear_angle_viscous_n_m(effects.gear_angle_viscous, speed, spindle_angle)
-    extra += motor_viscous_asymmetry_n_m(effects.motor_viscous_asymmetry, speed)
-    extra += grease_warmup_n_m(effects.grease_warmup, clock_s)
-    extra += effects.gear_wear[STRENGTH] * 0.3e-3
-    return float(extra)
+    """Return the hidden Coulomb friction at the motor shaft; the state is `gear_two_state`'s."""
+    return float(
+        gear_stribeck_n_m(effects.gear_stribeck, speed_rad_s)
+        + motor_asymmetry_n_m(effects.motor_asymmetry, speed_rad_s)
+        + motor_drag_n_m(effects.motor_drag, speed_rad_s)
+        + effects.gear_two_state[STRENGTH] * 0.35e-3 * state
+        + gear_angle_viscous_n_m(effects.gear_angle_viscous, speed_rad_s, spindle_angle_rad)
+        + motor_viscous_asymmetry_n_m(effects.motor_viscous_asymmetry, speed_rad_s)
+        + grease_warmup_n_m(effects.grease_warmup, clock_s)
+        + effects.gear_wear[STRENGTH] * 0.3e-3
+    )
 
 
 @numba.njit()
-def gear_friction_n_m(effects: Any, motor_speed: float, twist_torque: float) -> float:
+def gear_friction_n_m(effects: Any, motor_speed_rad_s: float, twist_n_m: float) -> float:
     """Return the hidden friction that grows with the torque in the gear, at the spindle."""
-    extra = 0.0
-    extra += gear_load_friction_n_m(effects.gear_load_friction, twist_torque)
-    extra += gear_load_viscous_n_m(effects.gear_load_viscous, motor_speed, twist_torque)
-    return extra
+    dry = gear_load_friction_n_m(effects.gear_load_friction, twist_n_m)
+    return dry + gear_load_viscous_n_m(effects.gear_load_viscous, motor_speed_rad_s, twist_n_m)
 
 
 @numba.njit()
@@ -77,18 +67,15 @@ def gear_backlash_n_m(
 
 
 @numba.njit()
-def gear_eccentricity_rad(row: Row, spindle_angle_rad: float) -> float:
-    """Position error of the gear: e (sin(n q + p) + 0.3 sin(2 n q)), e = 2 mrad at strength 1."""
-    angle = row[FIRST] * spindle_angle_rad
-    return row[STRENGTH] * 2e-3 * (math.sin(angle + row[SECOND]) + 0.3 * math.sin(2.0 * angle))
+def gear_eccentricity_rad(row: Row, spindle_angle_rad: float) -> tuple[float, float]:
+    """Position error of the gear, e (sin(n q + p) + 0.3 sin(2 n q)), e = 2 mrad, and its slope.
 
-
-@numba.njit()
-def gear_eccentricity_slope(row: Row, spindle_angle_rad: float) -> float:
-    """Derivative of the position error with the spindle angle: what keeps it free of energy."""
+    The slope over the spindle's angle keeps it free of energy.
+    """
     angle = row[FIRST] * spindle_angle_rad
-    wave = math.cos(angle + row[SECOND]) + 0.6 * math.cos(2.0 * angle)
-    return row[STRENGTH] * 2e-3 * row[FIRST] * wave
+    error = math.sin(angle + row[SECOND]) + 0.3 * math.sin(2.0 * angle)
+    slope = math.cos(angle + row[SECOND]) + 0.6 * math.cos(2.0 * angle)
+    return row[STRENGTH] * 2e-3 * error, row[STRENGTH] * 2e-3 * row[FIRST] * slope
 
 
 @numba.njit()

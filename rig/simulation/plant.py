@@ -17,8 +17,6 @@ for dry friction; J. J. Moreau, "Unilateral contact and dry friction in finite f
 """
 
 import math
-from collections import namedtuple
-from dataclasses import astuple, fields
 from typing import Any
 
 import numba
@@ -32,21 +30,9 @@ from rig.simulation.parameters import PlantParameters
 TICK_S = 1e-3
 """One tick of the logger, s."""
 
-_Constants = namedtuple("_Constants", [item.name for item in fields(PlantParameters)])  # type: ignore[misc]
-
-
-def constants_of(parameters: PlantParameters) -> Any:
-    """Return the parameters as compiled code takes them: a named tuple of floats, same names."""
-    return _Constants(*(float(value) for value in astuple(parameters)))
-
 
 def rest_state(parameters: PlantParameters, spindle_angle_rad: float) -> NDArray[np.float64]:
-    """Return the state of a rig at rest with no torque anywhere, shape (`places.STATE_SIZE`,).
-
-    Args:
-        parameters: Parameters of the plant.
-        spindle_angle_rad: Where the spindle stands, closing positive.
-    """
+    """Return the state of a rig at rest with no torque anywhere, shape (`places.STATE_SIZE`,)."""
     state = np.zeros(places.STATE_SIZE)
     state[places.MOTOR_ANGLE] = parameters.gear_ratio * spindle_angle_rad
     state[places.SPINDLE_ANGLE] = spindle_angle_rad
@@ -57,7 +43,7 @@ def rest_state(parameters: PlantParameters, spindle_angle_rad: float) -> NDArray
 
 @numba.njit()
 def wrist_pitch_rad(p: Any, clock_s: float) -> float:
-    """Return the pitch of the wrist, which swings by itself, at a time since the bench's start."""
+    """Return the pitch of the wrist, which swings by itself."""
     phase = 2.0 * math.pi * clock_s / p.wrist_period_s
     return float(p.wrist_middle_rad + p.wrist_swing_rad * math.sin(phase))
 
@@ -112,7 +98,7 @@ def step_tick(
 
     Args:
         state: Shape (`places.STATE_SIZE`,), changed in place.
-        p: From `constants_of`.
+        p: From `parameters.compiled`.
         effects: A record of `hidden.table`.
         current_target_a: Commanded motor current.
         load_target_a: Commanded load current.
@@ -135,8 +121,7 @@ def step_tick(
         row = effects.torque_lag
         lag_gain = min(2.0 * dt / (row[STRENGTH] * row[FIRST]), 1.0)
     if effects.jaw_mass[STRENGTH] != 0.0:
-        mass = hidden_cable.jaw_mass_kg_m2(effects.jaw_mass)
-        dt_jaw = dt / (p.jaw_inertia_kg_m2 + mass)
+        dt_jaw = dt / (p.jaw_inertia_kg_m2 + effects.jaw_mass[STRENGTH] * 1.2e-4)
 
     motor, motor_speed = state[places.MOTOR_ANGLE], state[places.MOTOR_SPEED]
     spindle, spindle_speed = state[places.SPINDLE_ANGLE], state[places.SPINDLE_SPEED]
@@ -176,9 +161,8 @@ def step_tick(
         twist_rate = gear * motor_speed - spindle_speed
         spindle_per_twist = 1.0
         if effects.gear_eccentricity[STRENGTH] != 0.0:
-            row = effects.gear_eccentricity
-            slope = hidden_drive.gear_eccentricity_slope(row, spindle)
-            twist += hidden_drive.gear_eccentricity_rad(row, spindle)
+            error, slope = hidden_drive.gear_eccentricity_rad(effects.gear_eccentricity, spindle)
+            twist += error
             twist_rate += slope * spindle_speed
             spindle_per_twist -= slope
         if effects.gear_backlash[STRENGTH] != 0.0:
@@ -195,15 +179,14 @@ def step_tick(
         stretch_rate = p.cable_ratio * spindle_speed - jaw_speed
         lever = p.cable_ratio
         if effects.eccentric_pulley[STRENGTH] != 0.0:
-            row = effects.eccentric_pulley
-            slope = hidden_cable.eccentric_pulley_slope(row, spindle)
-            stretch += hidden_cable.eccentric_pulley_rad(row, spindle)
+            wound, slope = hidden_cable.eccentric_pulley_rad(effects.eccentric_pulley, spindle)
+            stretch += wound
             stretch_rate += slope * spindle_speed
             lever += slope
         if effects.wrist_pull[STRENGTH] != 0.0:
-            row = effects.wrist_pull
-            stretch += hidden_cable.wrist_pull_rad(row, wrist)
-            stretch_rate += hidden_cable.wrist_pull_slope(row, wrist) * wrist_speed
+            wound, slope = hidden_cable.wrist_pull_rad(effects.wrist_pull, wrist)
+            stretch += wound
+            stretch_rate += slope * wrist_speed
         cable = p.cable_stiffness_n_m_rad * stretch + p.cable_damping_n_m_s_rad * stretch_rate
         if effects.cable_creep[STRENGTH] != 0.0:
             row = effects.cable_creep

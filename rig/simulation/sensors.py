@@ -7,8 +7,6 @@ earlier. The command logged in a row acts from that row's instant on, so the cur
 the next row.
 """
 
-from collections import namedtuple
-from dataclasses import astuple, fields
 from typing import Any
 
 import numba
@@ -23,14 +21,7 @@ from rig.simulation.parameters import SensorParameters
 MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT, FSR, COMMAND_E4, LOAD_MA = range(9)
 """Columns of a row of counts; the board is given the first seven."""
 
-_Scales = namedtuple("_Scales", [item.name for item in fields(SensorParameters)])  # type: ignore[misc]
-
 TURN_RAD = 2.0 * np.pi
-
-
-def scales_of(parameters: SensorParameters) -> Any:
-    """Return the parameters as compiled code takes them: a named tuple of floats, same names."""
-    return _Scales(*(float(value) for value in astuple(parameters)))
 
 
 @numba.njit()
@@ -53,7 +44,7 @@ def sample(
     Args:
         state: State of the plant, shape (`places.STATE_SIZE`,); only its drifts and the states of
             the sensors are changed.
-        s: From `scales_of`.
+        s: From `parameters.compiled`.
         effects: A record of `hidden.table`.
         seed: Scrambled seed of the bench.
         tick: Tick number since the bench was made.
