@@ -40,12 +40,6 @@ def pairs(plant: Plant) -> dict[str, Pair]:
     return found
 
 
-def torque_sensors(plant: Plant) -> dict[str, str]:
-    """Return the channel of each torque sensor by the sensor's name, which its counts have too."""
-    ending = "_torque_n_m"
-    return {s.name.removesuffix(ending): s.name for s in plant.sensors if s.name.endswith(ending)}
-
-
 REFERENCE = shipped_plant("reference")
 PAIRS = pairs(REFERENCE)
 GEAR = next(iter(PAIRS.values()))

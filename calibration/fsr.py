@@ -6,7 +6,7 @@ not modelled: a single curve inherits them, and its interval is as wide as they 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -67,9 +67,9 @@ class FsrResult:
     """
 
     curve: FsrCurve
-    held_out_rmse_n: dict[int, float] = field(default_factory=dict)
-    hysteresis: float | None = None
-    drift: float = 0.0
+    held_out_rmse_n: dict[int, float]
+    hysteresis: float | None
+    drift: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,12 +79,10 @@ class Creep:
     Attributes:
         rate: Relative change a decade of time.
         standard_error: Of the rate, samples taken as independent.
-        decades: Decades of time it was measured over.
     """
 
     rate: float
     standard_error: float
-    decades: float
 
 
 def fit_fsr(
@@ -113,12 +111,12 @@ def fit_fsr(
         fix = "Condition the sensor by loading it to 110 % several times, and press more slowly."
         quality.check_limit("hysteresis", hysteresis, HYSTERESIS_LIMIT, "Hysteresis", fix)
     tried = range(1, HIGHEST_DEGREE + 1) if degree is None else (degree,)
-    fits = {d: _fitted(runs, d, force_at_zero_n) for d in tried}
     low, high = float(volts.min()), float(volts.max())
+    held = [] if force_at_zero_n is None else [force_at_zero_n]
     fits = {
         d: fit
-        for d, fit in fits.items()
-        if is_monotone(_coefficients(fit, force_at_zero_n), low, high)
+        for d in tried
+        if is_monotone([*held, *(fit := _fitted(runs, d, held)).values], low, high)
     }
     if not fits:
         raise BadDataError(
@@ -130,9 +128,9 @@ def fit_fsr(
     chosen = _lowest_as_good(fits)
     quality.check_levels(volts, chosen + 2, "The voltage")
     fit = fits[chosen]
-    known = 0 if force_at_zero_n is None else 1  # a coefficient held fixed has no variance
-    covariance = block_diag(np.zeros((known, known)), fit.covariance)
-    coefficients = _coefficients(fit, force_at_zero_n)
+    # a coefficient held fixed has no variance
+    covariance = block_diag(np.zeros((len(held), len(held))), fit.covariance)
+    coefficients = [*held, *fit.values.tolist()]
     names = {f"c{k}": value for k, value in enumerate(coefficients)}
     kept = Fit("polynomial", names, covariance, fit.residual_rms, fit.size)
     curve = FsrCurve(tuple(coefficients), low, high, kept, len(runs))
@@ -193,9 +191,8 @@ def measure_creep(hold: FsrRun, start_s: float) -> Creep:
             "Hold the force by a weight.",
         )
     line = stats.linregress(np.log10(time / time[0]), volts)
-    decades = float(np.log10(time[-1] / time[0]))
     start = float(line.intercept)
-    return Creep(float(line.slope) / start, float(line.stderr) / abs(start), decades)
+    return Creep(float(line.slope) / start, float(line.stderr) / abs(start))
 
 
 def _checked(runs: Sequence[FsrRun], degree: int, rail_v: float) -> tuple[FloatArray, FloatArray]:
@@ -213,18 +210,10 @@ def _checked(runs: Sequence[FsrRun], degree: int, rail_v: float) -> tuple[FloatA
     return volts, forces
 
 
-def _fitted(runs: Sequence[FsrRun], degree: int, force_at_zero_n: float | None) -> Regression:
+def _fitted(runs: Sequence[FsrRun], degree: int, held: list[float]) -> Regression:
     """Fit the powers of the voltage; the constant one only where the force at 0 V is not held."""
-    first, zero_n = (0, 0.0) if force_at_zero_n is None else (1, force_at_zero_n)
-    powers: list[FloatArray] = [
-        np.asarray(polynomial.polyvander(run.fsr_v, degree)[:, first:]) for run in runs
-    ]
-    return regress([(x, run.force_n - zero_n) for x, run in zip(powers, runs, strict=True)])
-
-
-def _coefficients(fit: Regression, force_at_zero_n: float | None) -> list[float]:
-    known = [] if force_at_zero_n is None else [force_at_zero_n]
-    return [*known, *fit.values.tolist()]
+    powers = [np.asarray(polynomial.polyvander(r.fsr_v, degree)[:, len(held) :]) for r in runs]
+    return regress([(x, r.force_n - sum(held)) for x, r in zip(powers, runs, strict=True)])
 
 
 def _lowest_as_good(fits: dict[int, Regression]) -> int:

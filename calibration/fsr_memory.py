@@ -51,14 +51,12 @@ class FsrMemory:
             FsrRangeError: A voltage lies outside the curve's range.
         """
         volts = self.without_creep(curve, time_s, fsr_v)
-        return curve.force_n(volts) + self.gap_n / 2 * _lens(curve, volts) * _direction(
-            time_s, volts
-        )
+        return curve.force_n(volts) + self.gap_n * _half_loop(curve, time_s, volts)
 
     def memoryless(self, curve: FsrCurve, run: FsrRun) -> FsrRun:
         """Return a run as a sensor without memory would have given it."""
         volts = self.without_creep(curve, run.time_s, run.fsr_v)
-        bias_n = self.gap_n / 2 * _lens(curve, volts) * _direction(run.time_s, volts)
+        bias_n = self.gap_n * _half_loop(curve, run.time_s, volts)
         return FsrRun(run.name, run.time_s, volts, run.force_n - bias_n)
 
     def without_creep(self, curve: FsrCurve, time_s: FloatArray, fsr_v: FloatArray) -> FloatArray:
@@ -84,7 +82,7 @@ def fit_memory(curve: FsrCurve, runs: Sequence[FsrRun], creep: Creep | None) -> 
     """
     pairs = []
     for run in runs:
-        column = 0.5 * _lens(curve, run.fsr_v) * _direction(run.time_s, run.fsr_v)
+        column = _half_loop(curve, run.time_s, run.fsr_v)
         pairs.append((column[:, None], run.force_n - curve.force_n(run.fsr_v)))
     gaps = np.array([float(x[:, 0] @ left / (x[:, 0] @ x[:, 0])) for x, left in pairs])
     fit = regress(pairs)
@@ -98,15 +96,11 @@ def fit_memory(curve: FsrCurve, runs: Sequence[FsrRun], creep: Creep | None) -> 
     )
 
 
-def _lens(curve: FsrCurve, fsr_v: FloatArray) -> FloatArray:
+def _half_loop(curve: FsrCurve, time_s: FloatArray, fsr_v: FloatArray) -> FloatArray:
+    """Return s w(u) / 2; s is 1 where the voltage rises, -1 where it falls, held where it rests."""
     share = np.clip((fsr_v - curve.low_v) / (curve.high_v - curve.low_v), 0.0, 1.0)
-    return np.asarray(4.0 * share * (1.0 - share))
-
-
-def _direction(time_s: FloatArray, fsr_v: FloatArray) -> FloatArray:
-    """Return 1 where the voltage rises, -1 where it falls, held where it rests."""
     rate = np.gradient(fsr_v, time_s)
     least = 0.05 * np.abs(rate).max()
     sign = np.where(rate > least, 1.0, np.where(rate < -least, -1.0, 0.0))
     last = np.maximum.accumulate(np.where(sign != 0, np.arange(sign.size), 0))
-    return np.asarray(sign[last])
+    return np.asarray(0.5 * (4.0 * share * (1.0 - share)) * sign[last])

@@ -164,20 +164,12 @@ class Bench(Protocol):
         """Play the step's trajectory, or read the rig at rest for the step's duration."""
 
 
-Progress = Callable[[Step, int, int], None]
-"""Told the step that begins, its number from 0, and how many there are."""
-
-
-Measured = Callable[[Step, list[Measurement]], None]
-"""Given the step that was measured, and all measurements so far, its own last."""
-
-
 def carry_out(
     procedure: Procedure,
     operator: Operator,
     bench: Bench,
-    on_step: Progress | None = None,
-    on_measured: Measured | None = None,
+    on_step: Callable[[Step, int, int], None] | None = None,
+    on_measured: Callable[[list[Measurement]], None] | None = None,
     measured: list[Measurement] | None = None,
 ) -> list[Measurement]:
     """Go through the steps and return their measurements.
@@ -186,8 +178,8 @@ def carry_out(
         procedure: What is calibrated.
         operator: Sets up the steps.
         bench: Measures them.
-        on_step: Called before each step.
-        on_measured: Called after each step.
+        on_step: Called before each step with it, its number from 0, and how many there are.
+        on_measured: Called after each step with all measurements so far, its own last.
         measured: Measurements of the first steps, where a session goes on; it grows step by step,
             so that a caller has what was measured before an error.
 
@@ -208,7 +200,7 @@ def carry_out(
         refuse_saturated(measurement.recording)
         measured.append(measurement)
         if on_measured:
-            on_measured(step, measured)
+            on_measured(measured)
     return measured
 
 

@@ -101,8 +101,7 @@ class TorqueResult:
             where no level was reached both ways.
         drift: Change of the unloaded reading from the first to the last step, over the span; None
             where the series does not begin and end unloaded.
-        low_counts: Least mean reading.
-        high_counts: Greatest mean reading.
+        counts: Mean reading of each step, shape (n,).
         torque_n_m: Torque of each step, shape (n,).
         residual_n_m: Torque by the line less that of the step, shape (n,).
     """
@@ -111,8 +110,7 @@ class TorqueResult:
     linearity: float
     hysteresis: float | None
     drift: float | None
-    low_counts: float
-    high_counts: float
+    counts: FloatArray
     torque_n_m: FloatArray
     residual_n_m: FloatArray
 
@@ -143,8 +141,8 @@ def fit_torque(steps: Sequence[Step]) -> TorqueResult:
     slope, zero = 1.0 / float(line.slope), float(line.intercept)
     residual = (counts - zero) * slope - torques
     span = float(np.ptp(torques))
-    departures = [float(residual[torques == level].mean()) for level in np.unique(torques)]
-    linearity = max(map(abs, departures)) / span
+    departures = [residual[torques == level].mean() for level in np.unique(torques)]
+    linearity = float(np.abs(departures).max()) / span
     hysteresis, drift = _hysteresis(torques, residual, span), None
     if torques[0] == 0.0 and torques[-1] == 0.0:
         drift = float(residual[-1] - residual[0]) / span
@@ -158,15 +156,10 @@ def fit_torque(steps: Sequence[Step]) -> TorqueResult:
     apart = -float(torques.mean()) * line.stderr**2
     spread = np.array([[line.stderr**2, apart], [apart, line.intercept_stderr**2]])
     turned = np.diag([-(slope**2), 1.0])
-    fit = Fit(
-        LINE,
-        {"slope": slope, "zero": zero},
-        turned @ spread @ turned,
-        float(np.sqrt(np.mean(residual**2))),
-        len(steps),
-    )
-    low, high = float(counts.min()), float(counts.max())
-    return TorqueResult(fit, linearity, hysteresis, drift, low, high, torques, residual)
+    rms = float(np.sqrt(np.mean(residual**2)))
+    parameters = {"slope": slope, "zero": zero}
+    fit = Fit(LINE, parameters, turned @ spread @ turned, rms, len(steps))
+    return TorqueResult(fit, linearity, hysteresis, drift, counts, torques, residual)
 
 
 def _at_rest(values: ArrayLike, name: str) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -76,22 +77,19 @@ class FsrSession:
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
         """Return the curve from voltage to force, with hysteresis and creep."""
-        by_name = {m.recording.name: m for m in measurements}
-        runs = self.pressed(measurements)
-        zero_n = self._rest(measurements)[0]
-        fitted = fit_fsr(
-            runs, self.degree, force_at_zero_n=self.force_at_zero_n, rail_v=self.rail_v
+        fit = partial(
+            fit_fsr, degree=self.degree, force_at_zero_n=self.force_at_zero_n, rail_v=self.rail_v
         )
+        runs = self.pressed(measurements)
+        fitted = fit(runs)
         hysteresis, drift = fitted.hysteresis, fitted.drift
-        creep = self._creep(by_name.get("hold"), zero_n)
+        creep = self._creep(measurements)
         memory = fit_memory(fitted.curve, runs, creep)
         if self.curve_only:
             memory = FsrMemory(held_out_rmse_n=memory.held_out_rmse_n)
         # the curve in the middle of the loop: what memory adds is taken off, and it is fitted again
         pure = [memory.memoryless(fitted.curve, run) for run in runs]
-        fitted = fit_fsr(
-            pure, self.degree, force_at_zero_n=self.force_at_zero_n, rail_v=self.rail_v
-        )
+        fitted = fit(pure)
         curve = fitted.curve
         assert curve.fit is not None  # noqa: S101  it was fitted
         whole = curve.fit.extended(
@@ -161,10 +159,11 @@ class FsrSession:
             )
         return FsrRun(recording.name, time_s[pressed], smooth[pressed, 0], smooth[pressed, 1])
 
-    def _creep(self, hold: Measurement | None, zero_n: float) -> Creep | None:
+    def _creep(self, measurements: Sequence[Measurement]) -> Creep | None:
+        hold = next((m.recording for m in measurements if m.recording.name == "hold"), None)
         if hold is None:
             return None
-        time_s, smooth = self._smooth(hold.recording, zero_n)
+        time_s, smooth = self._smooth(hold, self._rest(measurements)[0])
         on = int(np.argmax(smooth[:, 1] > 0.9 * smooth[:, 1].max()))
         since_s = time_s[on:] - time_s[on] + CREEP_START_S
         return measure_creep(FsrRun("hold", since_s, smooth[on:, 0], smooth[on:, 1]), start_s=1.0)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.chain import REFERENCE, torque_sensors
+from calibration.chain import REFERENCE
 from calibration.linear import CalibrationSet
 from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
 from calibration.quality import BadDataError
@@ -19,7 +19,10 @@ from calibration.torque import (
 from calibration.torque import Step as Load
 from estimation.recording import FloatArray
 
-SENSORS = torque_sensors(REFERENCE)
+ENDING = "_torque_n_m"
+SENSORS = {
+    s.name.removesuffix(ENDING): s.name for s in REFERENCE.sensors if s.name.endswith(ENDING)
+}
 """Sensor to its channel; the counts field has the sensor's name."""
 
 MASSES_KG = (0.05, 0.1, 0.15, 0.2, 0.25)
@@ -126,7 +129,7 @@ class TorqueSession:
         }
         torques, left = fitted.torque_n_m, fitted.residual_n_m
         rising = np.diff(torques, prepend=-1.0) > 0
-        low, high = fitted.low_counts, fitted.high_counts
+        low, high = float(fitted.counts.min()), float(fitted.counts.max())
         result = Result(SENSORS[self.sensor], field, fitted.fit, low, high, tared=True)
         series = {
             "loading": (torques[rising], left[rising] * 1e3),

@@ -136,7 +136,7 @@ def _measure(procedure: Procedure, settings: Config, how: Keeping) -> list[Any]:
     def tell(step: Step, number: int, total: int) -> None:
         screen.print(f"{number + 1}/{total} {step.name}")
 
-    def show(step: Step, so_far: list[Any]) -> None:
+    def show(so_far: list[Any]) -> None:
         screen.print(f"  {reading(procedure, so_far, lines)}")
 
     try:

@@ -196,8 +196,8 @@ def test_the_gap_of_loading_and_unloading_is_found_where_there_is_one(gap):
 
 def test_creep_is_removed_only_where_it_is_significant():
     curve, _ = pressed(0)
-    sure = fit_memory(curve, [pressed(k)[1] for k in range(4)], Creep(0.02, 1e-4, 2))
-    unsure = fit_memory(curve, [pressed(k)[1] for k in range(4)], Creep(0.02, 0.02, 2))
+    sure = fit_memory(curve, [pressed(k)[1] for k in range(4)], Creep(0.02, 1e-4))
+    unsure = fit_memory(curve, [pressed(k)[1] for k in range(4)], Creep(0.02, 0.02))
     assert (sure.creep_ratio, unsure.creep_ratio) == (0.02, 0.0)
     held = np.full(1000, 0.5)
     time_s = np.arange(1000) * 0.01
