@@ -14,17 +14,14 @@ from estimation.recording import Recording
 from tests.estimation.synthetic import campaign
 
 RATIO, CONSTANT = 0.9, 0.85
-RNG = np.random.default_rng(3)
 
 
 def runs(scale: float = 1.0, offset_rad: float = 0.0, twist_rad_n_m: float = 0.0):
     """Nine runs whose spindle encoder has a scale and an offset of its own."""
-    random = np.random.default_rng(0)
-    made = []
+    random, made = np.random.default_rng(0), []
     for run in campaign():
-        noise = 1e-4 * random.normal(size=len(run))
-        angle = scale * run["spindle_angle_rad"] + offset_rad + noise
-        angle = angle - twist_rad_n_m * run["proximal_torque_n_m"]
+        twist = twist_rad_n_m * run["proximal_torque_n_m"] + 1e-4 * random.normal(size=len(run))
+        angle = scale * run["spindle_angle_rad"] + offset_rad - twist
         made.append(run.with_columns(spindle_angle_rad=angle))
     return made
 
@@ -57,7 +54,7 @@ def test_without_two_encoders_there_is_nothing_to_compare():
             agreements(few)
 
 
-def loaded(k, capstan=0.0, friction=0.0):
+def loaded(k, channel="motor_current_a", gain=1.0, capstan=0.0, friction=0.0):
     """Ten seconds of a sine against a load: a cable with friction, and a drive with its own."""
     time_s = np.arange(10_000) / 1000
     w = 2 * np.pi * 0.3
@@ -66,7 +63,7 @@ def loaded(k, capstan=0.0, friction=0.0):
     way = np.tanh(speed / 0.02)
     spindle = RATIO * load * np.exp(capstan * way) + friction * way
     current = (spindle + 0.03 * way + 1e-3 * speed) / CONSTANT
-    noise = 1e-4 * RNG.normal(size=(3, time_s.size))
+    noise = 1e-4 * np.random.default_rng(k).normal(size=(3, time_s.size))
     columns = {
         "spindle_angle_rad": angle,
         "jaw_angle_rad": RATIO * angle,
@@ -75,21 +72,18 @@ def loaded(k, capstan=0.0, friction=0.0):
         "motor_current_a": current + noise[2],
         "motor_command_ratio": current / 2.0,
     }
+    columns[channel] = gain * columns[channel]
     return Recording(f"{k:03}", time_s, columns)
 
 
-def loaded_runs(channel="motor_current_a", gain=1.0, **kind):
-    made = [loaded(k, **kind) for k in range(6)]
-    return [run.with_columns(**{channel: gain * run[channel]}) for run in made]
+def loaded_runs(*kind, **more):
+    return [loaded(k, *kind, **more) for k in range(6)]
 
 
 def record(constant):
-    names = ("torque_constant_n_m_a", "friction_n_m", "damping_n_m_s_rad", "offset_n_m")
-    parameters = dict(zip(names, (constant, 0, 0, 0), strict=True))
-    fit = Fit("current", parameters, 1e-8 * np.eye(4), 1e-3, 900)
-    return CalibrationRecord(
-        "current", "spindle_torque_n_m", "motor_current_a", "2026-01-02T03:04:05+00:00", "A", fit
-    )
+    fit = Fit("current", {"torque_constant_n_m_a": constant}, 1e-8 * np.eye(1), 1e-3, 900)
+    names = ("current", "spindle_torque_n_m", "motor_current_a")
+    return CalibrationRecord(*names, "2026-01-02T03:04:05+00:00", "A", fit)
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.8, 1.25])

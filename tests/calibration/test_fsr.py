@@ -11,31 +11,30 @@ from calibration.fsr import FsrRun, fit_fsr, hysteresis_ratio, measure_creep
 from calibration.fsr_curve import ZHANG_2022, FsrCurve, FsrRangeError
 from calibration.quality import BadDataError
 
-COEFFICIENTS = np.array([0.105, 2.57, -4.63, 3.71])
 
-
-def press(seed, *, noise_n=0.005, top_v=0.98, width_n=0.0, n=400):
+def press(seed, *, noise_n=0.005, top_v=0.98, width_n=0.0):
     """A run that loads and unloads slowly; force on loading is `width_n` above unloading."""
     rng = np.random.default_rng(seed)
-    time = np.arange(n) * 0.01
+    time = np.arange(400) * 0.01
     phase = np.pi * (time / time[-1])
     volts = top_v * rng.uniform(0.97, 1.0) * np.sin(phase) ** 2
-    force = np.polynomial.polynomial.polyval(volts, COEFFICIENTS)
-    force += width_n * np.cos(phase) * np.sin(phase) + rng.normal(0, noise_n, n)
-    return FsrRun(f"press {seed}", time, volts, force)
+    force = ZHANG_2022.force_n(volts) + width_n * np.cos(phase) * np.sin(phase)
+    return FsrRun(f"press {seed}", time, volts, force + rng.normal(0, noise_n, 400))
 
 
 def presses(count=6, **changes):
     return [press(seed, **changes) for seed in range(count)]
 
 
+def kept(run, samples):
+    return FsrRun(run.name, run.time_s[samples], run.fsr_v[samples], run.force_n[samples])
+
+
 def test_the_papers_cubic_is_recovered_with_its_degree():
     result = fit_fsr(presses())
-    assert len(result.curve.coefficients) == 4
-    error = np.array(result.curve.coefficients) - COEFFICIENTS
+    error = np.abs(np.subtract(result.curve.coefficients, [0.105, 2.57, -4.63, 3.71]))
     deviation = np.sqrt(np.diag(result.curve.fit.covariance))
-    assert (np.abs(error) < 5 * deviation).all()
-    assert (np.abs(error) < 0.1).all()
+    assert (error < np.minimum(5 * deviation, 0.1)).all()
     assert result.held_out_rmse_n[3] < result.held_out_rmse_n[2]
     assert result.curve.fit.residual_rms == pytest.approx(0.005, rel=0.1)
 
@@ -62,11 +61,7 @@ def test_the_papers_cubic_is_refused_outside_0_to_1_v(volts):
 
 
 def test_a_curve_is_good_for_the_voltages_it_was_fitted_on():
-    pressed = [
-        FsrRun(r.name, r.time_s[keep], r.fsr_v[keep], r.force_n[keep])
-        for r in presses(top_v=0.6)
-        for keep in [r.fsr_v > 0.2]
-    ]
+    pressed = [kept(run, run.fsr_v > 0.2) for run in presses(top_v=0.6)]
     curve = fit_fsr(pressed).curve
     volts = np.concatenate([run.fsr_v for run in pressed])
     assert (curve.low_v, curve.high_v) == (volts.min(), volts.max())
@@ -82,19 +77,14 @@ def test_new_forces_lie_in_the_interval_as_often_as_it_says(seed):
     curve = fit_fsr(presses(), degree=3).curve
     new = press(seed, top_v=0.9)
     low, high = curve.interval_n(np.clip(new.fsr_v, curve.low_v, curve.high_v))
-    inside = (new.force_n >= low) & (new.force_n <= high)
-    assert inside.mean() > 0.93
+    assert np.mean((new.force_n >= low) & (new.force_n <= high)) > 0.93
 
 
 def test_hysteresis_is_measured():
     assert hysteresis_ratio(presses()) < 0.01
-    width = 0.2
-    span = 1.7
-    measured = hysteresis_ratio(presses(width_n=width))
-    # loading is above unloading by width * sin(2 phase), at most by the width
-    assert measured == pytest.approx(width / span, rel=0.25)
-    one_way = [replace(r, time_s=r.time_s[:200], fsr_v=r.fsr_v[:200], force_n=r.force_n[:200])
-               for r in presses(noise_n=0.0)]  # fmt: skip
+    # loading is above unloading by width * sin(2 phase), at most by the width; the span is 1.7 N
+    assert hysteresis_ratio(presses(width_n=0.2)) == pytest.approx(0.2 / 1.7, rel=0.25)
+    one_way = [kept(run, slice(200)) for run in presses(noise_n=0.0)]
     assert hysteresis_ratio(one_way) is None
 
 

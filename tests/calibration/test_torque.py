@@ -13,25 +13,19 @@ SLOPE, ZERO = 4e-5, 37.0
 CERTIFICATE_V_V = 350.0 / (4 * 60_400.0 + 2 * 350.0)
 
 
-def series(seed=0, *, noise=2.0, bend=0.0, hysteresis_n_m=0.0, drift_counts=0.0):
+def series(seed=0, *, bend=0.0, hysteresis_n_m=0.0, drift_counts=0.0):
     rng = np.random.default_rng(seed)
     torques = weight_torque_n_m(MASSES_KG, 0.05)
-    felt = torques + bend * torques * (torques.max() - torques)
-    felt = felt + hysteresis_n_m * np.where(np.diff(torques, prepend=0) < 0, 0.5, -0.5) * (
-        torques > 0
-    )
+    way = np.where(torques > 0, np.where(np.diff(torques, prepend=0) < 0, 0.5, -0.5), 0.0)
+    felt = torques + bend * torques * (torques.max() - torques) + hysteresis_n_m * way
     counts = felt / SLOPE + ZERO + np.linspace(0, drift_counts, len(torques))
-    return [
-        Step(float(t), np.round(c + rng.normal(0, noise, 400)))
-        for t, c in zip(torques, counts, strict=True)
-    ]
+    readings = np.round(counts[:, None] + rng.normal(0, 2.0, (len(counts), 400)))
+    return [Step(float(t), row) for t, row in zip(torques, readings, strict=True)]
 
 
-def shunted(seed=0, gain=1.0):
-    rng = np.random.default_rng(seed)
-    change = gain * CERTIFICATE_V_V * 2e6
-    rest = rng.normal(10, 2, 500)
-    return rest, rest[::-1] + change
+def shunted(gain=1.0):
+    rest = np.random.default_rng(0).normal(10, 2, 500)
+    return rest, rest[::-1] + gain * CERTIFICATE_V_V * 2e6
 
 
 def test_a_healthy_sensor_passes_its_shunt_check():
@@ -67,10 +61,9 @@ def test_the_line_is_recovered_and_its_covariance_is_right():
 
 def test_hysteresis_and_drift_are_measured():
     span = series()[5].torque_n_m
-    result = fit_torque(series(hysteresis_n_m=0.008 * span))
-    assert result.hysteresis == pytest.approx(0.008, abs=0.001)
-    result = fit_torque(series(drift_counts=20.0))
-    assert result.drift == pytest.approx(20 * SLOPE / span, abs=0.001)
+    loose, drifting = series(hysteresis_n_m=0.008 * span), series(drift_counts=20.0)
+    assert fit_torque(loose).hysteresis == pytest.approx(0.008, abs=0.001)
+    assert fit_torque(drifting).drift == pytest.approx(20 * SLOPE / span, abs=0.001)
 
 
 @pytest.mark.parametrize(
