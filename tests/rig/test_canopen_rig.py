@@ -28,8 +28,7 @@ from rig.recording.campaign import open_campaign_folder, record_campaign
 
 pytestmark = pytest.mark.integration
 
-ANGLE = np.linspace(-1.0, -0.8, 600)
-NO_LOAD = np.zeros(600)
+STILL = (np.full(3000, -1.04), np.zeros(3000))
 
 
 def config(**changes: object) -> Config:
@@ -38,8 +37,7 @@ def config(**changes: object) -> Config:
 
 def drive_of(link: LogicLink) -> Epos4Fake:
     """The fake at the far end of a simulated rig."""
-    bus = link._device._bus
-    (drive,) = bus._nodes
+    (drive,) = link._device._bus._nodes
     return drive
 
 
@@ -56,7 +54,7 @@ def test_the_spindle_follows_its_target_and_the_drive_ends_without_power(alone):
         next(session.rest(0.1))
         session.settle()
         start = session.spindle_angle_rad
-        readings = list(session.play(start + np.linspace(0, 0.2, 600), NO_LOAD))
+        readings = list(session.play(start + np.linspace(0, 0.2, 600), np.zeros(600)))
         assert drive_of(link).state is State.OPERATION_ENABLED
     setpoint = np.concatenate([r.setpoint for r in readings])
     assert np.array_equal(setpoint[setpoint >= 0], np.arange(600))
@@ -69,7 +67,6 @@ def test_the_spindle_follows_its_target_and_the_drive_ends_without_power(alone):
 def test_a_drive_that_was_left_in_force_is_disarmed_by_opening_it():
     drive = Epos4Fake()
     drive.state = State.OPERATION_ENABLED
-
     bus = SimulatedCanBus([drive])
     LogicLink(Epos4(bus), bus.url).close()
     assert drive.state is State.SWITCH_ON_DISABLED
@@ -78,7 +75,7 @@ def test_a_drive_that_was_left_in_force_is_disarmed_by_opening_it():
 def test_a_fault_of_the_drive_ends_the_session_in_its_own_words(alone):
     settings, link = alone
     with pytest.raises(DriveFaultError, match=r"2310"), Session(settings, link) as rig:  # noqa: PT012
-        for k, _ in enumerate(rig.play(np.full(3000, -1.04), np.zeros(3000))):
+        for k, _ in enumerate(rig.play(*STILL)):
             if k == 5:
                 drive_of(link).fail(0x2310, 2)
     assert drive_of(link).torque_n_m == 0
@@ -103,16 +100,15 @@ def test_the_guards_of_the_board_hold_here_too(change, message):
 
 
 def test_load_is_refused_before_anything_moves(alone):
-    with Session(*alone) as session:  # noqa: SIM117
-        with pytest.raises(SafetyTripError, match="load_command_a"):
-            next(session.play(ANGLE, np.full(600, 0.1)))
+    with pytest.raises(SafetyTripError, match="load_command_a"), Session(*alone) as session:
+        next(session.play(np.linspace(-1.0, -0.8, 600), np.full(600, 0.1)))
 
 
 def test_a_drive_that_falls_silent_is_missing_and_its_state_unknown(monkeypatch, alone):
     settings, link = alone
     unsafe = pytest.raises((SafetyTripError, DriverError), match=r"not confirm")
     with unsafe, Session(settings, link) as session:
-        for k, _ in enumerate(session.play(np.full(3000, -1.04), np.zeros(3000))):
+        for k, _ in enumerate(session.play(*STILL)):
             if k == 5:
                 monkeypatch.setattr(drive_of(link), "transmit", list)
 

@@ -101,12 +101,18 @@ def slow(batch: Batch) -> Batch:
     return replace(batch, time_s=batch.time_s * 1.1)
 
 
+def nothing(batch: Batch) -> Batch:
+    names = ("time_s", "sequence", "flags")
+    return replace(batch, columns={}, **{name: getattr(batch, name)[:0] for name in names})
+
+
 @pytest.mark.parametrize(
     ("change", "check", "level", "words"),
     [
         (stuck, "stuck", Level.WARNING, "proximal_count did not change"),
         (saturated, "saturation", Level.ERROR, "Saturated in"),
         (slow, "sample rate", Level.ERROR, "909.1 Hz"),
+        (nothing, "sample rate", Level.ERROR, "sends nothing"),
     ],
 )
 def test_what_a_stream_may_have(change, check, level, words):
@@ -117,51 +123,42 @@ def test_what_a_stream_may_have(change, check, level, words):
     assert finding.fix
 
 
-def test_a_device_that_sends_nothing_is_an_error():
-    def nothing(batch: Batch) -> Batch:
-        names = ("time_s", "sequence", "flags")
-        empty = {name: values[:0] for name, values in batch.columns.items()}
-        return replace(batch, columns=empty, **{name: getattr(batch, name)[:0] for name in names})
-
-    device = Changed(fakes()["usb520"](Faults()), nothing)
-    finding = by_check(device_findings("torque", lambda: device))["sample rate"]
-    assert finding.level is Level.ERROR
-    assert "sends nothing" in finding.what
-
-
-def computer(root: Path, rule: bool, modem_manager: bool) -> Path:
+def computer(root: Path, files: dict[str, str]) -> Path:
     """A file system as far as the doctor looks into one."""
-    process = root / "proc" / "42"
-    process.mkdir(parents=True)
-    (process / "comm").write_text("ModemManager\n" if modem_manager else "bash\n")
-    rules = root / "etc" / "udev" / "rules.d"
-    rules.mkdir(parents=True)
-    if rule:
-        (rules / "70-rig.rules").write_text(udev_rules())
+    for name, text in files.items():
+        (root / name).parent.mkdir(parents=True)
+        (root / name).write_text(text)
     return root
 
 
-@pytest.mark.parametrize(("rule", "modem_manager"), [(a, b) for a in (0, 1) for b in (0, 1)])
-def test_rules_and_modem_manager(tmp_path, rule, modem_manager):
-    device = tmp_path / "ttyACM0"
-    device.touch()
-    root = computer(tmp_path / "root", rule, modem_manager)
-    findings = by_check(port_findings([Port(str(device), "16c0:0483:123", "")], root))
+RULE = {"etc/udev/rules.d/70-rig.rules": udev_rules()}
+
+
+@pytest.fixture
+def port(tmp_path):
+    path = tmp_path / "ttyUSB7"
+    path.touch()
+    return Port(str(path), "16c0:0483:123", "")
+
+
+@pytest.mark.parametrize("modem_manager", [False, True])
+@pytest.mark.parametrize("rule", [{}, RULE])
+def test_rules_and_modem_manager(tmp_path, port, rule, modem_manager):
+    process = {"proc/42/comm": "ModemManager\n" if modem_manager else "bash\n"}
+    findings = by_check(port_findings([port], computer(tmp_path, rule | process)))
     assert ("udev rule" in findings) == (not rule)
     assert ("ModemManager" in findings) == (modem_manager and not rule)
     for finding in findings.values():
         assert finding.level is Level.OK or "rig udev | sudo tee" in finding.fix
+    other_peoples = Port("/dev/ttyS0", "", "")
+    assert port_findings([other_peoples], tmp_path) == []
 
 
-def test_who_holds_a_port_is_named(tmp_path):
-    device = tmp_path / "ttyACM0"
-    device.touch()
-    root = computer(tmp_path / "root", True, False)
-    port = Port(str(device), "16c0:0483:123", "")
-    with device.open() as held:
+def test_who_holds_a_port_is_named(tmp_path, port):
+    with Path(port.path).open() as held:
         holder = subprocess.Popen(["sleep", "60"], stdin=held)
     try:
-        finding = by_check(port_findings([port], root))["free"]
+        finding = by_check(port_findings([port], tmp_path))["free"]
     finally:
         holder.terminate()
         holder.wait()
@@ -169,18 +166,10 @@ def test_who_holds_a_port_is_named(tmp_path):
     assert finding.fix.endswith(f"kill -TERM {holder.pid}")
 
 
-def test_a_slow_ftdi_adapter_is_reported(tmp_path):
-    root = computer(tmp_path / "root", True, False)
-    timer = root / "sys/bus/usb-serial/devices/ttyUSB7/latency_timer"
-    timer.parent.mkdir(parents=True)
-    timer.write_text("16\n")
-    (tmp_path / "ttyUSB7").touch()
-    port = Port(str(tmp_path / "ttyUSB7"), "0403:6001:A1", "")
-    assert "16 ms" in by_check(port_findings([port], root))["latency"].what
-
-
-def test_other_peoples_ports_are_left_alone(tmp_path):
-    assert port_findings([Port("/dev/ttyS0", "", "")], computer(tmp_path, False, True)) == []
+def test_a_slow_ftdi_adapter_is_reported(tmp_path, port):
+    computer(tmp_path, {"sys/bus/usb-serial/devices/ttyUSB7/latency_timer": "16\n"})
+    ftdi = replace(port, usb="0403:6001:A1")
+    assert "16 ms" in by_check(port_findings([ftdi], tmp_path))["latency"].what
 
 
 def test_the_rules_name_every_device():
@@ -191,10 +180,8 @@ def test_the_rules_name_every_device():
 
 
 def test_can_interfaces_are_known_by_their_kind(tmp_path):
-    for name, kind in (("can0", "280"), ("eth0", "1")):
-        (tmp_path / "sys/class/net" / name).mkdir(parents=True)
-        (tmp_path / "sys/class/net" / name / "type").write_text(f"{kind}\n")
-    assert can_interfaces(tmp_path) == ["can0"]
+    kinds = {"sys/class/net/can0/type": "280\n", "sys/class/net/eth0/type": "1\n"}
+    assert can_interfaces(computer(tmp_path, kinds)) == ["can0"]
 
 
 def test_the_verbs_speak_to_machines(answered):

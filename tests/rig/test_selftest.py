@@ -25,6 +25,14 @@ from tests.rig.simulated import behind, simulated, transport
 pytestmark = pytest.mark.integration
 
 
+def all_pass(checks):
+    """Require that all checks pass; return how many there are."""
+    done = list(checks)
+    assert done
+    assert all(check.passed for check in done), [c for c in done if not c.passed]
+    return len(done)
+
+
 @pytest.mark.bench
 def test_the_bench_passes_its_acceptance_test():
     named = os.environ.get("RIG_BENCH")
@@ -32,25 +40,20 @@ def test_the_bench_passes_its_acceptance_test():
         pytest.skip("no bench: set RIG_BENCH to a configuration, as for `rig selftest -c`")
     config = load_config(Path(named))
     refuse_problems(config)
-    checks = list(selftest(config))
-    assert checks
-    assert all(check.passed for check in checks), [c for c in checks if not c.passed]
+    all_pass(selftest(config))
 
 
 @pytest.mark.parametrize("names", [("usb520", "ati-can", "amt21"), ("qia128", "ati-net", "epos4")])
 def test_the_simulated_rig_passes_with_every_kind_of_device(names, library):
     devices = {name.replace("-", "_"): {"driver": name, "url": "sim://"} for name in names}
     config = simulated(firmware=True).changed(devices=devices)
-    checks = list(selftest(config))
-    assert len(checks) == 9
-    assert all(check.passed for check in checks), [c for c in checks if not c.passed]
+    assert all_pass(selftest(config)) == 9
 
 
 @pytest.mark.parametrize("name", ["moteus_simulated", "dynamixel_simulated"])
 def test_the_shipped_drives_pass_and_turn(name, library):
     for checks in (selftest, commission):
-        done = list(checks(load_config(Path(name))))
-        assert all(check.passed for check in done), [c for c in done if not c.passed]
+        all_pass(checks(load_config(Path(name))))
 
 
 @pytest.fixture
@@ -132,10 +135,10 @@ class MiswiredBench:
         self._inner.advance_with_board(ticks, address, board_address, tick_us)
 
 
-def results(bench, monkeypatch, config=None):
-    link = SimulatedTransport(FirmwareBoard(bench), step_s=0.02)
+def commissioned(bench, monkeypatch, *start):
+    link = SimulatedTransport(FirmwareBoard(bench, *start), step_s=0.02)
     monkeypatch.setattr("rig.bench.logger.open_logger", lambda _: link)
-    return {check.name: check.passed for check in commission(config or simulated())}
+    return list(commission(simulated()))
 
 
 @pytest.mark.usefixtures("library")
@@ -159,8 +162,8 @@ def test_a_sound_rig_passes_both_ways(said):
 )
 def test_a_wrong_wire_is_named_and_the_shaft_hardly_turns(monkeypatch, factors, command, failed):
     bench = MiswiredBench(factors, command)
-    made = results(bench, monkeypatch)
-    assert [name for name, passed in made.items() if not passed] == [failed]
+    made = commissioned(bench, monkeypatch)
+    assert [check.name for check in made if not check.passed] == [failed]
     turned_rad = np.ptp(bench.spindle) * 2 * np.pi / 8192
     assert turned_rad < 2 * REACH_RAD
 
@@ -168,9 +171,7 @@ def test_a_wrong_wire_is_named_and_the_shaft_hardly_turns(monkeypatch, factors, 
 @pytest.mark.usefixtures("library")
 def test_a_board_without_zeros_does_not_move(monkeypatch):
     bench = MiswiredBench({})
-    link = SimulatedTransport(FirmwareBoard(bench, BoardStart(simulated=False)), step_s=0.02)
-    monkeypatch.setattr("rig.bench.logger.open_logger", lambda _: link)
-    *_, last = commission(simulated())
+    *_, last = commissioned(bench, monkeypatch, BoardStart(simulated=False))
     assert not last.passed
     assert "rig reference" in last.detail
     assert np.ptp(bench.spindle or [0]) < 5
