@@ -89,17 +89,7 @@ def test_diff_names_what_changed(rig, added, said):
     assert "slope 40 uN m a count" in said("cal list").out  # the name it had
 
 
-def test_a_record_is_shown_with_units_and_spread(rig, tmp_path, said):
-    folders = ("--out", tmp_path / "raw", "--store", tmp_path / "store")
-    said("calibrate current --sim --yes --operator Ada", *folders)
-    (digest,) = (r.content_hash for r in CalibrationStore(tmp_path / "store").records()
-                 if r.channel == "spindle_torque_n_m")  # fmt: skip
-    shown = said("calibrate show", digest).out
-    assert re.search(r"torque_constant_n_m_a: 8\d\d\.\d mN m/A \+- ", shown)
-    assert "covariance" not in shown
-
-
-def test_records_of_the_simulated_rig_are_listed_by_their_gains_and_found(
+def test_records_of_the_simulated_rig_are_listed_by_their_gains_found_and_shown_with_units(
     rig, monkeypatch, tmp_path, said
 ):
     monkeypatch.chdir(tmp_path)
@@ -114,7 +104,9 @@ def test_records_of_the_simulated_rig_are_listed_by_their_gains_and_found(
     constant, gain = sorted(lines[1:3], key=lambda line: "motor_current_a" in line)
     assert re.search(r"SIM-TOOL-1: torque_constant_n_m_a 8\d\d\.\d mN m/A", constant)
     assert re.search(r": gain_a 2\.\d+ A", gain)
-    said("calibrate show", constant.split()[1])
+    shown = said("calibrate show", constant.split()[1]).out
+    assert re.search(r"torque_constant_n_m_a: 8\d\d\.\d mN m/A \+- ", shown)
+    assert "covariance" not in shown
     said("calibrate use", constant.split()[1], "--by Ada")
     assert not (tmp_path / "store").exists()
 

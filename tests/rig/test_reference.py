@@ -117,34 +117,13 @@ def test_a_board_without_reference_moves_only_gently(library):
     assert not host.samples()["status"][-1] & STATUS_REFERENCED
 
 
-class BoardThatIsReset:
-    """Implements `drivers.transport.simulated.Board`: a board, and another start of it later."""
-
-    def __init__(self, library: Path, reset_at_tick: int) -> None:
-        self._bench, self._library = SimulatedBench(), library
-        self._board = FirmwareBoard(self._bench, BoardStart(boot=4), library)
-        self._left = reset_at_tick
-
-    def receive(self, data: bytes) -> None:
-        self._board.receive(data)
-
-    def transmit(self) -> bytes:
-        return self._board.transmit()
-
-    def advance(self, ticks: int) -> None:
-        if 0 < self._left <= ticks:
-            self._board = FirmwareBoard(
-                self._bench, BoardStart(boot=5, simulated=False), self._library
-            )
-        self._left -= ticks
-        self._board.advance(ticks)
-
-
 def test_a_session_detects_that_its_board_was_reset_and_reports_what_to_do(library):
-    link = SimulatedTransport(BoardThatIsReset(library, 800), "sim://")
+    bench = SimulatedBench()
+    link = SimulatedTransport(FirmwareBoard(bench, BoardStart(boot=4), library), "sim://")
     with Session(simulated(), link) as session:
         assert session.board["board_start"] == "4"
-        readings = session.rest(5.0)
+        next(session.rest(0.5))
+        link.board = FirmwareBoard(bench, BoardStart(boot=5, simulated=False), library)
         with pytest.raises(BoardResetError, match="rig reference") as caught:
-            list(readings)
+            list(session.rest(5.0))
     assert "is 5 and was 4" in caught.value.why
