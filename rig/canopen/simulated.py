@@ -17,13 +17,8 @@ from rig.logic.link import LogicLink
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.logger import plant_and_sensors
 
-_TICK = ctypes.CFUNCTYPE(
-    None,
-    ctypes.c_void_p,
-    ctypes.c_uint32,
-    ctypes.POINTER(ctypes.c_int32),
-    ctypes.POINTER(ctypes.c_int32),
-)
+_COUNTS = ctypes.POINTER(ctypes.c_int32)
+_TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, _COUNTS, _COUNTS)
 
 
 class PlantMotor:
@@ -53,29 +48,27 @@ class PlantMotor:
 
 def open_simulated_canopen(config: Config) -> LogicLink:
     """Return the link to the logic of a simulated CANopen rig, in virtual time."""
-    options = {"node_id": 1, **config.logger.options}
     bus = open_simulated_bus(config)
-    return LogicLink(Epos4(bus, **options), bus.url)
+    return LogicLink(Epos4(bus, **{"node_id": 1, **config.logger.options}), bus.url)
 
 
 def open_simulated_bus(config: Config) -> CanBus:
     """Return the host's place on a bus with a drive's fake, in virtual time."""
-    node_id = config.logger.options.get("node_id", 1)
-    return SimulatedCanBus([_drive(config, node_id)], "sim://epos4")
+    return SimulatedCanBus([_drive(config)], "sim://epos4")
 
 
 def open_live_bus(config: Config) -> CanBus:
     """Return the host's place on a virtual bus of python-can with a drive's fake, in real time."""
     channel = f"can:virtual:rig-{os.getpid()}"
-    drive = _drive(config, config.logger.options.get("node_id", 1))
+    drive = _drive(config)
     drive.advance(1)  # the plant is compiled the first time, which takes longer than a drive may
     return LiveCanBus(open_can(channel), open_can(channel), [drive])
 
 
-def _drive(config: Config, node_id: int) -> Epos4Fake:
+def _drive(config: Config) -> Epos4Fake:
     """Return the drive's fake with the plant as its motor."""
     plant, sensors, effects = plant_and_sensors(config.simulation)
     bench = SimulatedBench(plant, sensors, effects, config.simulation.seed)
     constant = round(plant.torque_constant_n_m_a * 1e6)
     objects = {(0x3001, 5): constant, (0x6076, 0): constant * 700 // 1000}
-    return Epos4Fake(node_id, PlantMotor(bench), objects)
+    return Epos4Fake(config.logger.options.get("node_id", 1), PlantMotor(bench), objects)

@@ -20,14 +20,7 @@ stops. `rig selftest --bench` prints this list after its own checks; keep it wit
 
 @dataclass(frozen=True, slots=True)
 class BenchTest:
-    """One test for a person with a bench.
-
-    Attributes:
-        name: Its name.
-        why: Why nothing else shows it.
-        do: What to do.
-        shows: What it must show.
-    """
+    """One test for a person with a bench: why nothing else shows it, what to do, what it shows."""
 
     name: str
     why: str

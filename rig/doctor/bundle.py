@@ -32,12 +32,7 @@ TOKEN = re.compile(r"(?i)\b(token|password|passwd|secret|key)(=|\"?: ?\"?)[^\s\"
 
 
 def write_bundle(path: Path, settings: Config, findings: Sequence[Finding]) -> list[str]:
-    """Write the archive; returns the names of the files in it.
-
-    Args:
-        path: Archive to write, `.zip`.
-        settings: Configuration of the rig.
-        findings: Result of the examination.
+    """Write the archive, `.zip`; returns the names of the files in it.
 
     Raises:
         OutputError: The archive cannot be written.

@@ -1,9 +1,9 @@
 """From a wired bench to its first motion: every sensor must answer a small current the right way.
 
 The position loop is kept out: its gain makes the command a constant pulse, whose size is its limit.
-The pulses grow until the shaft turns and end with it; each is ended by the board itself,
-whose queue runs dry. A shaft that turns the wrong way, or an
-encoder that counts the wrong way, is then a sentence and not a run-away.
+The pulses grow until the shaft turns and end with it; each is ended by the board itself, whose
+queue runs dry. A shaft that turns, or an encoder that counts, the wrong way is then a sentence and
+not a run-away.
 """
 
 from collections.abc import Iterator
@@ -120,13 +120,10 @@ def _first_turn(bench: "_Bench", closing: int) -> Iterator[Check]:
     if current is not None:
         yield current
     turned = max(map(abs, pulse.change.values()), default=0.0) >= TURNED_RAD
-    yield Check(
-        f"the shaft turns, {word}",
-        turned,
-        f"at {abs(100 * pulse.ratio):g}% of a full command"
-        if turned
-        else f"not up to {abs(100 * pulse.ratio):g}%: supply, enable, set value or a blocked shaft",
-    )
+    percent = f"{abs(100 * pulse.ratio):g}%"
+    blocked = f"not up to {percent}: supply, enable, set value or a blocked shaft"
+    detail = f"at {percent} of a full command" if turned else blocked
+    yield Check(f"the shaft turns, {word}", turned, detail)
     for name, change in pulse.change.items() if turned else ():
         seen = change * closing
         fault = "counts nothing" if abs(change) < SEEN_RAD else "counts the wrong way: swap A and B"
@@ -140,12 +137,9 @@ def _judge_current(bench: "_Bench", pulse: Pulse, word: str) -> Check | None:
         return None
     asked_a = pulse.ratio * bench.config.plausibility.command_full_scale_a
     good = pulse.current_a / asked_a >= CURRENT_SHARE
-    return Check(
-        f"the measured current follows the command, {word}",
-        good,
-        f"{pulse.current_a:+.3f} A of {asked_a:+.3f} A"
-        + ("" if good else "; look at enable, the direction line and the read-back"),
-    )
+    look = "" if good else "; look at enable, the direction line and the read-back"
+    detail = f"{pulse.current_a:+.3f} A of {asked_a:+.3f} A{look}"
+    return Check(f"the measured current follows the command, {word}", good, detail)
 
 
 class _Bench:

@@ -1,7 +1,6 @@
 """The whole examination: configuration, ports, every device, the firmware."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 from drivers.errors import DriverError
 from drivers.registry import broken_drivers
@@ -14,18 +13,13 @@ from rig.bench.trips import WORDS
 from rig.configuration.check import problems
 from rig.configuration.config import Config
 from rig.doctor.finding import Finding, Level
-from rig.doctor.ports import ROOT, port_findings, serial_ports
+from rig.doctor.ports import port_findings, serial_ports
 from rig.doctor.stream import device_findings
 from rig.machines.choose import machine_of
 
 
-def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
-    """Yield findings as they are made.
-
-    Args:
-        config: The expected configuration.
-        root: Root of the file system, for the files of the operating system.
-    """
+def examine(config: Config) -> Iterator[Finding]:
+    """Yield the findings on the rig of a configuration as they are made."""
     wrong = problems(config) or limit_problems(config)
     for problem in wrong:
         yield Finding("configuration", problem.key, Level.ERROR, problem.what, problem.fix)
@@ -33,18 +27,17 @@ def examine(config: Config, root: Path = ROOT) -> Iterator[Finding]:
         yield Finding("configuration", "sound", Level.OK, f"{config.name} is sound.")
     for driver, error in broken_drivers().items():
         yield Finding("drivers", driver, Level.WARNING, error.what, error.fix)
-    yield from port_findings(serial_ports(), root)
+    yield from port_findings(serial_ports())
     if wrong:
         return  # it would be opened as it must not be
     for name, open_it in openers(config):
         yield from device_findings(name, open_it)
     if config.logger.driver != "epos4" and config.logger.profile != SENSOR:
-        yield from board_findings(config)
+        yield from _board_findings(config)
 
 
-def board_findings(config: Config) -> Iterator[Finding]:
+def _board_findings(config: Config) -> Iterator[Finding]:
     """Yield whether the logger board may be armed: its zeros, and what it tripped over."""
-    name = "logger"
     try:
         with TeensyLogger(open_logger(config), machine_of(config).profile) as logger:
             identity = logger.identify()
@@ -53,7 +46,7 @@ def board_findings(config: Config) -> Iterator[Finding]:
         return  # reported with the device
     if not identity.referenced:
         what = "The encoders have no zeros: the board was restarted, or an encoder was doubted."
-        yield Finding(name, "referenced", Level.WARNING, what, "Run: rig reference")
+        yield Finding("logger", "referenced", Level.WARNING, what, "Run: rig reference")
     if trip is not Trip.NONE:
         what, fix = WORDS[trip]
-        yield Finding(name, "tripped", Level.WARNING, f"{what}.", f"{fix} Then run: rig clear")
+        yield Finding("logger", "tripped", Level.WARNING, f"{what}.", f"{fix} Then run: rig clear")

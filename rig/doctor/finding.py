@@ -19,8 +19,6 @@ class Finding:
 
     Attributes:
         subject: Subject of the check: a device, a port, the computer.
-        check: The check.
-        level: Whether it is in order.
         what: Finding, with numbers.
         fix: Action or next command; empty if none is needed.
     """

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +20,6 @@ class Port:
     """One serial port.
 
     Attributes:
-        path: Device path.
         usb: `VID:PID:SERIAL`, hexadecimal; empty where it is not on USB.
         name: Name reported by the device.
     """
@@ -33,16 +33,13 @@ def serial_ports() -> list[Port]:
     """Return the serial ports of this computer."""
     from serial.tools import list_ports
 
-    return [
-        Port(
-            str(port.device),
-            f"{port.vid:04x}:{port.pid:04x}:{port.serial_number or ''}"
-            if port.vid is not None and port.pid is not None
-            else "",
-            str(port.description or ""),
-        )
-        for port in sorted(list_ports.comports(), key=lambda found: str(found.device))
-    ]
+    ports = []
+    for port in sorted(list_ports.comports(), key=lambda found: str(found.device)):
+        usb = ""
+        if port.vid is not None and port.pid is not None:
+            usb = f"{port.vid:04x}:{port.pid:04x}:{port.serial_number or ''}"
+        ports.append(Port(str(port.device), usb, str(port.description or "")))
+    return ports
 
 
 def can_interfaces(root: Path = ROOT) -> list[str]:
@@ -95,10 +92,8 @@ def _latency_findings(port: Port, root: Path) -> list[Finding]:
 
 
 def _runs(name: str, root: Path) -> bool:
-    def is_it(comm: Path) -> bool:
-        try:
-            return comm.read_text().strip() == name
-        except OSError:
-            return False  # ended meanwhile
-
-    return any(is_it(comm) for comm in (root / "proc").glob("[0-9]*/comm"))
+    for comm in (root / "proc").glob("[0-9]*/comm"):
+        with suppress(OSError):  # ended meanwhile
+            if comm.read_text().strip() == name:
+                return True
+    return False

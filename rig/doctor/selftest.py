@@ -25,16 +25,13 @@ SETTLE_S = 0.2
 LATEST_TRIP_S, LATEST_TRIP_SAMPLES = 0.002, 2
 """A board may trip so late, s; the logic of a slow drive, run once a sample, so many samples."""
 
+BoardCheck = Callable[[TeensyLogger, Config], tuple[bool, str]]
+"""Whether it passed, and the detail."""
+
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Result of one check.
-
-    Attributes:
-        name: Name of the check.
-        passed: Whether it holds.
-        detail: Numbers, or what went wrong.
-    """
+    """Result of one check; the detail is numbers, or what went wrong."""
 
     name: str
     passed: bool
@@ -55,9 +52,7 @@ def selftest(config: Config) -> Iterator[Check]:
         yield _on_the_board(name, check, config)
 
 
-def _on_the_board(
-    name: str, check: Callable[[TeensyLogger, Config], tuple[bool, str]], config: Config
-) -> Check:
+def _on_the_board(name: str, check: BoardCheck, config: Config) -> Check:
     try:
         with held_logger(config) as logger:
             logger.identify()
@@ -117,7 +112,7 @@ def _stop(logger: TeensyLogger, config: Config) -> tuple[bool, str]:
     return not status & STATUS_ARMED, f"status {status:#06x} read back after disarming"
 
 
-BOARD_CHECKS: dict[str, Callable[[TeensyLogger, Config], tuple[bool, str]]] = {
+BOARD_CHECKS: dict[str, BoardCheck] = {
     "zeros stay where they are": _zero_drift,
     "the board trips at a travel limit": _travel_limit,
     "the board refuses a setpoint beyond the travel": _setpoint_limit,

@@ -20,12 +20,7 @@ COMMANDED = "command_"
 
 
 def device_findings(name: str, open_it: Callable[[], Device]) -> list[Finding]:
-    """Open a device, read its stream for a second, and report its faults.
-
-    Args:
-        name: Name of the device in the configuration.
-        open_it: Opens it; it is closed again.
-    """
+    """Open a device of the configuration, read its stream for a second, and report its faults."""
     try:
         device = open_it()
     except DriverError as error:

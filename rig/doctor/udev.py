@@ -1,5 +1,6 @@
 """The udev rules that give the user the rig's USB devices and keep ModemManager off them."""
 
+from contextlib import suppress
 from pathlib import Path
 
 RULES_FILE = "70-rig.rules"
@@ -38,23 +39,11 @@ def udev_rules() -> str:
 
 
 def has_rule(identity: str, root: Path = Path("/")) -> bool:
-    """Whether any installed rule names a USB identity `VID:PID` and keeps ModemManager off.
-
-    Args:
-        identity: Vendor and product, hexadecimal.
-        root: Root of the file system.
-    """
+    """Whether any installed rule names a USB identity `VID:PID` and keeps ModemManager off."""
     vendor = identity.split(":")[0].lower()
-    return any(
-        vendor in text and "id_mm_device_ignore" in text
-        for folder in _FOLDERS
-        for path in (root / folder).glob("*.rules")
-        for text in [_text(path)]
-    )
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(errors="replace").lower()
-    except OSError:
-        return ""
+    for path in (path for folder in _FOLDERS for path in (root / folder).glob("*.rules")):
+        with suppress(OSError):
+            text = path.read_text(errors="replace").lower()
+            if vendor in text and "id_mm_device_ignore" in text:
+                return True
+    return False

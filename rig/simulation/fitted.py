@@ -25,35 +25,34 @@ gear is wound up. Here all of it is plain friction of the spindle that changes s
 """
 
 
-def plant_of(models: Iterable[Model], start: PlantParameters = DECLARED_PLANT) -> PlantParameters:
-    """Return the plant that corresponds to the fitted models.
+def plant_of(models: Iterable[Model]) -> PlantParameters:
+    """Return the plant that corresponds to the fitted models; the rest is `DECLARED_PLANT`'s.
 
-    Other parameters keep their values. All losses of the cable's equation are at the spindle.
+    All losses of the cable's equation are at the spindle.
 
     Args:
         models: Fitted models of the equations `motor`, `gearbox`, `cable` and `stretch`; any of
             them may be missing, others are ignored.
-        start: Plant with the values of all other parameters.
 
     Raises:
         NotFittedError: A parameter has no value.
         DataError: A value makes no plant, such as a negative stiffness.
     """
     by_balance = {model.balance: model for model in models}
-    plant = replace(start, gear_ratio=_gear_ratio(by_balance.values(), start.gear_ratio))
+    plant = replace(DECLARED_PLANT, gear_ratio=_gear_ratio(by_balance.values()))
     for balance, change in _READ.items():
         if balance in by_balance:
             plant = change(by_balance[balance], plant)
     return plant
 
 
-def _gear_ratio(models: Iterable[Model], usual: float) -> float:
+def _gear_ratio(models: Iterable[Model]) -> float:
     """Return the ratio of the gearbox of the models' machine; the usual one if none has it."""
     for model in models:
         bend = model.signals.combination("gearbox_differential_rad")
         if bend is not None and (gain := bend.gain("motor_angle_rad")) > 0.0:
             return 1.0 / gain
-    return usual
+    return DECLARED_PLANT.gear_ratio
 
 
 def _with_motor(model: Model, plant: PlantParameters) -> PlantParameters:
@@ -61,10 +60,12 @@ def _with_motor(model: Model, plant: PlantParameters) -> PlantParameters:
 
     The sensor carries the drive unit, so the rotor's inertia acts on it ratio - 1 times.
     """
-    ratio = plant.gear_ratio
+    ratio, gain = plant.gear_ratio, _amplitude(model, "motor.torque_constant", "gain", math.nan)
+    if not gain > 0.0:
+        raise DataError(f"The model {model.name!r} makes no plant: its torque constant is {gain}.")
     return replace(
         plant,
-        torque_constant_n_m_a=_torque_constant(model) / ratio,
+        torque_constant_n_m_a=gain / ratio,
         rotor_inertia_kg_m2=max(
             _amplitude(model, "inertia.missing", "inertia", 0.0) / (ratio - 1.0),
             0.2 * plant.rotor_inertia_kg_m2,
@@ -80,8 +81,7 @@ def _with_gearbox(model: Model, plant: PlantParameters) -> PlantParameters:
     slope = _slope(model, ("proximal_torque", "gearbox_differential"))
     if slope is None:
         return plant
-    stiffness = 1.0 / slope if model.unit == "rad" else slope
-    return replace(plant, gear_stiffness_n_m_rad=stiffness)
+    return replace(plant, gear_stiffness_n_m_rad=1.0 / slope if model.unit == "rad" else slope)
 
 
 def _with_stretch(model: Model, plant: PlantParameters) -> PlantParameters:
@@ -104,22 +104,23 @@ def _with_cable(model: Model, plant: PlantParameters) -> PlantParameters:
     Its ratio of torques is ignored: a plant has one ratio, that of the angles, and a loss that
     makes the torques' differ is not part of the declared model.
     """
-    ratio, changed = plant.cable_ratio, plant
+    own = {
+        "spindle_friction_n_m": _amplitude(
+            model, "friction.coulomb", "friction", plant.spindle_friction_n_m
+        ),
+        "spindle_creep_speed_rad_s": _width(model, plant.spindle_creep_speed_rad_s, plant),
+    }
     viscous = _term(model, "friction.viscous")
     if viscous is not None:
-        damping = viscous.values["damping"].value * _per_spindle(viscous, "speed", changed)
-        changed = replace(changed, spindle_viscous_n_m_s_rad=damping)
+        damping = viscous.values["damping"].value * _per_spindle(viscous, "speed", plant)
+        own["spindle_viscous_n_m_s_rad"] = damping
     inertia = _term(model, "inertia.missing")
     if inertia is not None:
-        total = inertia.values["inertia"].value * _per_spindle(inertia, "acceleration", changed)
-        others = (
-            plant.gear_ratio * plant.rotor_inertia_kg_m2 + ratio * ratio * plant.jaw_inertia_kg_m2
-        )
-        own = max(total - others, 0.25 * plant.spindle_inertia_kg_m2)
-        changed = replace(changed, spindle_inertia_kg_m2=own)
-    friction = _amplitude(model, "friction.coulomb", "friction", plant.spindle_friction_n_m)
-    width = _width(model, changed.spindle_creep_speed_rad_s, changed)
-    return replace(changed, spindle_friction_n_m=friction, spindle_creep_speed_rad_s=width)
+        total = inertia.values["inertia"].value * _per_spindle(inertia, "acceleration", plant)
+        jaw = plant.cable_ratio * plant.cable_ratio * plant.jaw_inertia_kg_m2
+        others = plant.gear_ratio * plant.rotor_inertia_kg_m2 + jaw
+        own["spindle_inertia_kg_m2"] = max(total - others, 0.25 * plant.spindle_inertia_kg_m2)
+    return replace(plant, **own)
 
 
 def _term(model: Model, effect: str) -> Term | None:
@@ -132,13 +133,6 @@ def _amplitude(model: Model, effect: str, name: str, missing: float) -> float:
         return missing
     place = [p.name for p in term.effect.amplitudes].index(name)
     return term.numbers(term.effect.amplitudes)[place]
-
-
-def _torque_constant(model: Model) -> float:
-    value = _amplitude(model, "motor.torque_constant", "gain", math.nan)
-    if not value > 0.0:
-        raise DataError(f"The model {model.name!r} makes no plant: its torque constant is {value}.")
-    return value
 
 
 def _slope(model: Model, words: Sequence[str], side: int = 1) -> float | None:

@@ -24,7 +24,7 @@ def press_force_n(profile: str, top_n: float, duration_s: float, seed: int) -> F
     """Return the force of a press at 1 kHz, shape (n,).
 
     Args:
-        profile: `ramp` (up and down once), `triangle` (twice) or `hold` (on, then constant).
+        profile: `ramp` (up and down once) or `hold` (on, then constant).
         top_n: Greatest force.
         duration_s: Length.
         seed: Seed of how unsteady the hand is; a hold is by a weight and steady.
@@ -33,8 +33,7 @@ def press_force_n(profile: str, top_n: float, duration_s: float, seed: int) -> F
     if profile == "hold":
         return np.asarray(top_n * np.minimum(t / 0.2, 1.0))
     random = np.random.default_rng(seed)
-    times = 2 if profile == "triangle" else 1
-    raised = 0.5 - 0.5 * np.cos(2 * np.pi * times * np.minimum(t / (duration_s - 1.0), 1.0))
+    raised = 0.5 - 0.5 * np.cos(2 * np.pi * np.minimum(t / (duration_s - 1.0), 1.0))
     tremor = 1.0 + 0.02 * np.sin(2 * np.pi * (random.uniform(0.8, 1.6) * t + random.uniform()))
     return np.asarray(top_n * random.uniform(0.97, 1.0) * raised * tremor)
 
