@@ -42,9 +42,7 @@ class Agreement:
 
     Attributes:
         encoder: Its name, a key of `VERIFIED`.
-        channel: Its channel.
         reference: Channel of the encoder it is compared with.
-        runs: Number of runs.
         scale: Slope over the nominal ratio; 1 if both agree.
         scale_uncertainty: Expanded uncertainty of it, two standard deviations of the mean of runs.
         offset_rad: Angle where the reference is at zero.
@@ -78,10 +76,7 @@ class Agreement:
 
 
 def agreements(recordings: Iterable[Recording]) -> list[Agreement]:
-    """Return each encoder of recordings against its reference.
-
-    Args:
-        recordings: Runs with motion of the same rig.
+    """Return each encoder of runs with motion of one rig against its reference.
 
     Raises:
         NoPairError: No two encoders are in three runs that move.

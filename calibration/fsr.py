@@ -35,7 +35,6 @@ class FsrRun:
     """One run of pressing the sensor on the force sensor.
 
     Attributes:
-        name: Name of the run.
         time_s: Time, shape (n,), rising.
         fsr_v: Amplified voltage, shape (n,).
         force_n: Reference force, shape (n,).
@@ -59,7 +58,6 @@ class FsrResult:
     """A fitted curve and what was measured on the way.
 
     Attributes:
-        curve: The curve.
         held_out_rmse_n: Degree to the error on runs left out, N; only of monotone degrees.
         hysteresis: Greatest force on loading less that on unloading at one voltage, over the span
             of force; None where the runs do not go both ways.

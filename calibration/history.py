@@ -18,9 +18,6 @@ class Change:
     """One parameter in two calibrations.
 
     Attributes:
-        parameter: Its name.
-        earlier: Value before.
-        now: Value now.
         uncertainty: Expanded uncertainty of the difference, or None where a record states none.
     """
 
@@ -47,12 +44,7 @@ class Change:
 def earlier_ones(
     record: CalibrationRecord, records: Iterable[CalibrationRecord]
 ) -> list[CalibrationRecord]:
-    """Return the latest calibrations of the same sensor before a record, the newest first.
-
-    Args:
-        record: The calibration.
-        records: All that are stored.
-    """
+    """Return the latest calibrations of the same sensor before a record, the newest first."""
     same = [
         one
         for one in records

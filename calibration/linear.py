@@ -55,7 +55,6 @@ class CalibrationSet:
     """The calibrations of every channel of a rig.
 
     Attributes:
-        name: Name of the set.
         channels: SI channel to its line.
     """
 

@@ -66,9 +66,7 @@ class Result:
     """One calibration that came out.
 
     Attributes:
-        channel: SI channel it gives.
         input: Raw counts field or channel it reads.
-        fit: The fit.
         low: Least input it was measured at; None if it has no range.
         high: Greatest input.
         tared: Whether the zero is measured again before each run.
@@ -102,9 +100,7 @@ class Conclusion:
     """Result of a session.
 
     Attributes:
-        results: The calibrations.
         found: Other numbers that were measured on the way, and words on what was not.
-        residuals: For the figure.
     """
 
     results: tuple[Result, ...]

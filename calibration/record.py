@@ -133,8 +133,6 @@ class CalibrationRecord:
         input: Raw counts field or channel it reads.
         made_at: When, ISO 8601 with the offset from UTC.
         operator: Who did it.
-        fit: The result.
-        validity: Range and age.
         instrument: Serial number of the instrument it holds for; empty if it holds for any.
         serials: Device to serial number.
         firmware_hash: CRC-32 of the sources of the firmware behind the raw log; empty if none was,
@@ -143,7 +141,6 @@ class CalibrationRecord:
         code_version: Version of the code that fitted it.
         tared: Whether the zero is measured again before each run.
         figure_svg: Residual figure as SVG text; empty if there is none.
-        notes: Operator's notes.
     """
 
     kind: str
@@ -229,28 +226,16 @@ class CalibrationRecord:
         )
 
 
-def record_of_line(
-    line: LinearCalibration, *, kind: str, made_at: str, operator: str, **rest: Any
-) -> CalibrationRecord:
+def record_of_line(line: LinearCalibration, **rest: Any) -> CalibrationRecord:
     """Return the record of a line whose numbers come from a certificate or a datasheet.
 
     Args:
         line: The line.
-        kind: Kind of calibration.
-        made_at: When it was made.
-        operator: Who vouches for it.
-        rest: Other fields of the record.
+        rest: The other fields of the record: `kind`, `made_at`, `operator` and more.
     """
-    parameters = {"slope": line.slope, "zero": line.zero_counts}
-    return CalibrationRecord(
-        kind=kind,
-        channel=line.channel,
-        input=line.counts,
-        made_at=made_at,
-        operator=operator,
-        fit=Fit(LINE, parameters),
-        **{"notes": line.source, "tared": line.tared, **rest},
-    )
+    fit = Fit(LINE, {"slope": line.slope, "zero": line.zero_counts})
+    own = {"notes": line.source, "tared": line.tared, **rest}
+    return CalibrationRecord(channel=line.channel, input=line.counts, fit=fit, **own)
 
 
 def _time(text: str) -> datetime:

@@ -1,6 +1,5 @@
 """Rules for the use of a calibration record: stale, foreign, changed, out of range."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from calibration.errors import CalibrationError
-from calibration.record import LINE, CalibrationRecord
+from calibration.record import LINE, CalibrationRecord, RawFile
 
 STALE_FACTOR = 2.0
 """A record is a warning past its days, and an error past this many times its days."""
@@ -31,9 +30,7 @@ class Verdict:
         rule: `stale`, `future`, `foreign_serial`, `unknown_serial`, `raw_missing`, `raw_changed`
             or `out_of_range`.
         is_error: Whether it must not be used; otherwise it is a warning.
-        message: In words.
         record: Hash of the record.
-        channel: Its channel.
     """
 
     rule: str
@@ -46,46 +43,36 @@ class Verdict:
 def judge(
     record: CalibrationRecord, now: datetime, serials: Mapping[str, str] | None = None
 ) -> list[Verdict]:
-    """Return the objections to using a record now on these devices; empty if there are none.
+    """Return the objections to using a record now, with its offset from UTC, on these devices.
 
     Stale is a warning, and an error past twice the days. A serial number that differs is an error,
-    one that the configuration does not state is a warning.
-
-    Args:
-        record: The record.
-        now: Time of use, with its offset from UTC.
-        serials: Device to the serial number of the one on the rig.
+    one that the configuration (device to serial number) does not state is a warning.
     """
-    said = [*_age(record, now)]
+    said = _age(record, now)
     for device, serial in sorted(record.serials.items()):
         here = (serials or {}).get(device)
         if here is None:
             said.append(("unknown_serial", False, f"made on {device} {serial}, here unknown"))
         elif here != serial:
             said.append(("foreign_serial", True, f"made on {device} {serial}, here is {here}"))
-    return [_verdict(record, *one) for one in said]
+    return _verdicts(record, said)
 
 
 def judge_raw(record: CalibrationRecord) -> list[Verdict]:
     """Return whether the files a record was made from are still there and the same."""
-    verdicts = []
+    said = []
     for file in record.raw:
-        path = Path(file.path)
-        if not path.is_file():
-            verdicts.append(_verdict(record, "raw_missing", False, f"{path} is not there any more"))
-        elif hashlib.sha256(path.read_bytes()).hexdigest() != file.sha256:
-            verdicts.append(_verdict(record, "raw_changed", True, f"{path} has changed since"))
-    return verdicts
+        if not Path(file.path).is_file():
+            said.append(("raw_missing", False, f"{file.path} is not there any more"))
+        elif RawFile.of(Path(file.path)).sha256 != file.sha256:
+            said.append(("raw_changed", True, f"{file.path} has changed since"))
+    return _verdicts(record, said)
 
 
 def judge_range(record: CalibrationRecord, values: ArrayLike) -> list[Verdict]:
-    """Return whether inputs lie outside the calibrated range.
+    """Return whether inputs, any shape, lie outside the calibrated range.
 
     Beyond it a line is a warning, since it goes on as it was; any other form is an error.
-
-    Args:
-        record: The record.
-        values: Inputs, any shape.
     """
     inputs = np.asarray(values, dtype=np.float64)
     low = -np.inf if record.validity.low is None else record.validity.low
@@ -97,7 +84,7 @@ def judge_range(record: CalibrationRecord, values: ArrayLike) -> list[Verdict]:
         f"{int(outside.sum())} of {inputs.size} values of {record.input} are outside "
         f"{low:g} .. {high:g}; they go from {inputs.min():g} to {inputs.max():g}"
     )
-    return [_verdict(record, "out_of_range", record.fit.form != LINE, message)]
+    return _verdicts(record, [("out_of_range", record.fit.form != LINE, message)])
 
 
 def refuse_errors(verdicts: list[Verdict]) -> list[Verdict]:
@@ -126,5 +113,5 @@ def _age(record: CalibrationRecord, now: datetime) -> list[tuple[str, bool, str]
     return [("stale", days > STALE_FACTOR * limit, f"{days:.0f} days old, good for {limit:g}")]
 
 
-def _verdict(record: CalibrationRecord, rule: str, is_error: bool, message: str) -> Verdict:
-    return Verdict(rule, is_error, message, record.content_hash, record.channel)
+def _verdicts(record: CalibrationRecord, said: list[tuple[str, bool, str]]) -> list[Verdict]:
+    return [Verdict(*one, record.content_hash, record.channel) for one in said]

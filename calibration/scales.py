@@ -40,9 +40,7 @@ class Scale:
     """The scale of one sensor against another.
 
     Attributes:
-        channel: Its channel.
         reference: Channel of the sensor it is compared with.
-        runs: Number of runs.
         low: Least value that the recordings allow, 95 %.
         high: Greatest.
         unit: Unit of these.
@@ -107,11 +105,9 @@ def torque_scale(runs: Sequence[Recording]) -> Scale:
 
 
 def current_scale(runs: Sequence[Recording], record: CalibrationRecord | None) -> Scale:
-    """Return the torque at the spindle that an ampere of the motor gives.
+    """Return the torque at the spindle that an ampere of the motor gives in runs of one rig.
 
-    Args:
-        runs: Recordings of one rig.
-        record: Active calibration of the current, of kind `current`; None if there is none.
+    It is expected to be that of the record, the active calibration of kind `current`, if any.
 
     Raises:
         BadDataError: Too few runs with both sensors, or the load does not change.

@@ -23,8 +23,6 @@ from estimation.files import sync_folder
 ENVIRONMENT = "RIG_CALIBRATIONS"
 """Environment variable that names the store's folder."""
 
-_DIGITS = 6
-
 
 class StoreError(CalibrationError):
     """The store is damaged, or has no such record."""
@@ -41,7 +39,6 @@ class Choice:
     Attributes:
         record: Hash of the record.
         at: When it was chosen, ISO 8601.
-        by: Who chose it.
     """
 
     record: str
@@ -130,7 +127,7 @@ class CalibrationStore:
         text = json.dumps(asdict(Choice(record.content_hash, at, by)), indent=1) + "\n"
         last = max((int(path.stem) for path in self._choice_paths()), default=0)
         for number in itertools.count(last + 1):
-            if _create(self.folder / "active" / f"{number:0{_DIGITS}d}.json", text):
+            if _create(self.folder / "active" / f"{number:06d}.json", text):
                 return record
         raise AssertionError("unreachable: the numbers do not end")  # pragma: no cover
 
@@ -155,20 +152,13 @@ def active_lines(
 ) -> dict[str, CalibrationRecord]:
     """Return the line that a session takes for each channel which has an active one.
 
-    A record for this instrument goes before one for any; among kinds the newest record wins.
-
-    Args:
-        store: The store.
-        instrument: Serial number of the instrument on the rig.
+    A record for this instrument, a serial number, goes before one for any; among kinds the newest
+    record wins.
     """
-    chosen: dict[str, CalibrationRecord] = {}
-    for record in store.active().values():
-        if record.fit.form != LINE or record.instrument not in ("", instrument):
-            continue
-        other = chosen.get(record.channel)
-        if other is None or _rank(record) > _rank(other):
-            chosen[record.channel] = record
-    return chosen
+    lines = [one for one in store.active().values() if one.fit.form == LINE]
+    ours = [one for one in lines if one.instrument in ("", instrument)]
+    ranked = sorted(ours, key=lambda one: (bool(one.instrument), one.made, one.content_hash))
+    return {record.channel: record for record in ranked}
 
 
 def compose(base: CalibrationSet, records: Iterable[CalibrationRecord]) -> CalibrationSet:
@@ -194,10 +184,6 @@ def compose(base: CalibrationSet, records: Iterable[CalibrationRecord]) -> Calib
                 "Choose another record with `rig calibrate use`.",
             )
     return CalibrationSet(f"{base.name}+store", {**base.channels, **lines})
-
-
-def _rank(record: CalibrationRecord) -> tuple[bool, float, str]:
-    return bool(record.instrument), record.made.timestamp(), record.content_hash
 
 
 def _read(path: Path) -> CalibrationRecord:

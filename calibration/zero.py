@@ -18,8 +18,6 @@ class Drift:
     """How far a zero moved over a run.
 
     Attributes:
-        channel: SI channel.
-        unit: Its unit.
         before: Zero before the run relative to the calibration's own, SI.
         after: The same after the run, SI.
         limit: Largest change that passes, SI.
@@ -35,11 +33,7 @@ class Drift:
 
 
 def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dict[str, float]:
-    """Return the mean reading at rest of every tared channel, counts.
-
-    Args:
-        counts: Structured raw counts, shape (n,).
-        calibrations: The calibrations, with the tared channels.
+    """Return the mean of structured raw counts, shape (n,), at rest, of every tared channel.
 
     Raises:
         CalibrationError: Too few readings, or none of them differ although a real sensor has noise.
@@ -69,13 +63,9 @@ def drift_verdicts(
     calibrations: CalibrationSet,
     limits: Mapping[str, float],
 ) -> list[Drift]:
-    """Compare the zeros before and after a run.
+    """Compare the zeros before and after a run, counts.
 
-    Args:
-        before: Zeros before the run, counts.
-        after: Zeros after it.
-        calibrations: Slopes from counts to SI.
-        limits: Channel to the largest change that passes, SI; a channel without one is not judged.
+    The limits are the largest changes that pass, SI; a channel without one is not judged.
     """
     verdicts = []
     for name, limit in limits.items():

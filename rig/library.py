@@ -38,8 +38,6 @@ class Prediction:
     """An estimate of a channel in one run, with its interval.
 
     Attributes:
-        channel: The channel.
-        unit: Its SI unit.
         time_s: Shape (n,), s.
         value: The estimate, shape (n,); not a number where a channel that it needs is not.
         half_width: Half of the 95 % interval, from the error of the runs fitted on; None for a

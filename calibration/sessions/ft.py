@@ -119,7 +119,6 @@ class Tool:
 
     Attributes:
         bias: Reading with nothing on it, N and N m, shape (6,).
-        mass_kg: Mass.
         centre_m: Centre of mass from the sensor's origin, shape (3,).
         fit: All of these, with the root mean square residual of the forces, N.
         torque_residual_n_m: Root mean square residual of the torques.

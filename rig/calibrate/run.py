@@ -22,8 +22,6 @@ class Signature:
         operator: Who made it.
         days: Days after which it is stale; None if never.
         instrument: Serial number of the instrument it holds for; empty for any.
-        serials: Device to serial number.
-        notes: Operator's notes.
     """
 
     operator: str
@@ -35,13 +33,7 @@ class Signature:
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """A calibration that was kept.
-
-    Attributes:
-        records: The records, by hash.
-        folder: Folder of their raw logs.
-        conclusion: Conclusion of the session.
-    """
+    """A calibration that was kept: its records by hash, the folder of its raw logs."""
 
     records: dict[str, CalibrationRecord]
     folder: Path

@@ -19,7 +19,6 @@ class ZeroMotion:
     """The zero of one sensor over some runs.
 
     Attributes:
-        channel: Its channel.
         unit: The unit of all values, SI.
         runs: Number of runs with a zero before and after.
         within_run: Largest change from before a run to after it, as a magnitude.

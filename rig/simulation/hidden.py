@@ -24,14 +24,7 @@ from rig.errors import UsageError
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One number that shapes an effect: what it is, with its unit, and the range it is drawn from.
-
-    Attributes:
-        name: Name with the unit.
-        low: Smallest value drawn.
-        high: Largest value drawn.
-        whole: Whole numbers only.
-    """
+    """One number that shapes an effect: its name and unit, and the range it is drawn from."""
 
     name: str
     low: float
@@ -57,7 +50,6 @@ class Kind:
     """One kind of hidden effect.
 
     Attributes:
-        name: Name in the configuration.
         shapes: Up to two numbers of its row.
         strongest: Largest strength `draw` gives.
         alone: Whether it shows in a campaign of usual runs, so that `draw` may pick it:
@@ -179,10 +171,9 @@ class UnknownHiddenEffectError(UsageError):
 
 @dataclass(frozen=True, slots=True)
 class HiddenEffect:
-    """One hidden effect switched on.
+    """One hidden effect of `NAMES` switched on.
 
     Attributes:
-        name: One of `NAMES`.
         strength: 0 is off, 1 is clear.
         shape: The numbers of `Kind.shapes` in order; those left out take the middle of their range.
     """
