@@ -210,8 +210,11 @@ def _checked(runs: Sequence[FsrRun], degree: int, rail_v: float) -> tuple[FloatA
 
 def _fitted(runs: Sequence[FsrRun], degree: int, held: list[float]) -> Regression:
     """Fit the powers of the voltage; the constant one only where the force at 0 V is not held."""
-    powers = [np.asarray(polynomial.polyvander(r.fsr_v, degree)[:, len(held) :]) for r in runs]
-    return regress([(x, r.force_n - sum(held)) for x, r in zip(powers, runs, strict=True)])
+    pairs: list[tuple[FloatArray, FloatArray]] = []
+    for run in runs:
+        powers = np.asarray(polynomial.polyvander(run.fsr_v, degree)[:, len(held) :], np.float64)
+        pairs.append((powers, run.force_n - sum(held)))
+    return regress(pairs)
 
 
 def _lowest_as_good(fits: dict[int, Regression]) -> int:

@@ -157,8 +157,12 @@ def active_lines(
     """
     lines = [one for one in store.active().values() if one.fit.form == LINE]
     ours = [one for one in lines if one.instrument in ("", instrument)]
-    ranked = sorted(ours, key=lambda one: (bool(one.instrument), one.made, one.content_hash))
-    return {record.channel: record for record in ranked}
+
+    def best(channel: str) -> CalibrationRecord:
+        own = (one for one in ours if one.channel == channel)
+        return max(own, key=lambda one: (bool(one.instrument), one.made, one.content_hash))
+
+    return {channel: best(channel) for channel in dict.fromkeys(one.channel for one in ours)}
 
 
 def compose(base: CalibrationSet, records: Iterable[CalibrationRecord]) -> CalibrationSet:

@@ -287,11 +287,10 @@ def to_pandas(campaign: Campaign) -> Any:
     pd = _library("pandas")
     from estimation.channels import unit_of
 
-    parts = [pd.DataFrame(_columns(recording)) for recording in campaign.evidence]
-    table = pd.concat(parts, ignore_index=True)
-    channels = {name for recording in campaign.evidence for name in recording.columns}
-    units = {name: unit_of(name) for name in table.columns if name in channels | {"time_s"}}
-    table.attrs["units"] = units
+    runs = list(campaign.evidence)
+    table = pd.concat([pd.DataFrame(_columns(run)) for run in runs], ignore_index=True)
+    channels = {"time_s"}.union(*(run.columns for run in runs))
+    table.attrs["units"] = {name: unit_of(name) for name in table.columns if name in channels}
     return table
 
 
@@ -304,8 +303,7 @@ def to_polars(campaign: Campaign) -> Any:
         MissingExtraError: Polars is not installed.
     """
     pl = _library("polars")
-    parts = [pl.DataFrame(_columns(recording)) for recording in campaign.evidence]
-    return pl.concat(parts, how="diagonal")
+    return pl.concat([pl.DataFrame(_columns(run)) for run in campaign.evidence], how="diagonal")
 
 
 def _columns(recording: Recording) -> dict[str, Any]:

@@ -20,12 +20,7 @@ def state_folder() -> Path:
 
 
 class TripLatch:
-    """The trip of the rig at a URL.
-
-    Args:
-        url: The rig's URL.
-        folder: Folder of the files; the user's own if None.
-    """
+    """The trip of the rig at a URL, in a file of a folder; the user's own folder if None."""
 
     def __init__(self, url: str, folder: Path | None = None) -> None:
         digest = hashlib.sha256(url.encode()).hexdigest()[:16]

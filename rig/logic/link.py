@@ -37,12 +37,9 @@ _TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p
 
 
 class DriveBench:
-    """The drive as `drivers.teensy.core.FirmwareBench`: inputs from it, commands to it.
+    """A started drive as `drivers.teensy.core.FirmwareBench`: inputs from it, commands to it.
 
     Motor and spindle are both the drive's position; quantities that it does not measure are 0.
-
-    Args:
-        device: The drive, started.
     """
 
     def __init__(self, device: Drive) -> None:
@@ -52,10 +49,9 @@ class DriveBench:
         self._missed = 0
         self._powered = False
         self._lost = 0
-        self.board: FirmwareBoard | None = None
-        """The logic whose state the power stage follows."""
+        self.board: FirmwareBoard | None = None  # the logic whose state the power stage follows
+        # tick, values and flags of the drive's newest samples
         self.samples: deque[tuple[int, Mapping[str, float], int]] = deque(maxlen=KEPT)
-        """Tick, values and flags of the drive's newest samples."""
 
     def advance_with_board(
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
@@ -68,7 +64,10 @@ class DriveBench:
         inputs[[MOTOR, SPINDLE]] = MISSING if missing else self._position_count
         inputs[CURRENT] = self._current_ma
         _TICK(tick_address)(board_address, tick_us, inputs.ctypes.data, outputs.ctypes.data)
-        self._command(int(outputs[0]), self.board is not None and self.board.in_force)
+        if self.board is None or not self.board.in_force:
+            self.follow(False)
+        elif self._powered:
+            self._device.command(1e-4 * int(outputs[0]))
 
     def follow(self, in_force: bool) -> None:
         """Switch the power stage on or off, and return when the drive has confirmed it.
@@ -103,12 +102,6 @@ class DriveBench:
         self._position_count = round(max(-TOP, min(TOP, values[axis.position] / axis.step)))
         self._current_ma = round(1000 * values[axis.current])
         self.samples.append((tick_us, values, int(batch.flags[-1])))
-
-    def _command(self, command_e4: int, in_force: bool) -> None:
-        if not in_force:
-            self.follow(False)
-        elif self._powered:
-            self._device.command(1e-4 * command_e4)
 
 
 class LogicLink:

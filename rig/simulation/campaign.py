@@ -33,12 +33,9 @@ def bench_at(
 
 
 def simulated_run(bench: SimulatedBench, plan: RunPlan, source: str) -> Recording:
-    """Return one run of a bench: the load is ramped up before it, as when a rig is recorded.
+    """Return one run of a bench, which stands at the start of the plan or near it.
 
-    Args:
-        bench: The bench, which stands at the start of the plan or near it.
-        plan: Trajectory and load.
-        source: Source of the recording.
+    The load is ramped up before it, as when a rig is recorded.
     """
     motion = motion_of(plan, float(plan.target_angle_rad[0]))
     columns = bench.play(*(values[: motion.last] for values in motion.setpoints))
@@ -72,11 +69,11 @@ def simulate_reference_campaign(
     """
     table(effects)  # an unknown name is refused now
     plans = load_protocol(protocol).plans()
-    return Campaign(
-        tuple(
-            Run(p.name, partial(_run, p, seed, k, effects, parameters)) for k, p in enumerate(plans)
-        )
-    )
+    runs = [
+        Run(plan.name, partial(_run, plan, seed, k, effects, parameters))
+        for k, plan in enumerate(plans)
+    ]
+    return Campaign(tuple(runs))
 
 
 def _run(

@@ -65,14 +65,14 @@ def fitted_rig(models: Iterable[Model], runs: Sequence[Recording]) -> FittedRig:
     """
     if not runs:
         raise DataError("There are no runs to fit a rig on.")
-    plant = with_load_unit(plant_of(models), runs)
+    plant = _with_load_unit(plant_of(models), runs)
     plant = replace(plant, jaw_zero_rad=_jaw_zero(plant, runs))
     plan, tick = recorded_plan(runs[0])
-    quanta = with_quanta(SensorParameters(), runs[0])
+    quanta = _with_quanta(runs[0])
     still = _played(plan, plant, quanta, 0)
     silent = {name: noise_std(still[name][tick], runs[0].sample_rate_hz) for name in NOISY}
     others = {n: float(x.mean()) for n, x in runs[0].columns.items() if n not in PLAYED}
-    return FittedRig(plant, with_noise(quanta, runs, silent), runs[0].instrument, others)
+    return FittedRig(plant, _with_noise(quanta, runs, silent), runs[0].instrument, others)
 
 
 def recorded_plan(run: Recording) -> tuple[RunPlan, NDArray[np.int64]]:
@@ -100,18 +100,15 @@ def _played(
 
 
 def _jaw_zero(plant: PlantParameters, runs: Sequence[Recording]) -> float:
-    zeros = [
-        np.median(
-            run["jaw_angle_rad"]
-            - plant.cable_ratio * run["spindle_angle_rad"]
-            + run["distal_torque_n_m"] / plant.cable_stiffness_n_m_rad
-        )
-        for run in runs
-    ]
+    zeros = []
+    for run in runs:
+        stretch = run["distal_torque_n_m"] / plant.cable_stiffness_n_m_rad
+        wound = plant.cable_ratio * run["spindle_angle_rad"]
+        zeros.append(np.median(run["jaw_angle_rad"] - wound + stretch))
     return float(np.median(zeros))
 
 
-def with_load_unit(plant: PlantParameters, runs: Sequence[Recording]) -> PlantParameters:
+def _with_load_unit(plant: PlantParameters, runs: Sequence[Recording]) -> PlantParameters:
     """Return the plant with the load unit the runs show: torque a load current, and friction.
 
     Least squares of distal torque on the load's current, the smooth direction of the spindle and
@@ -127,9 +124,8 @@ def with_load_unit(plant: PlantParameters, runs: Sequence[Recording]) -> PlantPa
     slope, friction, _ = np.linalg.lstsq(table[:, :3], table[:, 3], rcond=None)[0]
     if np.ptp(table[:, 0]) == 0.0 or slope <= 0.0:
         return plant
-    return replace(
-        plant, load_torque_n_m_a=float(slope), load_friction_n_m=max(float(friction), 0.0)
-    )
+    friction = max(float(friction), 0.0)
+    return replace(plant, load_torque_n_m_a=float(slope), load_friction_n_m=friction)
 
 
 def _direction(run: Recording) -> FloatArray:
@@ -147,16 +143,12 @@ def noise_std(values: FloatArray, rate_hz: float) -> float:
     return float(np.std(high[edge : values.size - edge]) / np.sqrt(share))
 
 
-def with_noise(
+def _with_noise(
     sensors: SensorParameters, runs: Sequence[Recording], silent: Mapping[str, float]
 ) -> SensorParameters:
     """Return sensors with the noise of recordings.
 
-    Args:
-        sensors: Sensors whose other values are kept.
-        runs: Measured runs.
-        silent: Channel to the noise of a simulation without sensor noise, from quantisation and
-            the controller; it is subtracted from the recordings' noise to get that of the sensor.
+    That of a simulation with silent sensors, from quantisation and the controller, is taken off.
     """
     own = {}
     for channel, parameter in NOISY.items():
@@ -165,8 +157,9 @@ def with_noise(
     return replace(sensors, **own)
 
 
-def with_quanta(sensors: SensorParameters, run: Recording) -> SensorParameters:
+def _with_quanta(run: Recording) -> SensorParameters:
     """Return silent sensors, drift and offset free, that round as the recording's do."""
+    sensors = SensorParameters()
     torque = _quantum(run["proximal_torque_n_m"]) or sensors.torque_n_m_per_count
     current = _quantum(run["motor_current_a"]) or sensors.current_a_per_count
     counts = {
@@ -186,12 +179,9 @@ def with_quanta(sensors: SensorParameters, run: Recording) -> SensorParameters:
 
 
 _ZEROS = (
-    "proximal_offset_n_m",
-    "distal_offset_n_m",
-    "proximal_ramp_n_m_s",
-    "distal_ramp_n_m_s",
+    "proximal_offset_n_m", "distal_offset_n_m", "proximal_ramp_n_m_s", "distal_ramp_n_m_s",
     "torque_walk_n_m_s",
-)
+)  # fmt: skip
 
 
 def _quantum(values: FloatArray) -> float | None:

@@ -28,9 +28,7 @@ def smooth(random: Random, scale: float) -> FloatArray:
 
     Made of random waves (Rahimi and Recht 2007) of a squared-exponential kernel.
 
-    Args:
-        random: Source of the draw.
-        scale: Length scale, shares of the range.
+    The length scale is a share of the range.
     """
     rates = random.standard_normal(WAVES) / scale
     phases = random.uniform(0.0, 2.0 * np.pi, WAVES)
@@ -54,9 +52,7 @@ def rising(random: Random) -> FloatArray:
 def falling(random: Random, x: FloatArray) -> FloatArray:
     """Return a form that falls from 1 at 0 towards 0 beyond 1, of a random kind, distorted.
 
-    Args:
-        random: Source of the draw.
-        x: Where, 0 and more, shape (`POINTS`,).
+    It is taken at x, 0 and more, shape (`POINTS`,).
     """
     power = random.uniform(0.8, 2.5)
     kinds = (
@@ -85,9 +81,7 @@ def spots(random: Random, most: int = 2, narrow: float = 0.04, wide: float = 0.1
 def course(random: Random, x: FloatArray) -> FloatArray:
     """Return how something drifts, from 0, of a random kind: towards a level, slower, in seasons.
 
-    Args:
-        random: Source of the draw.
-        x: Time, shares of the whole, shape (n,).
+    It is taken at times x, shares of the whole, shape (n,).
     """
     time = random.uniform(0.1, 0.6)
     kinds = (

@@ -43,12 +43,8 @@ def _lanes(word: np.uint64) -> float:
 def normal(seed: np.uint64, tick: int, stream: int) -> float:
     """Return a number of mean 0 and variance 1, nearly normal: the sum of eight uniform ones.
 
-    It is never beyond 4.9 and its kurtosis is 2.85 where the normal distribution has 3.
-
-    Args:
-        seed: Scrambled seed of the bench.
-        tick: Tick number since the bench was made.
-        stream: Which of the tick's numbers, 0..`STREAMS_PER_TICK` - 1.
+    It is never beyond 4.9 and its kurtosis is 2.85 where the normal distribution has 3. Ticks count
+    since the bench was made; a stream is one of the tick's `STREAMS_PER_TICK` numbers.
     """
     counter = np.uint64(tick * STREAMS_PER_TICK + stream) * np.uint64(2)
     first = mix(seed + counter * _GOLDEN)

@@ -42,8 +42,7 @@ def sample(
     """Write the seven sampled counts of this tick and let the torque zeros drift by one tick.
 
     Args:
-        state: State of the plant, shape (`places.STATE_SIZE`,); only its drifts and the states of
-            the sensors are changed.
+        state: Of the plant; only its drifts and the states of the sensors are changed.
         s: From `parameters.compiled`.
         effects: A record of `hidden.table`.
         seed: Scrambled seed of the bench.
@@ -150,17 +149,9 @@ def spindle_count_of(angle_rad: float, sensors: SensorParameters) -> int:
 def columns_of(
     counts: NDArray[np.int32], target_count: NDArray[np.int32], sensors: SensorParameters
 ) -> dict[str, NDArray[np.float64]]:
-    """Return counts as channels in SI units, closing positive, with the nominal scales.
+    """Return counts, shape (n, 9), and the spindle's target, shape (n,), as channels in SI units.
 
-    Zeros are left as they are: offsets and drift of the sensors stay in the channels.
-
-    Args:
-        counts: Rows of counts, shape (n, 9).
-        target_count: Target of the spindle, shape (n,).
-        sensors: Scales of the sensors.
-
-    Returns:
-        Channel name to values of shape (n,).
+    They are closing positive, with the nominal scales; offsets and drift of the sensors stay in.
     """
     rows = counts.astype(np.float64)
     spindle_rad = TURN_RAD / sensors.spindle_count_per_turn
