@@ -38,29 +38,20 @@ class NoPairError(CalibrationError):
 
 @dataclass(frozen=True)
 class Agreement:
-    """One encoder against its reference.
+    """One encoder against its reference."""
 
-    Attributes:
-        encoder: Its name, a key of `VERIFIED`.
-        reference: Channel of the encoder it is compared with.
-        scale: Slope over the nominal ratio; 1 if both agree.
-        scale_uncertainty: Expanded uncertainty of it, two standard deviations of the mean of runs.
-        offset_rad: Angle where the reference is at zero.
-        offset_uncertainty_rad: Expanded uncertainty of it.
-        travel_rad: Usual travel of a run.
-        within_run_rad: Half width of the middle 95 % of their difference in a usual run, by twist,
-            lost motion and noise.
-    """
-
-    encoder: str
+    encoder: str  # its name, a key of `VERIFIED`
     channel: str
-    reference: str
+    reference: str  # channel of the encoder it is compared with
     runs: int
-    scale: float
+    scale: float  # slope over the nominal ratio; 1 if both agree
+    # expanded uncertainty of it, two standard deviations of the mean of runs
     scale_uncertainty: float
-    offset_rad: float
-    offset_uncertainty_rad: float
-    travel_rad: float
+    offset_rad: float  # angle where the reference is at zero
+    offset_uncertainty_rad: float  # expanded uncertainty of it
+    travel_rad: float  # usual travel of a run
+    # half width of the middle 95 % of their difference in a usual run, by twist, lost motion and
+    # noise
     within_run_rad: float
 
     @property

@@ -8,19 +8,12 @@ from estimation.plant_file import shipped_plant
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """An encoder, its reference, and the torque between the two.
+    """An encoder, its reference, and the torque between the two."""
 
-    Attributes:
-        channel: Angle of the encoder.
-        reference: Angle of the encoder before it in the chain.
-        torque: Torque between the two.
-        ratio: Travel of the reference per travel of the encoder, by the label.
-    """
-
-    channel: str
-    reference: str
-    torque: str
-    ratio: float
+    channel: str  # angle of the encoder
+    reference: str  # angle of the encoder before it in the chain
+    torque: str  # torque between the two
+    ratio: float  # travel of the reference per travel of the encoder, by the label
 
     @property
     def nominal_ratio(self) -> float:

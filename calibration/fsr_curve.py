@@ -31,21 +31,14 @@ def is_monotone(coefficients: Sequence[float] | FloatArray, low: float, high: fl
 
 @dataclass(frozen=True)
 class FsrCurve:
-    """Force over voltage, F = c0 + c1 x + c2 x^2 + ..., x in V and F in N.
-
-    Attributes:
-        coefficients: c0, c1, ...
-        low_v: Least voltage it holds for.
-        high_v: Greatest voltage it holds for.
-        fit: The coefficients and how well they are known; None for those of a paper.
-        runs: Number of runs fitted on.
-    """
+    """Force over voltage, F = c0 + c1 x + c2 x^2 + ..., x in V and F in N."""
 
     coefficients: tuple[float, ...]
-    low_v: float
-    high_v: float
+    low_v: float  # least voltage it holds for
+    high_v: float  # greatest voltage it holds for
+    # the coefficients and how well they are known; None for those of a paper
     fit: Fit | None = None
-    runs: int = 0
+    runs: int = 0  # number of runs fitted on
 
     def __post_init__(self) -> None:
         if not (self.low_v < self.high_v and np.isfinite(self.coefficients).all()):

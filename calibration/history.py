@@ -15,15 +15,12 @@ MOST = 5
 
 @dataclass(frozen=True)
 class Change:
-    """One parameter in two calibrations.
-
-    Attributes:
-        uncertainty: Expanded uncertainty of the difference, or None where a record states none.
-    """
+    """One parameter in two calibrations."""
 
     parameter: str
     earlier: float
     now: float
+    # expanded uncertainty of the difference, or None where a record states none
     uncertainty: float | None
 
     @property

@@ -23,23 +23,14 @@ SHIPPED = Path(__file__).parent / "shipped"
 
 @dataclass(frozen=True, slots=True)
 class LinearCalibration:
-    """One channel's line.
+    """One channel's line."""
 
-    Attributes:
-        channel: SI channel it gives, with the unit in its name.
-        counts: Field of the raw counts it reads.
-        slope: SI units a count; negative where the raw count falls on closing.
-        zero_counts: Counts at zero, from the certificate or the mounting.
-        source: Source of slope and zero.
-        tared: Whether the zero is measured again before each run.
-    """
-
-    channel: str
-    counts: str
-    slope: float
-    zero_counts: float = 0.0
-    source: str = ""
-    tared: bool = False
+    channel: str  # SI channel it gives, with the unit in its name
+    counts: str  # field of the raw counts it reads
+    slope: float  # SI units a count; negative where the raw count falls on closing
+    zero_counts: float = 0.0  # counts at zero, from the certificate or the mounting
+    source: str = ""  # source of slope and zero
+    tared: bool = False  # whether the zero is measured again before each run
 
     def __post_init__(self) -> None:
         unit_of(self.channel)
@@ -52,14 +43,10 @@ class LinearCalibration:
 
 @dataclass(frozen=True)
 class CalibrationSet:
-    """The calibrations of every channel of a rig.
-
-    Attributes:
-        channels: SI channel to its line.
-    """
+    """The calibrations of every channel of a rig."""
 
     name: str
-    channels: Mapping[str, LinearCalibration]
+    channels: Mapping[str, LinearCalibration]  # SI channel to its line
 
     @property
     def content_hash(self) -> str:

@@ -37,29 +37,18 @@ SPAN = (2.5, 97.5)
 
 @dataclass(frozen=True)
 class Scale:
-    """The scale of one sensor against another.
-
-    Attributes:
-        reference: Channel of the sensor it is compared with.
-        low: Least value that the recordings allow, 95 %.
-        high: Greatest.
-        unit: Unit of these.
-        expected: What the calibrations say; None where there is none to compare with.
-        source: Where the expected value comes from.
-        span: Usual span of the reference, in its unit.
-        residual: Error of the fit, N m: twist, noise, and what the equation lacks.
-    """
+    """The scale of one sensor against another."""
 
     channel: str
-    reference: str
+    reference: str  # channel of the sensor it is compared with
     runs: int
-    low: float
-    high: float
-    unit: str
-    expected: float | None
-    source: str
-    span: float
-    residual: float
+    low: float  # least value that the recordings allow, 95 %
+    high: float  # greatest
+    unit: str  # unit of these
+    expected: float | None  # what the calibrations say; None where there is none to compare with
+    source: str  # where the expected value comes from
+    span: float  # usual span of the reference, in its unit
+    residual: float  # error of the fit, N m: twist, noise, and what the equation lacks
 
     @property
     def is_wrong(self) -> bool:

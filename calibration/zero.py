@@ -15,21 +15,14 @@ MINIMUM_SAMPLES = 100
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """How far a zero moved over a run.
-
-    Attributes:
-        before: Zero before the run relative to the calibration's own, SI.
-        after: The same after the run, SI.
-        limit: Largest change that passes, SI.
-        passes: Whether the change is within the limit.
-    """
+    """How far a zero moved over a run."""
 
     channel: str
     unit: str
-    before: float
-    after: float
-    limit: float
-    passes: bool
+    before: float  # zero before the run relative to the calibration's own, SI
+    after: float  # the same after the run, SI
+    limit: float  # largest change that passes, SI
+    passes: bool  # whether the change is within the limit
 
 
 def measure_zeros(counts: NDArray[np.void], calibrations: CalibrationSet) -> dict[str, float]:

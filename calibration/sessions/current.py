@@ -33,21 +33,14 @@ MOST_LATE = 6
 
 @dataclass(frozen=True, kw_only=True)
 class CurrentSession:
-    """Calibrate the motor's current as a torque sensor.
+    """Calibrate the motor's current as a torque sensor."""
 
-    Attributes:
-        loads_a: Loads to move against.
-        speeds_rad_s: Speeds of the spindle.
-        repeats: Number of moves of each.
-        motor_constant_n_m_a: Torque constant of the data sheet; with the ratio gives an efficiency.
-        gear_ratio: Ratio of the gear by its label.
-    """
-
-    loads_a: tuple[float, ...] = LOADS_A
-    speeds_rad_s: tuple[float, ...] = SPEEDS_RAD_S
-    repeats: int = 1
+    loads_a: tuple[float, ...] = LOADS_A  # loads to move against
+    speeds_rad_s: tuple[float, ...] = SPEEDS_RAD_S  # speeds of the spindle
+    repeats: int = 1  # number of moves of each
+    # torque constant of the data sheet; with the ratio gives an efficiency
     motor_constant_n_m_a: float | None = None
-    gear_ratio: float = GEAR.ratio
+    gear_ratio: float = GEAR.ratio  # ratio of the gear by its label
 
     kind = "current"
     devices = ("logger",)
@@ -101,17 +94,11 @@ class CurrentSession:
 
 @dataclass(frozen=True, kw_only=True)
 class DriveCurrentSession:
-    """Calibrate the current of an unloaded drive without a torque sensor.
+    """Calibrate the current of an unloaded drive without a torque sensor."""
 
-    Attributes:
-        speeds_rad_s: Speeds of the shaft; at least two.
-        repeats: Number of moves of each.
-        motor_constant_n_m_a: Torque at the shaft an ampere, by the data sheet.
-    """
-
-    speeds_rad_s: tuple[float, ...]
-    repeats: int = 1
-    motor_constant_n_m_a: float | None = None
+    speeds_rad_s: tuple[float, ...]  # speeds of the shaft; at least two
+    repeats: int = 1  # number of moves of each
+    motor_constant_n_m_a: float | None = None  # torque at the shaft an ampere, by the data sheet
 
     kind = "current"
     devices = ("logger",)

@@ -30,19 +30,13 @@ LEAST_PERIODS, MOST_PERIODS = 6, 40
 
 @dataclass(frozen=True, kw_only=True)
 class EncoderSession:
-    """Calibrate one encoder.
+    """Calibrate one encoder."""
 
-    Attributes:
-        encoder: `spindle`, against the motor's encoder, or `jaw`, against the spindle's.
-        loads_a: Loads of the moves.
-        repeats: Number of moves of each.
-        line_only: Model no periodic error.
-    """
-
+    # `spindle`, against the motor's encoder, or `jaw`, against the spindle's
     encoder: str = "spindle"
-    loads_a: tuple[float, ...] = (0.2, 0.6)
-    repeats: int = 2
-    line_only: bool = False
+    loads_a: tuple[float, ...] = (0.2, 0.6)  # loads of the moves
+    repeats: int = 2  # number of moves of each
+    line_only: bool = False  # model no periodic error
 
     kind = "encoder"
     devices = ("logger",)

@@ -21,29 +21,17 @@ KEPT_HZ = 50.0
 
 @dataclass(frozen=True, kw_only=True)
 class FsrSession:
-    """Calibrate a force-sensing resistor.
+    """Calibrate a force-sensing resistor."""
 
-    Attributes:
-        top_n: Greatest force of a press.
-        presses: Number of presses, one run each.
-        press_s: Length of a press.
-        hold_s: Length of the hold that shows creep; 0 for none.
-        degree: Degree of the polynomial; chosen on runs left out if None.
-        force_at_zero_n: Force at 0 V, held; fitted if None.
-        axis: Channel of the force sensor that presses, rising.
-        rail_v: Upper end of the amplifier's range.
-        curve_only: Model neither hysteresis nor creep.
-    """
-
-    top_n: float = 1.6
-    presses: int = 8
-    press_s: float = 8.0
-    hold_s: float = 30.0
-    degree: int | None = None
-    force_at_zero_n: float | None = None
-    axis: str = "force_z_n"
-    rail_v: float = 3.3
-    curve_only: bool = False
+    top_n: float = 1.6  # greatest force of a press
+    presses: int = 8  # number of presses, one run each
+    press_s: float = 8.0  # length of a press
+    hold_s: float = 30.0  # length of the hold that shows creep; 0 for none
+    degree: int | None = None  # degree of the polynomial; chosen on runs left out if None
+    force_at_zero_n: float | None = None  # force at 0 V, held; fitted if None
+    axis: str = "force_z_n"  # channel of the force sensor that presses, rising
+    rail_v: float = 3.3  # upper end of the amplifier's range
+    curve_only: bool = False  # model neither hysteresis nor creep
 
     kind = "fsr"
     devices = ("logger", "force_sensor")

@@ -36,21 +36,13 @@ Twist = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, kw_only=True)
 class GearboxSession:
-    """Calibrate the gear's twist.
+    """Calibrate the gear's twist."""
 
-    Attributes:
-        loads_a: Loads of both signs.
-        speeds_rad_s: Speeds of the spindle.
-        repeats: Number of moves of each.
-        gear_ratio: Motor turns a turn of the spindle.
-        stiffness_only: Model no backlash.
-    """
-
-    loads_a: tuple[float, ...] = (-0.9, -0.5, 0.5, 0.9)
-    speeds_rad_s: tuple[float, ...] = (0.5, 0.7)
-    repeats: int = 1
-    gear_ratio: float = GEAR.ratio
-    stiffness_only: bool = False
+    loads_a: tuple[float, ...] = (-0.9, -0.5, 0.5, 0.9)  # loads of both signs
+    speeds_rad_s: tuple[float, ...] = (0.5, 0.7)  # speeds of the spindle
+    repeats: int = 1  # number of moves of each
+    gear_ratio: float = GEAR.ratio  # motor turns a turn of the spindle
+    stiffness_only: bool = False  # model no backlash
 
     kind = "gearbox"
     devices = ("logger",)

@@ -30,25 +30,17 @@ MASSES_KG = (0.05, 0.1, 0.15, 0.2, 0.25)
 
 @dataclass(frozen=True, kw_only=True)
 class TorqueSession:
-    """Calibrate one torque sensor against weights.
+    """Calibrate one torque sensor against weights."""
 
-    Attributes:
-        sensor: `proximal` or `distal`.
-        arm_m: From the axis to where the weights hang, the arm level.
-        masses_kg: Weights, rising.
-        repeats: Number of passes up and down; four separate non-linearity from misplaced weights.
-        shunt_v_v: Change by the shunt, V/V, from the certificate; None for no check.
-        counts_per_v_v: Gain of amplifier and converter; needed with a shunt.
-        temperature_k: Temperature of the sensor; None if it was not measured.
-    """
-
-    sensor: str = "proximal"
-    arm_m: float = 0.1
-    masses_kg: tuple[float, ...] = MASSES_KG
+    sensor: str = "proximal"  # `proximal` or `distal`
+    arm_m: float = 0.1  # from the axis to where the weights hang, the arm level
+    masses_kg: tuple[float, ...] = MASSES_KG  # weights, rising
+    # number of passes up and down; four separate non-linearity from misplaced weights
     repeats: int = 1
+    # change by the shunt, V/V, from the certificate; None for no check
     shunt_v_v: float | None = None
-    counts_per_v_v: float | None = None
-    temperature_k: float | None = None
+    counts_per_v_v: float | None = None  # gain of amplifier and converter; needed with a shunt
+    temperature_k: float | None = None  # temperature of the sensor; None if it was not measured
 
     kind = "torque"
     devices = ("logger",)

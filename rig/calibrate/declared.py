@@ -42,15 +42,10 @@ STEADY = LowPass(cutoff_hz=20.0, order=3)
 
 @dataclass(frozen=True)
 class Declared:
-    """What one calibration declares.
+    """What one calibration declares."""
 
-    Attributes:
-        model: Its equation, a model named `calibration.KIND`.
-        recordings: The runs it was made from.
-    """
-
-    model: Model
-    recordings: list[Recording]
+    model: Model  # its equation, a model named `calibration.KIND`
+    recordings: list[Recording]  # the runs it was made from
 
 
 def declared_by_record(record: CalibrationRecord) -> Declared:
@@ -231,17 +226,13 @@ def _encoder(result: Result, measurements: Sequence[Measurement]) -> Declared:
 
 @dataclass(frozen=True)
 class _Kind:
-    """One kind of calibration.
+    """One kind of calibration."""
 
-    Attributes:
-        plain: Its simplest session, from the conditions of its runs.
-        declare: Makes the declaration of a result and the measurements.
-        place: Place of the result that is declared among a session's.
-    """
-
+    # its simplest session, from the conditions of its runs
     plain: Callable[[Mapping[str, float | str]], Procedure]
+    # makes the declaration of a result and the measurements
     declare: Callable[[Result, Sequence[Measurement]], Declared]
-    place: int = 0
+    place: int = 0  # place of the result that is declared among a session's
 
 
 KINDS: Mapping[str, _Kind] = {

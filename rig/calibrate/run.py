@@ -16,17 +16,11 @@ from rig.output.provenance import now_utc
 
 @dataclass(frozen=True, kw_only=True)
 class Signature:
-    """The text fields of a record.
+    """The text fields of a record."""
 
-    Attributes:
-        operator: Who made it.
-        days: Days after which it is stale; None if never.
-        instrument: Serial number of the instrument it holds for; empty for any.
-    """
-
-    operator: str
-    days: float | None = None
-    instrument: str = ""
+    operator: str  # who made it
+    days: float | None = None  # days after which it is stale; None if never
+    instrument: str = ""  # serial number of the instrument it holds for; empty for any
     serials: Mapping[str, str]
     notes: str = ""
 

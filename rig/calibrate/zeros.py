@@ -16,21 +16,14 @@ CONFIG = "config.json"
 
 @dataclass(frozen=True, slots=True)
 class ZeroMotion:
-    """The zero of one sensor over some runs.
-
-    Attributes:
-        unit: The unit of all values, SI.
-        runs: Number of runs with a zero before and after.
-        within_run: Largest change from before a run to after it, as a magnitude.
-        over_all: Range of the zeros before all runs; it was tared off each run.
-        limit: Largest change within a run that the configuration allows; None for no limit.
-    """
+    """The zero of one sensor over some runs."""
 
     channel: str
-    unit: str
-    runs: int
-    within_run: float
-    over_all: float
+    unit: str  # the unit of all values, SI
+    runs: int  # number of runs with a zero before and after
+    within_run: float  # largest change from before a run to after it, as a magnitude
+    over_all: float  # range of the zeros before all runs; it was tared off each run
+    # largest change within a run that the configuration allows; None for no limit
     limit: float | None
 
     @property

@@ -44,19 +44,13 @@ ENCODERS = ("motor_angle_rad", "spindle_angle_rad", "jaw_angle_rad")
 
 @dataclass(frozen=True, eq=False)
 class Pulse:
-    """What a pulse did.
+    """What a pulse did."""
 
-    Attributes:
-        ratio: Its size, of a full command in SI signs, closing positive.
-        change: Change of each encoder, rad at the spindle, by channel.
-        current_a: Mean measured current at its end less that before, A; None without a read-back.
-        trip: What the board tripped over; `Trip.NONE` for nothing.
-    """
-
-    ratio: float
-    change: dict[str, float]
+    ratio: float  # its size, of a full command in SI signs, closing positive
+    change: dict[str, float]  # change of each encoder, rad at the spindle, by channel
+    # mean measured current at its end less that before, A; None without a read-back
     current_a: float | None
-    trip: Trip
+    trip: Trip  # what the board tripped over; `Trip.NONE` for nothing
 
 
 def commission(config: Config) -> Iterator[Check]:

@@ -15,19 +15,13 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One finding.
+    """One finding."""
 
-    Attributes:
-        subject: Subject of the check: a device, a port, the computer.
-        what: Finding, with numbers.
-        fix: Action or next command; empty if none is needed.
-    """
-
-    subject: str
+    subject: str  # subject of the check: a device, a port, the computer
     check: str
     level: Level
-    what: str
-    fix: str = ""
+    what: str  # finding, with numbers
+    fix: str = ""  # action or next command; empty if none is needed
 
 
 def worst(findings: Iterable[Finding]) -> Level:

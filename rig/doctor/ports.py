@@ -17,16 +17,11 @@ CAN_LINK_TYPE = "280"
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """One serial port.
-
-    Attributes:
-        usb: `VID:PID:SERIAL`, hexadecimal; empty where it is not on USB.
-        name: Name reported by the device.
-    """
+    """One serial port."""
 
     path: str
-    usb: str
-    name: str
+    usb: str  # `VID:PID:SERIAL`, hexadecimal; empty where it is not on USB
+    name: str  # name reported by the device
 
 
 def serial_ports() -> list[Port]:

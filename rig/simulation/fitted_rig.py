@@ -35,18 +35,12 @@ NOISY = {
 
 @dataclass(frozen=True, eq=False)
 class FittedRig:
-    """A rig with the effects of fitted models only. It can be sent to another process.
+    """A rig with the effects of fitted models only. It can be sent to another process."""
 
-    Attributes:
-        plant: Parameters from the models.
-        sensors: Quanta and noise of the recordings.
-        instrument: Identity of the recordings' instrument.
-        others: Means of recorded channels that no plant simulates, such as a temperature.
-    """
-
-    plant: PlantParameters
-    sensors: SensorParameters
-    instrument: Instrument
+    plant: PlantParameters  # parameters from the models
+    sensors: SensorParameters  # quanta and noise of the recordings
+    instrument: Instrument  # identity of the recordings' instrument
+    # means of recorded channels that no plant simulates, such as a temperature
     others: Mapping[str, float]
 
     def play(self, plan: RunPlan, seed: int) -> Recording:

@@ -47,18 +47,13 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind of hidden effect.
-
-    Attributes:
-        shapes: Up to two numbers of its row.
-        strongest: Largest strength `draw` gives.
-        alone: Whether it shows in a campaign of usual runs, so that `draw` may pick it:
-            alike in all runs, with the wrist held.
-    """
+    """One kind of hidden effect."""
 
     name: str
-    shapes: tuple[Shape, ...]
-    strongest: float = 1.4
+    shapes: tuple[Shape, ...]  # up to two numbers of its row
+    strongest: float = 1.4  # largest strength `draw` gives
+    # whether it shows in a campaign of usual runs, so that `draw` may pick it: alike in all runs,
+    # with the wrist held
     alone: bool = True
 
 
@@ -171,15 +166,11 @@ class UnknownHiddenEffectError(UsageError):
 
 @dataclass(frozen=True, slots=True)
 class HiddenEffect:
-    """One hidden effect of `NAMES` switched on.
-
-    Attributes:
-        strength: 0 is off, 1 is clear.
-        shape: The numbers of `Kind.shapes` in order; those left out take the middle of their range.
-    """
+    """One hidden effect of `NAMES` switched on."""
 
     name: str
-    strength: float = 1.0
+    strength: float = 1.0  # 0 is off, 1 is clear
+    # the numbers of `Kind.shapes` in order; those left out take the middle of their range
     shape: tuple[float, ...] = ()
 
 
