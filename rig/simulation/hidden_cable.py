@@ -64,28 +64,24 @@ def cable_position_friction_n_m(row: Row, spindle_angle_rad: float) -> float:
 
 
 @numba.njit()
-def cable_presliding_rate(row: Row, bristle: float, spindle_speed: float) -> float:
-    """Rate of the bristle's bend u in -1..1: u' = w / z0 (1 - u^3 sgn w)."""
+def cable_presliding_n_m(row: Row, bristle: float, spindle_speed: float) -> tuple[float, float]:
+    """Torque of a deflected bristle on the spindle: F u, F = 12 mN m at strength 1.
+
+    Also the rate of its bend u in -1..1: u' = w / z0 (1 - u^3 sgn w).
+    """
     bend = bristle * bristle * bristle
-    return spindle_speed / row[FIRST] * (1.0 - (bend if spindle_speed > 0.0 else -bend))
+    rate = spindle_speed / row[FIRST] * (1.0 - (bend if spindle_speed > 0.0 else -bend))
+    return row[STRENGTH] * 12e-3 * bristle, rate
 
 
 @numba.njit()
-def cable_presliding_n_m(row: Row, bristle: float) -> float:
-    """Torque of the deflected bristle on the spindle: F u, F = 12 mN m at strength 1."""
-    return row[STRENGTH] * 12e-3 * bristle
+def cable_creep_n_m(row: Row, strain_rad: float, stiffness: float) -> tuple[float, float]:
+    """Tension of the branch that relaxes: 0.2 k e, e the strain not yet relaxed.
 
-
-@numba.njit()
-def cable_creep_n_m(row: Row, strain_rad: float, stiffness: float) -> float:
-    """Tension of the branch that relaxes: 0.2 k e, e the strain not yet relaxed."""
-    return row[STRENGTH] * 0.2 * stiffness * strain_rad
-
-
-@numba.njit()
-def cable_creep_rate(row: Row, strain_rad: float) -> float:
-    """Rate of relaxation: e (1 + |e| / 0.1 rad) / T."""
-    return strain_rad * (1.0 + abs(strain_rad) / 0.1) / row[FIRST]
+    Also the rate of relaxation: e (1 + |e| / 0.1 rad) / T.
+    """
+    rate = strain_rad * (1.0 + abs(strain_rad) / 0.1) / row[FIRST]
+    return row[STRENGTH] * 0.2 * stiffness * strain_rad, rate
 
 
 @numba.njit()
@@ -130,16 +126,14 @@ def friction_step_n_m(row: Row, clock_s: float) -> float:
 
 
 @numba.njit()
-def cable_hysteresis_rate(row: Row, bend: float, stretch_rate_rad_s: float) -> float:
-    """Rate of the bend u: u' = e' / z0 (1 - u^2 (0.7 sgn(e' u) + 0.3)), Bouc-Wen of order 2."""
+def cable_hysteresis_n_m(row: Row, bend: float, stretch_rate_rad_s: float) -> tuple[float, float]:
+    """Tension of the wires that rub on each other: F u, F = 10 mN m at strength 1.
+
+    Also the rate of the bend u: u' = e' / z0 (1 - u^2 (0.7 sgn(e' u) + 0.3)), Bouc-Wen of order 2.
+    """
     sign = 1.0 if stretch_rate_rad_s * bend > 0.0 else -1.0
-    return stretch_rate_rad_s / row[FIRST] * (1.0 - bend * bend * (0.7 * sign + 0.3))
-
-
-@numba.njit()
-def cable_hysteresis_n_m(row: Row, bend: float) -> float:
-    """Tension of the wires that rub on each other: F u, F = 10 mN m at strength 1."""
-    return row[STRENGTH] * 10e-3 * bend
+    rate = stretch_rate_rad_s / row[FIRST] * (1.0 - bend * bend * (0.7 * sign + 0.3))
+    return row[STRENGTH] * 10e-3 * bend, rate
 
 
 @numba.njit()

@@ -151,9 +151,8 @@ def step_tick(
         if effects.current_ripple[STRENGTH] != 0.0:
             motor_torque *= hidden_drive.current_ripple_ratio(effects.current_ripple, motor)
         if effects.torque_constant_sag[STRENGTH] != 0.0:
-            motor_torque *= hidden_drive.torque_constant_sag_ratio(
-                effects.torque_constant_sag, current
-            )
+            row = effects.torque_constant_sag
+            motor_torque *= hidden_drive.torque_constant_sag_ratio(row, current)
         if effects.motor_ripple[STRENGTH] != 0.0:
             motor_torque += hidden_drive.motor_ripple_n_m(effects.motor_ripple, motor)
 
@@ -189,13 +188,16 @@ def step_tick(
             stretch_rate += slope * wrist_speed
         cable = p.cable_stiffness_n_m_rad * stretch + p.cable_damping_n_m_s_rad * stretch_rate
         if effects.cable_creep[STRENGTH] != 0.0:
-            row = effects.cable_creep
-            cable += hidden_cable.cable_creep_n_m(row, strain, p.cable_stiffness_n_m_rad)
-            strain += dt * (stretch_rate - hidden_cable.cable_creep_rate(row, strain))
+            extra, rate = hidden_cable.cable_creep_n_m(
+                effects.cable_creep, strain, p.cable_stiffness_n_m_rad
+            )
+            cable += extra
+            strain += dt * (stretch_rate - rate)
         if effects.cable_hysteresis[STRENGTH] != 0.0:
             row = effects.cable_hysteresis
-            cable += hidden_cable.cable_hysteresis_n_m(row, bend)
-            bend += dt * hidden_cable.cable_hysteresis_rate(row, bend, stretch_rate)
+            extra, rate = hidden_cable.cable_hysteresis_n_m(row, bend, stretch_rate)
+            cable += extra
+            bend += dt * rate
 
         motor_limit = p.motor_friction_n_m
         if effects.motor_friction:
@@ -229,12 +231,12 @@ def step_tick(
             )
             spindle_limit += hidden_cable.wrist_friction_n_m(effects, spindle_speed, cable, wrist)
         if effects.spindle_ripple[STRENGTH] != 0.0:
-            row = effects.spindle_ripple
-            spindle_torque -= hidden_cable.spindle_ripple_n_m(row, spindle)
+            spindle_torque -= hidden_cable.spindle_ripple_n_m(effects.spindle_ripple, spindle)
         if effects.cable_presliding[STRENGTH] != 0.0:
             row = effects.cable_presliding
-            spindle_torque -= hidden_cable.cable_presliding_n_m(row, bristle)
-            bristle += dt * hidden_cable.cable_presliding_rate(row, bristle, spindle_speed)
+            extra, rate = hidden_cable.cable_presliding_n_m(row, bristle, spindle_speed)
+            spindle_torque -= extra
+            bristle += dt * rate
         spindle_speed += dt_spindle * spindle_torque
         spindle_speed -= braking(
             spindle_speed, dt_spindle * spindle_limit, p.spindle_creep_speed_rad_s
@@ -244,18 +246,11 @@ def step_tick(
 
         load = p.load_torque_n_m_a * load_current
         jaw_torque = cable - p.jaw_viscous_n_m_s_rad * jaw_speed - load
+        damping = p.stop_damping_n_m_s_rad * jaw_speed
         if jaw < p.stop_open_rad:
-            jaw_torque += max(
-                p.stop_stiffness_n_m_rad * (p.stop_open_rad - jaw)
-                - p.stop_damping_n_m_s_rad * jaw_speed,
-                0.0,
-            )
+            jaw_torque += max(p.stop_stiffness_n_m_rad * (p.stop_open_rad - jaw) - damping, 0.0)
         elif jaw > p.stop_closed_rad:
-            jaw_torque -= max(
-                p.stop_stiffness_n_m_rad * (jaw - p.stop_closed_rad)
-                + p.stop_damping_n_m_s_rad * jaw_speed,
-                0.0,
-            )
+            jaw_torque -= max(p.stop_stiffness_n_m_rad * (jaw - p.stop_closed_rad) + damping, 0.0)
         if effects.jaw_torque:
             jaw_torque -= hidden_cable.jaw_torque_n_m(effects, jaw)
         jaw_speed += dt_jaw * jaw_torque
