@@ -58,25 +58,18 @@ def test_closing_is_positive_in_the_reference_set():
     assert {name for name, line in lines.items() if line.slope < 0} == falls
 
 
-@pytest.mark.parametrize("slope", [0.0, float("nan"), float("inf")])
-def test_a_line_without_a_slope_is_refused(slope):
-    with pytest.raises(CalibrationError, match="do not make a line"):
-        LinearCalibration("motor_current_a", "current", slope)
-
-
-@pytest.mark.parametrize("text", ["", "{}", '{"name": "x", "channels": {"a": {}}}', "[1]"])
-def test_what_is_not_a_set_is_refused(text):
-    with pytest.raises(CalibrationError, match="not a calibration set"):
-        CalibrationSet.from_json(text)
-
-
-def test_a_file_with_a_wrong_key_is_refused(tmp_path):
+def test_what_is_no_line_or_no_set_is_refused(tmp_path):
+    for slope in (0.0, float("nan"), float("inf")):
+        with pytest.raises(CalibrationError, match="do not make a line"):
+            LinearCalibration("motor_current_a", "current", slope)
+    for text in ("", "{}", '{"name": "x", "channels": {"a": {}}}', "[1]"):
+        with pytest.raises(CalibrationError, match="not a calibration set"):
+            CalibrationSet.from_json(text)
     path = tmp_path / "c.toml"
     path.write_text('name = "x"\n[channels.motor_current_a]\ncounts = "current"\nslop = 1.0\n')
-    with pytest.raises(CalibrationError, match="slop"):
-        load_calibration_set(path)
-    with pytest.raises(CalibrationError, match="cannot be read"):
-        load_calibration_set(tmp_path / "absent.toml")
+    for file, message in ((path, "slop"), (tmp_path / "absent.toml", "cannot be read")):
+        with pytest.raises(CalibrationError, match=message):
+            load_calibration_set(file)
 
 
 @pytest.mark.parametrize(("after", "passes"), [(41.0, True), (60.0, False), (20.0, False)])

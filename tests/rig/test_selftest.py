@@ -86,14 +86,10 @@ def test_a_silent_board_fails_everything(failing):
     assert len(failing(simulated(), lambda data: b"")) == 6
 
 
-def test_selftest_speaks_to_machines(answered):
-    told = answered("selftest")
-    assert told["passed"]
-    assert {"name", "passed", "detail"} == set(told["checks"][0])
-
-
-def test_the_tests_for_a_person_are_named_and_are_those_of_the_page(answered):
+def test_selftest_speaks_to_machines_and_names_the_tests_for_a_person(answered):
     said = answered("selftest --sim --bench")
+    assert said["passed"]
+    assert {"name", "passed", "detail"} == set(said["checks"][0])
     tests = bench_tests()
     assert [test["name"] for test in said["by_hand"]] == [test.name for test in tests]
     assert all(test.why and test.do and test.shows for test in tests)
