@@ -75,14 +75,9 @@ class CalibrationSet:
     def apply(
         self, counts: NDArray[np.void], zeros: Mapping[str, float] | None = None
     ) -> dict[str, NDArray[np.float64]]:
-        """Convert raw counts to SI columns.
+        """Convert structured raw counts, shape (n,), to SI channels.
 
-        Args:
-            counts: Structured array with the counts fields, shape (n,).
-            zeros: Channel to measured zero in counts, in place of the line's own zero.
-
-        Returns:
-            SI channel to values, each of shape (n,).
+        A zero that was measured, in counts by channel, goes before the line's own.
         """
         zeros = zeros or {}
         return {

@@ -123,11 +123,9 @@ class Procedure(Protocol):
         """Return the steps in order."""
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
-        """Return the conclusion from the measurements, in the order of the steps.
+        """Return the conclusion from the measurements, one a step in the order of the steps.
 
-        Args:
-            measurements: One a step.
-            lines: The calibrations the recordings were converted with.
+        The lines are the calibrations that the recordings were converted with.
 
         Raises:
             BadDataError: They are not sufficient for a calibration; its `rule` is the reason.

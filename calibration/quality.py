@@ -77,23 +77,17 @@ def check_change(values: FloatArray, least: float, name: str) -> None:
 def check_rails(
     values: FloatArray, low: float | None, high: float | None, name: str, *, pile_up: bool = True
 ) -> None:
-    """Refuse values at a rail, or, in a sweep, that pile up at their greatest value as if cut off.
+    """Refuse readings, shape (n,), at a rail, or piled up at their greatest value as if cut off.
 
-    Args:
-        values: Readings, shape (n,).
-        low: Lower rail; None if rest is there anyway.
-        high: Upper rail; None if unknown.
-        name: Name.
-        pile_up: Whether to look for the pile-up; off for readings at rest, which are all alike.
+    A rail is None where it is unknown or rest is there anyway. The pile-up is looked for in a
+    sweep, not in readings at rest, which are all alike.
     """
-    for rail, at_rail in (
-        (low, values <= (-np.inf if low is None else low)),
-        (high, values >= (np.inf if high is None else high)),
-    ):
-        if rail is not None and at_rail.mean() > SATURATED_SHARE:
+    for rail, sign in ((low, -1.0), (high, 1.0)):
+        share = 0.0 if rail is None else float(np.mean(sign * values >= sign * rail))
+        if share > SATURATED_SHARE:
             raise BadDataError(
                 "saturated",
-                f"{at_rail.mean():.0%} of {name} are at the rail {rail:g}.",
+                f"{share:.0%} of {name} are at the rail {rail:g}.",
                 "What lies beyond a rail is not measured.",
                 "Load less, or reduce the amplifier's gain.",
             )

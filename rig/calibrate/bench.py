@@ -24,17 +24,11 @@ from rig.protocols.protocol import RunPlan
 ZERO_S = 0.5
 START_TIMEOUT_S = 2.0
 
-OpenDevice = Callable[[], Device]
-
 
 class RigBench:
-    """Measures steps with the devices of a rig. Implements `calibration.procedure.Bench`.
+    """Measures steps with devices of a rig: `logger`, `force_sensor` or both.
 
-    Args:
-        config: The rig's configuration.
-        devices: Devices to measure with: `logger`, `force_sensor` or both.
-        open_logger: Opens the way to the logger.
-        open_force_sensor: Opens the force sensor; None without one.
+    Implements `calibration.procedure.Bench`.
     """
 
     def __init__(
@@ -42,7 +36,7 @@ class RigBench:
         config: Config,
         devices: tuple[str, ...],
         open_logger: Callable[[], Transport],
-        open_force_sensor: OpenDevice | None = None,
+        open_force_sensor: Callable[[], Device] | None = None,
     ) -> None:
         self._config = config
         self._devices = devices
@@ -69,9 +63,8 @@ class RigBench:
             for reading in session.rest(step.duration_s):
                 readings.append(reading)
                 if force is not None:
-                    batches += _caught_up(
-                        force, batches, reading.time_s[-1] - readings[0].time_s[0]
-                    )
+                    elapsed_s = reading.time_s[-1] - readings[0].time_s[0]
+                    batches += _caught_up(force, batches, elapsed_s)
             measured = self._measured(session, step, readings)
             if force is None:
                 return measured
@@ -86,8 +79,7 @@ class RigBench:
                 pass
             if self._zeros is None:
                 session.settle()
-                session.take_zeros(ZERO_S)
-                self._zeros = dict(session.zeros)
+                self._zeros = session.take_zeros(ZERO_S)
             # one zero for all steps: at rest the sensor shows what friction happens to hold, and
             # that differs from step to step by more than the sensor's own zero does
             session.zeros = dict(self._zeros)
@@ -113,9 +105,8 @@ class RigBench:
             instrument=self._config.instrument.identity(),
             calibrations={session.calibrations.name: session.calibrations.content_hash},
         )
-        details: dict[str, float | str] = {**session.board}
         counts = np.concatenate([reading.counts for reading in readings])
-        return Measurement(recording, counts, details)
+        return Measurement(recording, counts, {**session.board})
 
     def _force_sensor(self, stack: ExitStack) -> Device | None:
         if "force_sensor" not in self._devices or self._open_force_sensor is None:
@@ -189,10 +180,7 @@ def _force_times(device: Device, batch: Batch) -> NDArray[np.float64]:
 
 def _said(device: Device) -> dict[str, float | str]:
     """Return the identity of a force sensor: serial, and counts per unit where available."""
-    said: dict[str, float | str] = {"force_sensor": device.name}
-    for name, value in (getattr(device, "counts_per_unit", None) or {}).items():
-        said[name] = value
-    return said
+    return {"force_sensor": device.name, **(getattr(device, "counts_per_unit", None) or {})}
 
 
 def _of_force(step: Step, config: Config, device: Device, batch: Batch) -> Measurement:

@@ -82,7 +82,6 @@ class LoadedRdt(RdtFake):
         """Return the counts of the six axes, int64, shape (6,)."""
         wrench = self.zero + self.wrench
         if self.press is not None:
-            wrench = wrench.copy()
             wrench[2] += self.press[min(self._pressed, self.press.size - 1)]
             self._pressed += 1
         noise = self._noise.normal(0.0, 1.0, 6) * [0.02, 0.02, 0.02, 5e-4, 5e-4, 5e-4]
@@ -99,11 +98,7 @@ TOOL_CENTRE_M = np.array([0.004, -0.002, 0.031])
 
 
 class SimulatedHands:
-    """Sets up steps in the simulated world. Implements `calibration.procedure.Operator`.
-
-    Args:
-        config: The simulated rig's configuration.
-    """
+    """Sets up steps in the simulated world. Implements `calibration.procedure.Operator`."""
 
     def __init__(self, config: Config) -> None:
         self.bench = HandledBench(config)
@@ -126,10 +121,9 @@ class SimulatedHands:
             torque = weight_torque_n_m(float(said["mass_kg"]), float(said["arm_m"]))
             self.bench.hang(str(said["sensor"]), float(torque))
         if "shunt_ratio" in said:
-            gain = float(said.get("shunt_v_v_ratio", 0.0)) * float(
-                said.get("counts_per_v_v_ratio", 0.0)
-            )
-            self.bench.unbalance(str(said["sensor"]), float(said["shunt_ratio"]) * gain)
+            change_v_v = float(said["shunt_ratio"]) * float(said.get("shunt_v_v_ratio", 0.0))
+            counts = change_v_v * float(said.get("counts_per_v_v_ratio", 0.0))
+            self.bench.unbalance(str(said["sensor"]), counts)
         if "mark_ratio" in said:
             self.bench.turn_to_mark()
         if "press_n" in said:
@@ -142,8 +136,7 @@ class SimulatedHands:
     def _press(self, step: Step) -> None:
         said = step.conditions
         seed = int.from_bytes(hashlib.sha256(f"{self._seed}{step.name}".encode()).digest()[:4])
-        force = press_force_n(
-            str(said["profile"]), float(said["press_n"]), step.duration_s + 1.0, seed
-        )
+        duration_s = step.duration_s + 1.0
+        force = press_force_n(str(said["profile"]), float(said["press_n"]), duration_s, seed)
         self._rdt.begin_press(force)
         self.bench.fsr = PressedFsr(force, seed)

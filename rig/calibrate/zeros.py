@@ -35,8 +35,7 @@ class ZeroMotion:
 def zero_motions(logs: Sequence[LogFile]) -> list[ZeroMotion]:
     """Return how far the zero of every sensor moved that was tared before and after runs.
 
-    Args:
-        logs: Heads of logs; those without both zeros or without calibrations are left out.
+    Of the heads of logs, those without both zeros or without calibrations are left out.
     """
     zeros: dict[str, list[tuple[float, float]]] = defaultdict(list)
     limits: dict[str, float | None] = {}

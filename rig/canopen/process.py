@@ -32,10 +32,7 @@ _KINDS: dict[str, type[DriverError]] = {
 
 
 class CanopenProcess:
-    """A transport to such a process, which it starts, and ends when it is closed.
-
-    Args:
-        config: The rig; its logger is an EPOS4.
+    """A transport to such a process of a rig with an EPOS4, which it starts and ends.
 
     Raises:
         DriverError: The drive cannot be reached or set up.

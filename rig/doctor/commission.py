@@ -56,8 +56,7 @@ class Pulse:
 def commission(config: Config) -> Iterator[Check]:
     """Yield the checks of a first motion as they are made; the first that fails is the last.
 
-    Args:
-        config: A rig with one motor and no object in its jaw, referenced. Its motor is powered.
+    The rig has one motor, which is powered, and no object in its jaw; it is referenced.
 
     Raises:
         UsageError: A rig with several motors.

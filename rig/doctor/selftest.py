@@ -39,11 +39,7 @@ class Check:
 
 
 def selftest(config: Config) -> Iterator[Check]:
-    """Yield the checks of the acceptance test as they are made.
-
-    Args:
-        config: The rig. Its motors may be powered; nothing is asked of them.
-    """
+    """Yield the checks of the acceptance test as they are made; motors may be powered."""
     for name, open_it in openers(config):
         findings = device_findings(name, open_it)
         bad = [f"{f.check}: {f.what}" for f in findings if f.level is not Level.OK]

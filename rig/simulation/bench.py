@@ -149,7 +149,7 @@ class SimulatedBench:
 
     Args:
         parameters: The plant.
-        sensors: The sensors.
+        sensors_parameters: The sensors.
         effects: Hidden effects that are switched on.
         seed: Seed of the sensors' noise and drift.
         start_count: Spindle encoder count at which the rig stands at rest, with no torque.
@@ -183,14 +183,10 @@ class SimulatedBench:
     def play(
         self, target_angle_rad: FloatArray, load_command_a: FloatArray
     ) -> dict[str, FloatArray]:
-        """Run the armed bench along a trajectory with the reference gains and a fresh controller.
+        """Run the armed bench along a spindle trajectory at 1 kHz, closing positive, shape (n,).
 
-        Args:
-            target_angle_rad: Spindle trajectory at 1 kHz, closing positive, shape (n,).
-            load_command_a: Load current, shape (n,).
-
-        Returns:
-            SI channels as from `sensors.columns_of`, each of shape (n,).
+        It has the reference gains and a fresh controller. Returns SI channels of shape (n,), as
+        `sensors.columns_of`.
         """
         per_rad = self.sensors.spindle_count_per_turn / sensors.TURN_RAD
         target = np.round(-target_angle_rad * per_rad).astype(np.int32)
@@ -201,17 +197,16 @@ class SimulatedBench:
     def advance(
         self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
     ) -> NDArray[np.int32]:
-        """Run closed-loop ticks with the plain board's controller, without guards.
+        """Run closed-loop ticks of 1 ms with the plain board's controller, without guards.
 
         Args:
-            ticks: Number of ticks of 1 ms.
+            ticks: Number of ticks.
             target: Target of the spindle, encoder counts, shape (ticks,).
             load_ma: Current of the load motor, mA, shape (ticks,).
             drive: The board's state and gains, changed in place.
 
         Returns:
-            Counts with raw signs, shape (ticks, 11), int32, columns as in
-            `drivers.teensy.reference_board`.
+            Counts with raw signs, shape (ticks, 11), as in `drivers.teensy.reference_board`.
 
         Raises:
             BenchInputError: A shape does not fit.

@@ -11,10 +11,7 @@ ENDS_S = 2.0
 
 
 class FirmwareProcess:
-    """A transport to a firmware process that it starts, and ends when it is closed.
-
-    Args:
-        profile: What the firmware is of: `reference` or `grasper`.
+    """A transport to a firmware process, `reference` or `grasper`, that it starts and ends.
 
     Raises:
         FirmwareMissingError: The program is not built.

@@ -64,13 +64,8 @@ def proximal_lag_n_m(
 def delayed(row: Row, ring: NDArray[np.float64], tick: int, value: float) -> float:
     """Return the value of some ticks ago, smeared over three ticks by weights 1, 2, 1.
 
-    Before the ring is filled the oldest value there is.
-
-    Args:
-        row: First shape: delay in ticks at strength 1, at most `RING` - 4 in all.
-        ring: Shape (`RING`,), changed in place.
-        tick: Ticks since the ring was empty.
-        value: Newest value.
+    Before the ring, shape (`RING`,), is filled, it is the oldest value there is. The delay is at
+    most `RING` - 4 ticks; the tick counts from the empty ring.
     """
     ring[tick % RING] = value
     ticks = min(row[STRENGTH] * row[FIRST], RING - 4.0)

@@ -169,12 +169,8 @@ def vary(parameters: Parameters, seed: int, spread: float = 0.1) -> Parameters:
     """Return a copy as another rig of the same make would have it.
 
     Every parameter that is not fixed by construction (ratios, scales, limits) is multiplied by a
-    log-normal factor.
-
-    Args:
-        parameters: Parameters to start from.
-        seed: Seed of the draw; the same seed gives the same rig.
-        spread: Standard deviation of the factor's logarithm; 0.1 is about 10 %.
+    log-normal factor; the spread is the standard deviation of its logarithm, 0.1 about 10 %. The
+    same seed gives the same rig.
     """
     generator = np.random.default_rng(seed)
     changed = {}

@@ -94,14 +94,8 @@ def step_tick(
     motor's torque and its friction. Both are left in the state as of the last substep.
 
     This is one function so that its variables stay in registers: cut into functions of the state it
-    takes more than twice as long.
-
-    Args:
-        state: Shape (`places.STATE_SIZE`,), changed in place.
-        p: From `parameters.compiled`.
-        effects: A record of `hidden.table`.
-        current_target_a: Commanded motor current.
-        load_target_a: Commanded load current.
+    takes more than twice as long. The state, shape (`places.STATE_SIZE`,), is changed in place; p
+    is from `parameters.compiled`, the effects are a record of `hidden.table`.
     """
     steps = int(p.substeps_ratio)
     dt = TICK_S / steps

@@ -23,11 +23,8 @@ FULL_SCALE_N = 1.755
 def press_force_n(profile: str, top_n: float, duration_s: float, seed: int) -> FloatArray:
     """Return the force of a press at 1 kHz, shape (n,).
 
-    Args:
-        profile: `ramp` (up and down once) or `hold` (on, then constant).
-        top_n: Greatest force.
-        duration_s: Length.
-        seed: Seed of how unsteady the hand is; a hold is by a weight and steady.
+    The profile is `ramp` (up and down once, by a hand as unsteady as the seed makes it) or `hold`
+    (on, then constant, by a weight).
     """
     t = np.arange(round(duration_s / TICK_S)) * TICK_S
     if profile == "hold":
@@ -43,12 +40,7 @@ CREEP_RATIO = 0.01  # Relative rise a decade of time under load
 
 
 class PressedFsr:
-    """The sensor under one press.
-
-    Args:
-        force_n: Force a tick, shape (n,); its last value holds on.
-        seed: Seed of the noise.
-    """
+    """The sensor under one press: a force a tick, shape (n,), whose last value holds on."""
 
     def __init__(self, force_n: FloatArray, seed: int = 0) -> None:
         self._force_n = force_n

@@ -41,13 +41,8 @@ def sample(
 ) -> None:
     """Write the seven sampled counts of this tick and let the torque zeros drift by one tick.
 
-    Args:
-        state: Of the plant; only its drifts and the states of the sensors are changed.
-        s: From `parameters.compiled`.
-        effects: A record of `hidden.table`.
-        seed: Scrambled seed of the bench.
-        tick: Tick number since the bench was made.
-        counts: Where to write, shape (7,) or longer, int32.
+    Of the plant's state only the drifts and the states of the sensors are changed; s is from
+    `parameters.compiled`, the effects are a record of `hidden.table`.
     """
     _drift(state, s, seed, tick)
     counts[MOTOR] = int(np.floor(state[places.MOTOR_ANGLE] / TURN_RAD * s.motor_count_per_turn))
