@@ -11,7 +11,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -19,9 +19,6 @@ from calibration.errors import CalibrationError, UnknownNameError
 from calibration.linear import CalibrationSet
 from calibration.record import LINE, CalibrationRecord
 from estimation.files import sync_folder
-
-ENVIRONMENT = "RIG_CALIBRATIONS"
-"""Environment variable that names the store's folder."""
 
 
 class StoreError(CalibrationError):
@@ -46,20 +43,16 @@ class Choice:
     by: str
 
 
-def own_folder(environment: Mapping[str, str] = os.environ) -> Path:
+def own_folder() -> Path:
     """Return the folder of a person's configurations: `$XDG_CONFIG_HOME/rig` or `~/.config/rig`."""
-    base = environment.get("XDG_CONFIG_HOME")
+    base = os.environ.get("XDG_CONFIG_HOME")
     return (Path(base) if base else Path.home() / ".config") / "rig"
 
 
-def default_folder(environment: Mapping[str, str] = os.environ) -> Path:
-    """Return the store's folder where none is named.
-
-    It is `$RIG_CALIBRATIONS`, else `calibrations` in the folder of a person's configurations.
-    """
-    if named := environment.get(ENVIRONMENT):
-        return Path(named)
-    return own_folder(environment) / "calibrations"
+def default_folder() -> Path:
+    """Return the store's folder: `$RIG_CALIBRATIONS`, else `calibrations` in a person's own."""
+    named = os.environ.get("RIG_CALIBRATIONS")
+    return Path(named) if named else own_folder() / "calibrations"
 
 
 def simulated_folder(folder: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
@@ -101,10 +102,12 @@ def test_half_a_record_is_never_there(store, monkeypatch):
     assert list((store.folder / "records").iterdir()) == []
 
 
-def test_the_store_is_in_the_configuration_folder_unless_the_environment_names_another(tmp_path):
-    assert default_folder({"RIG_CALIBRATIONS": str(tmp_path)}) == tmp_path
-    assert default_folder({"XDG_CONFIG_HOME": "/c"}).as_posix() == "/c/rig/calibrations"
-    assert default_folder({}).parts[-3:] == (".config", "rig", "calibrations")
+def test_the_store_is_in_the_own_folder_unless_another_is_named(monkeypatch):
+    own = Path.home() / ".config"
+    for named, base, folder in (("", "", own), ("", "/c", Path("/c")), ("/s", "/c", None)):
+        monkeypatch.setenv("RIG_CALIBRATIONS", named)
+        monkeypatch.setenv("XDG_CONFIG_HOME", base)
+        assert default_folder() == (folder / "rig/calibrations" if folder else Path(named))
 
 
 def test_active_lines_take_the_place_of_the_sets_own(store, chosen):
