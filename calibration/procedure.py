@@ -108,6 +108,11 @@ class Conclusion:
     residuals: Residuals
 
 
+def or_words(value: float | None, words: str) -> float | str:
+    """Return a number that was found, or words on why it was not measured."""
+    return words if value is None else value
+
+
 class Procedure(Protocol):
     """One kind of calibration."""
 

@@ -73,23 +73,22 @@ class CurrentSession:
         driver = _driver(runs)
         low, high = float(currents.min()), float(currents.max())
         half = torque.half_widths()
+        efficiency: float | str = "no torque constant of the motor was given"
+        if self.motor_constant_n_m_a is not None:
+            efficiency = float(gain / (self.motor_constant_n_m_a * self.gear_ratio))
         found: dict[str, float | str] = {
             "torque_constant_ci95_n_m_a": float(half[0]),
             "friction_current_a": float(friction / gain),
-            "efficiency_ratio": "no torque constant of the motor was given"
-            if self.motor_constant_n_m_a is None
-            else float(gain / (self.motor_constant_n_m_a * self.gear_ratio)),
+            "efficiency_ratio": efficiency,
             "drift_ratio": drift,
             "witness_rms_n_m": float(np.sqrt(torque.held_out.mean())),
         }
         names = ("torque_constant_n_m_a", "friction_n_m", "damping_n_m_s_rad", "offset_n_m")
         torque_fit = torque.as_fit("current", *names)
         series = residuals(measurements, [run[CURRENT] for run in runs], torque)
-        return Conclusion(
-            (Result("spindle_torque_n_m", CURRENT, torque_fit, low, high), driver),
-            found,
-            Residuals("motor current, A", "residual, mN m", series),
-        )
+        result = Result("spindle_torque_n_m", CURRENT, torque_fit, low, high)
+        shown = Residuals("motor current, A", "residual, mN m", series)
+        return Conclusion((result, driver), found, shown)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +122,9 @@ class DriveCurrentSession:
         turning = regress([_turning(run) for run in runs], LEAST_RUNS)
         friction, damping, zero = turning.values.tolist()
         half = turning.half_widths().tolist()
-        constant = self.motor_constant_n_m_a
+        torque = "no torque constant was given"
+        if self.motor_constant_n_m_a is not None:
+            torque = f"{friction * self.motor_constant_n_m_a:.3g} N m by the data sheet's constant"
         found: dict[str, float | str] = {
             "friction_current_a": friction,
             "friction_current_ci95_a": half[0],
@@ -131,15 +132,12 @@ class DriveCurrentSession:
             "damping_current_at_1_rad_s_ci95_a": half[1],
             "zero_current_a": zero,
             "delay_of_the_drive_s": late / measurements[0].recording.sample_rate_hz,
-            "friction_torque": "no torque constant was given"
-            if constant is None
-            else f"{friction * constant:.3g} N m by the data sheet's constant",
+            "friction_torque": torque,
         }
         velocities = [run["spindle_velocity_rad_s"] for run in runs]
         series = residuals(measurements, velocities, turning)
-        return Conclusion(
-            (_driver(runs),), found, Residuals("speed, rad/s", "residual, mA", series)
-        )
+        shown = Residuals("speed, rad/s", "residual, mA", series)
+        return Conclusion((_driver(runs),), found, shown)
 
 
 def equation(run: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:

@@ -75,36 +75,24 @@ class EncoderSession:
         used = waved if is_waved else plain
         names = ["ratio", "offset_rad", "compliance_rad_n_m", "lost_motion_rad"]
         names += ["wave_sine_rad", "wave_cosine_rad"] if is_waved else []
+        spread, covariance = float(at.std(ddof=1)), np.diag([0.0, at.var(ddof=1) / at.size])
+        zero = {"slope": line.slope, "zero": float(at.mean())}
+        line_fit = Fit(LINE, zero, covariance, spread * abs(line.slope), int(at.size))
+        at_mark = Result(pair.channel, line.counts, line_fit, tared=line.tared)
         angles = joined(runs, pair.channel)
+        low, high = float(angles.min()), float(angles.max())
         error_fit = used.as_fit("encoder", *names)
-        zero = float(at.mean())
-        variance = float(at.var(ddof=1) / at.size)
-        line_fit = Fit(
-            LINE,
-            {"slope": line.slope, "zero": zero},
-            ((0.0, 0.0), (0.0, variance)),
-            float(at.std(ddof=1) * abs(line.slope)),
-            int(at.size),
-        )
+        errors = Result(f"{self.encoder}_encoder_rad", pair.reference, error_fit, low, high)
+        wave = f"{periods} periods per turn" if has_wave else "none that predicts runs left out"
         found: dict[str, float | str] = {
-            "mark_spread_count": float(at.std(ddof=1)),
+            "mark_spread_count": spread,
             "ratio_over_nominal": float(used.values[0] / pair.nominal_ratio),
-            "wave": f"{periods} periods per turn"
-            if has_wave
-            else "none that predicts runs left out",
+            "wave": wave,
             "wave_amplitude_rad": amplitude,
         }
         series = residuals(moved, [run[pair.channel] for run in runs], used)
-        low, high = float(angles.min()), float(angles.max())
-        error_name = f"{self.encoder}_encoder_rad"
-        return Conclusion(
-            (
-                Result(pair.channel, line.counts, line_fit, None, None, line.tared),
-                Result(error_name, pair.reference, error_fit, low, high),
-            ),
-            found,
-            Residuals("angle, rad", "residual, mrad", series),
-        )
+        shown = Residuals("angle, rad", "residual, mrad", series)
+        return Conclusion((at_mark, errors), found, shown)
 
 
 def _mark_counts(marks: Sequence[Measurement], field: str) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from calibration.fsr import Creep, FsrRun, fit_fsr, measure_creep
 from calibration.fsr_memory import CREEP_START_S, FsrMemory, fit_memory
 from calibration.linear import CalibrationSet
-from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
+from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step, or_words
 from calibration.quality import BadDataError, check_points
 from estimation.filters import LowPass, zero_phase
 from estimation.recording import FloatArray, Recording
@@ -38,12 +38,8 @@ class FsrSession:
 
     def steps(self) -> list[Step]:
         """The empty sensors, the presses, and a hold under a weight."""
-        rest = Step(
-            "rest",
-            {"press_n": 0.0, "profile": "hold"},
-            "Let nothing touch the sensors.",
-            duration_s=1.0,
-        )
+        still: dict[str, float | str] = {"press_n": 0.0, "profile": "hold"}
+        rest = Step("rest", still, "Let nothing touch the sensors.", duration_s=1.0)
         text = (
             f"After Enter press slowly up to {self.top_n:g} N and off again, once, "
             f"in about {self.press_s:g} s."
@@ -55,12 +51,8 @@ class FsrSession:
         if self.hold_s <= 0:
             return [rest, *runs]
         weight = 0.7 * self.top_n
-        hold = Step(
-            "hold",
-            {"press_n": weight, "profile": "hold"},
-            f"After Enter put a weight of {weight / 9.80665 * 1e3:.0f} g on and do not touch it.",
-            self.hold_s,
-        )
+        text = f"After Enter put a weight of {weight / 9.80665 * 1e3:.0f} g on and do not touch it."
+        hold = Step("hold", {"press_n": weight, "profile": "hold"}, text, self.hold_s)
         return [rest, *runs, hold]
 
     def conclude(self, measurements: Sequence[Measurement], lines: CalibrationSet) -> Conclusion:
@@ -90,9 +82,7 @@ class FsrSession:
             "degree": str(len(curve.coefficients) - 1),
             "held_out_rmse_n_by_degree": held_out,
             "interval95_mid_n": float(high[0] - low[0]) / 2,
-            "hysteresis_ratio": "no loading and unloading at one voltage"
-            if hysteresis is None
-            else hysteresis,
+            "hysteresis_ratio": or_words(hysteresis, "no loading and unloading at one voltage"),
             "held_out_rmse_n": memory.held_out_rmse_n[0],
             "held_out_rmse_with_gap_n": memory.held_out_rmse_n[1],
             "loading_gap": self._gap_words(memory),
@@ -102,11 +92,8 @@ class FsrSession:
             "drift_ratio": drift,
         }
         series = {run.name: (run.fsr_v, run.force_n - curve.force_n(run.fsr_v)) for run in pure}
-        return Conclusion(
-            (Result("fsr_force_n", FSR, whole, curve.low_v, curve.high_v),),
-            found,
-            Residuals("voltage, V", "residual, N", series),
-        )
+        result = Result("fsr_force_n", FSR, whole, curve.low_v, curve.high_v)
+        return Conclusion((result,), found, Residuals("voltage, V", "residual, N", series))
 
     def pressed(self, measurements: Sequence[Measurement]) -> list[FsrRun]:
         """Return the pressed parts of the presses, the force less its zero.

@@ -93,11 +93,8 @@ class FtSession:
         whole = tool.fit.extended(jaw)
         number = np.arange(len(down), dtype=np.float64)
         series = {axis: (number, left[:, k]) for k, axis in enumerate(AXES[:3])}
-        return Conclusion(
-            (Result("contact_wrench", "force_sensor", whole),),
-            found,
-            Residuals("pose", "residual force, N", series),
-        )
+        result = Result("contact_wrench", "force_sensor", whole)
+        return Conclusion((result,), found, Residuals("pose", "residual force, N", series))
 
 
 def _refuse_swinging(measurement: Measurement) -> None:

@@ -73,9 +73,7 @@ class GearboxSession:
         used = without if self.stiffness_only else whole
         fit = _as_fit(used, int(every.size))
         found: dict[str, float | str] = {
-            "backlash": "significant on runs left out"
-            if has_gap
-            else "not significant on runs left out",
+            "backlash": f"{'' if has_gap else 'not '}significant on runs left out",
             "drift_ratio": drift,
             "backlash_ci95_rad": float(2 * whole.half_widths()[1]),
             "torque_zero_n_m": zero_n_m if has_gap else "only a gap shows it",

@@ -7,7 +7,7 @@ import numpy as np
 
 from calibration.chain import REFERENCE
 from calibration.linear import CalibrationSet
-from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step
+from calibration.procedure import Conclusion, Measurement, Residuals, Result, Step, or_words
 from calibration.quality import BadDataError
 from calibration.torque import (
     MINIMUM_LEVELS,
@@ -114,10 +114,10 @@ class TorqueSession:
         fitted = fit_torque(loads)
         found: dict[str, float | str] = {
             "linearity_ratio": fitted.linearity,
-            "hysteresis_ratio": _or_words(fitted.hysteresis, "no load was reached both ways"),
-            "zero_drift_ratio": _or_words(fitted.drift, "it did not begin and end at zero"),
-            "temperature_k": _or_words(self.temperature_k, "not measured"),
-            "shunt_deviation_ratio": _or_words(deviation, "no shunt was given"),
+            "hysteresis_ratio": or_words(fitted.hysteresis, "no load was reached both ways"),
+            "zero_drift_ratio": or_words(fitted.drift, "it did not begin and end at zero"),
+            "temperature_k": or_words(self.temperature_k, "not measured"),
+            "shunt_deviation_ratio": or_words(deviation, "no shunt was given"),
         }
         torques, left = fitted.torque_n_m, fitted.residual_n_m
         rising = np.diff(torques, prepend=-1.0) > 0
@@ -142,7 +142,3 @@ def _counts(measurement: Measurement, field: str) -> FloatArray:
     if measurement.counts is None:
         raise BadDataError("points", f"{measurement.recording.name} has no raw counts.")
     return measurement.counts[field].astype(np.float64)
-
-
-def _or_words(value: float | None, words: str) -> float | str:
-    return words if value is None else value
