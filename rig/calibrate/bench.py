@@ -84,21 +84,19 @@ class RigBench:
             # that differs from step to step by more than the sensor's own zero does
             session.zeros = dict(self._zeros)
             motion = session.machine.motion(plan, session.here)
-            readings = list(session.play(*motion.setpoints))
-            of_run = [
-                r.where((r.setpoint >= motion.first) & (r.setpoint < motion.last)) for r in readings
-            ]
+            of_run = []
+            for reading in session.play(*motion.setpoints):
+                setpoint = reading.setpoint
+                of_run.append(reading.where((setpoint >= motion.first) & (setpoint < motion.last)))
             return self._measured(session, step, [reading for reading in of_run if len(reading)])
 
     def _measured(self, session: Session, step: Step, readings: list[Reading]) -> Measurement:
         time_s = np.concatenate([reading.time_s for reading in readings])
+        names = readings[0].columns
         recording = Recording(
             step.name,
             time_s - time_s[0],
-            {
-                name: np.concatenate([reading.columns[name] for reading in readings])
-                for name in readings[0].columns
-            },
+            {name: np.concatenate([r.columns[name] for r in readings]) for name in names},
             flags=np.concatenate([reading.flags for reading in readings]),
             conditions=step.conditions,
             rig=self._config.name,

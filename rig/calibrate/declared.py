@@ -106,7 +106,14 @@ def _known(kind: str) -> "_Kind":
 
 
 def _fsr(result: Result, measurements: Sequence[Measurement]) -> Declared:
-    curve, memory = fsr_of(result)
+    if result.low is None or result.high is None:
+        raise UsageError("The calibration of the resistor states no range of voltage.")
+    values = result.fit.parameters
+    powers = [name for name in values if name.startswith("c") and name[1:].isdigit()]
+    coefficients = tuple(values[f"c{k}"] for k in range(len(powers)))
+    curve = FsrCurve(coefficients, result.low, result.high)
+    gap_n, creep_ratio = values.get("loading_gap_n", 0.0), values.get("creep_ratio", 0.0)
+    memory = FsrMemory(gap_n=gap_n, creep_ratio=creep_ratio)
     made = []
     for run in FsrSession().pressed(measurements):
         volts = np.clip(run.fsr_v, curve.low_v, curve.high_v)
@@ -130,10 +137,10 @@ def _torque(result: Result, measurements: Sequence[Measurement]) -> Declared:
     level = np.array([step["applied_n_m"][0] for step in steps])
     way = np.sign(np.diff(level, prepend=level[0] - 1.0))
     number = np.cumsum(np.diff(way, prepend=way[0]) != 0)
-    made = [
-        _in_a_row(f"way-{k}", [s for s, n in zip(steps, number, strict=True) if n == k])
-        for k in range(int(number[-1]) + 1)
-    ]
+    ways: dict[int, list[Recording]] = {}
+    for k, step in zip(number.tolist(), steps, strict=True):
+        ways.setdefault(k, []).append(step)
+    made = [_in_a_row(f"way-{k}", parts) for k, parts in ways.items()]
     return Declared(_of_sensor("torque", "applied_n_m", "read_n_m", LowPass()), made)
 
 
@@ -252,29 +259,10 @@ KINDS: Mapping[str, _Kind] = {
 }
 
 
-def fsr_of(result: Result) -> tuple[FsrCurve, FsrMemory]:
-    """Return the curve and the memory that an FSR's calibration holds.
-
-    Raises:
-        UsageError: It states no range of voltage.
-    """
-    values = result.fit.parameters
-    powers = [name for name in values if name.startswith("c") and name[1:].isdigit()]
-    coefficients = tuple(values[f"c{k}"] for k in range(len(powers)))
-    if result.low is None or result.high is None:
-        raise UsageError("The calibration of the resistor states no range of voltage.")
-    memory = FsrMemory(
-        gap_n=values.get("loading_gap_n", 0.0), creep_ratio=values.get("creep_ratio", 0.0)
-    )
-    return FsrCurve(coefficients, result.low, result.high), memory
-
-
 def _of_sensor(kind: str, source: str, target: str, low_pass: LowPass) -> Model:
     """Return a line from one to the other, whose gain and zero a fit may still move."""
-    terms = (
-        Term(effect("transmission.ratio"), 1, {"load": source}),
-        Term(effect("sensor.offset"), 1),
-    )
+    gain = Term(effect("transmission.ratio"), 1, {"load": source})
+    terms = (gain, Term(effect("sensor.offset"), 1))
     about = "The calibrated reading of the sensor against its reference."
     return Model(kind, f"calibration.{kind}", target, terms, about, low_pass, False, "all")
 
@@ -292,9 +280,7 @@ def _moving(recording: Recording) -> Recording:
 
 def _in_a_row(name: str, steps: Sequence[Recording]) -> Recording:
     """Return the static parts of several steps as one run, one step after the other."""
-    columns = {
-        channel: np.concatenate([step[channel] for step in steps]) for channel in steps[0].columns
-    }
+    columns = {name: np.concatenate([step[name] for step in steps]) for name in steps[0].columns}
     flags = np.concatenate([step.flags for step in steps])
     time_s = np.arange(len(flags)) / steps[0].sample_rate_hz
     return replace(steps[0], name=name, time_s=time_s, columns=columns, flags=flags, conditions={})

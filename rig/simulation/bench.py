@@ -79,15 +79,8 @@ def _board_call(
         pointer = ir.IntType(8).as_pointer()
         kind = ir.FunctionType(ir.VoidType(), [pointer, ir.IntType(32), pointer, pointer])
         callee = builder.inttoptr(arguments[0], kind.as_pointer())
-        builder.call(
-            callee,
-            [
-                builder.inttoptr(arguments[1], pointer),
-                arguments[2],
-                builder.inttoptr(arguments[3], pointer),
-                builder.inttoptr(arguments[4], pointer),
-            ],
-        )
+        board, inputs, outputs = (builder.inttoptr(arguments[k], pointer) for k in (1, 3, 4))
+        builder.call(callee, [board, arguments[2], inputs, outputs])
         return context.get_dummy_value()
 
     return signature, build
@@ -128,13 +121,8 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         outputs = np.zeros(2, np.int32)
         for k in range(ticks):
             sensors.sample(state, s, effects, seed, first_tick + k, inputs)
-            call_board_tick(
-                function,
-                board,
-                np.uint32(tick_us + 1000 * k),
-                inputs.ctypes.data,
-                outputs.ctypes.data,
-            )
+            now_us = np.uint32(tick_us + 1000 * k)
+            call_board_tick(function, board, now_us, inputs.ctypes.data, outputs.ctypes.data)
             current = -p.command_full_scale_a * 1e-4 * outputs[0]
             plant.step_tick(state, p, effects, current, 1e-3 * outputs[1])
 

@@ -80,9 +80,7 @@ def recorded_plan(run: Recording) -> tuple[RunPlan, NDArray[np.int64]]:
     elapsed = run.time_s - run.time_s[0]
     tick = np.rint(elapsed * SAMPLE_RATE_HZ).astype(np.int64)
     grid = np.arange(tick[-1] + 1) / SAMPLE_RATE_HZ
-    target, load = (
-        np.interp(grid, elapsed, run[name]) for name in ("target_angle_rad", "load_command_a")
-    )
+    target, load = (np.interp(grid, elapsed, run[name]) for name in PLAYED[:2])
     return RunPlan(run.name, target, load, dict(run.conditions)), tick
 
 
@@ -109,12 +107,8 @@ def _with_load_unit(plant: PlantParameters, runs: Sequence[Recording]) -> PlantP
     an offset. The plant is not changed where the load never varies.
     """
     load, torque = "load_command_a", "distal_torque_n_m"
-    table = np.concatenate(
-        [
-            np.column_stack([run[load], _direction(run), np.ones(len(run)), run[torque]])[::20]
-            for run in runs
-        ]
-    )
+    columns = [(run[load], _direction(run), np.ones(len(run)), run[torque]) for run in runs]
+    table = np.concatenate([np.column_stack(column)[::20] for column in columns])
     slope, friction, _ = np.linalg.lstsq(table[:, :3], table[:, 3], rcond=None)[0]
     if np.ptp(table[:, 0]) == 0.0 or slope <= 0.0:
         return plant

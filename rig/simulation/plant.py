@@ -102,11 +102,8 @@ def step_tick(
     target = clip(current_target_a, p.current_limit_a)
     current_gain = min(dt / p.current_lag_s, 1.0)
     load_gain = min(dt / p.load_lag_s, 1.0)
-    dt_motor, dt_spindle, dt_jaw = (
-        dt / p.rotor_inertia_kg_m2,
-        dt / p.spindle_inertia_kg_m2,
-        dt / p.jaw_inertia_kg_m2,
-    )
+    dt_motor, dt_spindle = dt / p.rotor_inertia_kg_m2, dt / p.spindle_inertia_kg_m2
+    dt_jaw = dt / p.jaw_inertia_kg_m2
     gear = 1.0 / p.gear_ratio
     jaw_friction = p.jaw_friction_n_m + p.load_friction_n_m
     load_share = p.load_friction_n_m / jaw_friction if jaw_friction > 0.0 else 0.0
@@ -158,12 +155,12 @@ def step_tick(
             twist += error
             twist_rate += slope * spindle_speed
             spindle_per_twist -= slope
+        stiffness = p.gear_stiffness_n_m_rad
         if effects.gear_backlash[STRENGTH] != 0.0:
-            twist_torque = hidden_drive.gear_backlash_n_m(
-                effects.gear_backlash, twist, twist_rate, p.gear_stiffness_n_m_rad
-            )
+            row = effects.gear_backlash
+            twist_torque = hidden_drive.gear_backlash_n_m(row, twist, twist_rate, stiffness)
         else:
-            twist_torque = p.gear_stiffness_n_m_rad * twist
+            twist_torque = stiffness * twist
         if effects.gear_stiffening[STRENGTH] != 0.0:
             twist_torque *= hidden_drive.gear_stiffening_ratio(effects.gear_stiffening, twist)
         twist_torque += p.gear_damping_n_m_s_rad * twist_rate
@@ -182,9 +179,8 @@ def step_tick(
             stretch_rate += slope * wrist_speed
         cable = p.cable_stiffness_n_m_rad * stretch + p.cable_damping_n_m_s_rad * stretch_rate
         if effects.cable_creep[STRENGTH] != 0.0:
-            extra, rate = hidden_cable.cable_creep_n_m(
-                effects.cable_creep, strain, p.cable_stiffness_n_m_rad
-            )
+            row, stiffness = effects.cable_creep, p.cable_stiffness_n_m_rad
+            extra, rate = hidden_cable.cable_creep_n_m(row, strain, stiffness)
             cable += extra
             strain += dt * (stretch_rate - rate)
         if effects.cable_hysteresis[STRENGTH] != 0.0:
@@ -203,19 +199,15 @@ def step_tick(
             )
             motor_limit += gear * hidden_drive.gear_friction_n_m(effects, motor_speed, twist_torque)
         before = motor_speed
-        motor_speed += dt_motor * (
-            motor_torque - p.motor_viscous_n_m_s_rad * motor_speed - gear * twist_torque
-        )
+        viscous = p.motor_viscous_n_m_s_rad * motor_speed
+        motor_speed += dt_motor * (motor_torque - viscous - gear * twist_torque)
         motor_speed -= braking(motor_speed, dt_motor * motor_limit, p.motor_creep_speed_rad_s)
         rotor_torque = (motor_speed - before) / dt_motor
         motor += dt * motor_speed
 
         spindle_limit = p.spindle_friction_n_m + p.cable_load_friction_ratio * abs(cable)
-        spindle_torque = (
-            spindle_per_twist * twist_torque
-            - lever * cable
-            - p.spindle_viscous_n_m_s_rad * spindle_speed
-        )
+        viscous = p.spindle_viscous_n_m_s_rad * spindle_speed
+        spindle_torque = spindle_per_twist * twist_torque - lever * cable - viscous
         if effects.spindle_friction:
             if effects.cable_dwell[STRENGTH] != 0.0:
                 row = effects.cable_dwell
@@ -232,9 +224,8 @@ def step_tick(
             spindle_torque -= extra
             bristle += dt * rate
         spindle_speed += dt_spindle * spindle_torque
-        spindle_speed -= braking(
-            spindle_speed, dt_spindle * spindle_limit, p.spindle_creep_speed_rad_s
-        )
+        most = dt_spindle * spindle_limit
+        spindle_speed -= braking(spindle_speed, most, p.spindle_creep_speed_rad_s)
         proximal = spindle_per_twist * twist_torque + rotor_torque
         spindle += dt * spindle_speed
 

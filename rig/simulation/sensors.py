@@ -46,9 +46,8 @@ def sample(
     """
     _drift(state, s, seed, tick)
     counts[MOTOR] = int(np.floor(state[places.MOTOR_ANGLE] / TURN_RAD * s.motor_count_per_turn))
-    counts[SPINDLE] = int(
-        np.floor(-state[places.SPINDLE_ANGLE] / TURN_RAD * s.spindle_count_per_turn)
-    )
+    spindle_turns = -state[places.SPINDLE_ANGLE] / TURN_RAD
+    counts[SPINDLE] = int(np.floor(spindle_turns * s.spindle_count_per_turn))
     jaw = state[places.JAW_ANGLE]
     if effects.jaw_encoder_wave[STRENGTH] != 0.0:
         jaw += hidden_sensors.jaw_encoder_wave_rad(effects.jaw_encoder_wave, jaw)
@@ -58,20 +57,12 @@ def sample(
 
     per_count = 1.0 / s.torque_n_m_per_count
     limit = s.torque_limit_count
-    proximal = (
-        _proximal_n_m(state, effects)
-        + s.proximal_offset_n_m
-        + state[places.PROXIMAL_DRIFT]
-        + s.proximal_noise_n_m * normal(seed, tick, 2)
-        + s.torque_colour_n_m * state[places.PROXIMAL_COLOUR]
-    )
-    distal = (
-        _distal_n_m(state, effects)
-        + s.distal_offset_n_m
-        + state[places.DISTAL_DRIFT]
-        + s.distal_noise_n_m * normal(seed, tick, 3)
-        + s.torque_colour_n_m * state[places.DISTAL_COLOUR]
-    )
+    proximal = _proximal_n_m(state, effects) + s.proximal_offset_n_m + state[places.PROXIMAL_DRIFT]
+    proximal += s.proximal_noise_n_m * normal(seed, tick, 2)
+    proximal += s.torque_colour_n_m * state[places.PROXIMAL_COLOUR]
+    distal = _distal_n_m(state, effects) + s.distal_offset_n_m + state[places.DISTAL_DRIFT]
+    distal += s.distal_noise_n_m * normal(seed, tick, 3)
+    distal += s.torque_colour_n_m * state[places.DISTAL_COLOUR]
     counts[PROXIMAL] = _converted(proximal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
     counts[DISTAL] = _converted(-distal * per_count, s.torque_quantum_count, -limit - 1.0, limit)
 
@@ -81,9 +72,8 @@ def sample(
         current *= hidden_sensors.bend_ratio(row, current)
     current += s.current_offset_a + s.current_noise_a * normal(seed, tick, 4)
     current += s.current_colour_a * state[places.CURRENT_COLOUR]
-    counts[CURRENT] = _converted(
-        current / s.current_a_per_count, 1.0, -s.current_limit_count - 1.0, s.current_limit_count
-    )
+    limit = s.current_limit_count
+    counts[CURRENT] = _converted(current / s.current_a_per_count, 1.0, -limit - 1.0, limit)
 
     grip = max(state[places.DISTAL_TORQUE], 0.0) / s.lever_arm_m
     fsr = grip / s.fsr_n_per_count + s.fsr_offset_count + s.fsr_noise_count * normal(seed, tick, 5)
