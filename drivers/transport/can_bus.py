@@ -1,13 +1,11 @@
 """CAN frames to and from a bus: what every way to a bus offers, real or simulated."""
 
-import struct
 from dataclasses import dataclass
 from typing import Protocol
 
 MAX_STANDARD_ID = 0x7FF
 MAX_EXTENDED_ID = 0x1FFFFFFF
 MAX_DATA = 8
-_HEAD = struct.Struct(">I?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,16 +28,6 @@ class CanFrame:
             raise ValueError(f"a CAN identifier lies in 0..{top:#x}, not {self.can_id:#x}")
         if len(self.data) > MAX_DATA:
             raise ValueError(f"a CAN frame carries {MAX_DATA} bytes, not {len(self.data)}")
-
-    def to_bytes(self) -> bytes:
-        """Return the frame as a packet of bytes, for what handles packets."""
-        return _HEAD.pack(self.can_id, self.extended) + self.data
-
-    @classmethod
-    def from_bytes(cls, packet: bytes) -> "CanFrame":
-        """Return the frame that `to_bytes` packed."""
-        can_id, extended = _HEAD.unpack_from(packet)
-        return cls(can_id, packet[_HEAD.size :], extended)
 
 
 @dataclass(slots=True)

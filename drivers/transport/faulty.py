@@ -1,13 +1,13 @@
 """A bad cable: faults on what a device sends, around any transport or bus, repeatable by a seed.
 
-Time is the inner transport's own, so that a fault that lasts takes no real time on a simulated one.
-`Faults` is independent of transports; a bus can use it for each message, too.
+Time is the inner link's own, so that a fault that lasts takes no real time on a simulated one.
 """
 
 import random
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from enum import StrEnum
+from typing import Generic, TypeVar
 
 from drivers.errors import LinkLostError
 from drivers.transport.can_bus import CanBus, CanFrame
@@ -15,6 +15,9 @@ from drivers.transport.transport import Transport
 
 LONGEST_RUN = 16
 """Most bytes of a stream one fault takes, changes or repeats."""
+Chunk = TypeVar("Chunk", bytes, CanFrame)
+Tap = Callable[[bytes], bytes]
+"""Changes bytes on their way; the returned bytes replace them."""
 
 
 class Fault(StrEnum):
@@ -72,11 +75,11 @@ class Faults:
         else:
             self._waiting.extend([(fault, duration_s)] * count)
 
-    def pass_on(self, chunk: bytes, now_s: float, whole: bool) -> list[tuple[float, bytes]]:
+    def pass_on(self, chunk: Chunk, now_s: float, whole: bool) -> list[tuple[float, Chunk]]:
         """Return a chunk with faults: pieces, each with the time from which it may be read.
 
         Args:
-            chunk: Bytes from the device; a packet where `whole`.
+            chunk: What the device sent.
             now_s: Time of the link.
             whole: Damage a packet as a whole rather than a run of a stream's bytes.
         """
@@ -114,8 +117,8 @@ class Faults:
                 striking.append((fault, 0.3))
         return striking
 
-    def _damage(self, fault: Fault, data: bytes, whole: bool) -> list[bytes]:
-        if whole:
+    def _damage(self, fault: Fault, data: Chunk, whole: bool) -> list[Chunk]:
+        if whole or isinstance(data, CanFrame):
             return [data, data] if fault is Fault.DUPLICATE else []
         size = self._random.randint(1, min(LONGEST_RUN, len(data)))
         first = self._random.randint(0, len(data) - size)
@@ -126,44 +129,29 @@ class Faults:
         return [before + behind if fault is Fault.DROP else before + run + run + behind]
 
 
-Tap = Callable[[bytes], bytes]
-"""Changes bytes on their way; the returned bytes replace them."""
+class _Cable(Generic[Chunk]):
+    """What comes through a bad cable, chunk by chunk, in the time of the link behind it."""
 
+    _instant_s = 0.0
+    """A wait up to this is the rounding of a sum, and none."""
 
-class FaultyTransport:
-    """Any transport behind a bad cable.
-
-    Args:
-        inner: The transport.
-        faults: The faults that strike; more can be injected at any time.
-        packets: Whether each read of `inner` is one packet rather than part of a stream.
-        instant_s: Waits up to this are the rounding of a sum, and none.
-    """
-
-    def __init__(
-        self,
-        inner: Transport,
-        faults: Faults | None = None,
-        packets: bool = False,
-        instant_s: float = 0.0,
-    ) -> None:
+    def __init__(self, inner: Transport | CanBus, faults: Faults | None, packets: bool) -> None:
         self.url = inner.url
         self.close = inner.close
-        self._inner = inner
         self.faults = faults or Faults()
+        self._link = inner
         self._packets = packets
-        self._instant_s = instant_s
-        self._held: list[tuple[float, bytes]] = []
-        self.incoming: Tap = unchanged
-        self.outgoing: Tap = unchanged
+        self._held: list[tuple[float, Chunk]] = []
+        self.incoming: Callable[[Chunk], Chunk] = unchanged
+        self.outgoing: Callable[[Chunk], Chunk] = unchanged
 
     @property
     def now_s(self) -> float:
-        """The clock of the inner transport, seconds."""
-        return self._inner.now_s
+        """The clock of the inner link, seconds."""
+        return self._link.now_s
 
-    def read(self, timeout_s: float) -> bytes:
-        """Return the bytes that get through, waiting at most `timeout_s` for the first."""
+    def _read(self, receive: Callable[[float], Chunk | None], timeout_s: float) -> list[Chunk]:
+        """Return the chunks that are due, waiting at most `timeout_s` for the first."""
         give_up_s = self.now_s + timeout_s
         while True:
             self._require_link()
@@ -172,7 +160,7 @@ class FaultyTransport:
                 return due
             remaining_s = self._wait(give_up_s - self.now_s)
             next_due_s = min((due_s for due_s, _ in self._held), default=float("inf"))
-            chunk = self._inner.read(min(remaining_s, self._wait(next_due_s - self.now_s)))
+            chunk = receive(min(remaining_s, self._wait(next_due_s - self.now_s)))
             if chunk:
                 arrived = self.incoming(chunk)
                 if arrived:
@@ -181,30 +169,23 @@ class FaultyTransport:
                 self._require_link()
                 return self._due()
 
-    def write(self, data: bytes) -> None:
-        """Send `data`, as far as the taps let it."""
-        self._require_link()
-        changed = self.outgoing(data)
-        if changed:
-            self._inner.write(changed)
-
-    def _wait(self, wait_s: float) -> float:
-        return wait_s if wait_s > self._instant_s else 0.0
-
-    def _due(self) -> bytes:
+    def _due(self) -> list[Chunk]:
         now_s = self.now_s
         if now_s < self.faults.stalled_until_s(now_s):
-            return b""
+            return []
         due = [entry for entry in self._held if not self._wait(entry[0] - now_s)]
         if self._packets:
             due = due[:1]
         for entry in due:
             self._held.remove(entry)
-        return b"".join(data for _, data in due)
+        return [chunk for _, chunk in due]
+
+    def _wait(self, wait_s: float) -> float:
+        return wait_s if wait_s > self._instant_s else 0.0
 
     def _require_link(self) -> None:
         if self.faults.disconnected:
-            self._inner.close()
+            self.close()
             raise LinkLostError(
                 f"The link to {self.url} is gone.",
                 "The device or its adapter was unplugged.",
@@ -212,7 +193,34 @@ class FaultyTransport:
             )
 
 
-class FaultyCanBus:
+class FaultyTransport(_Cable[bytes]):
+    """Any transport behind a bad cable.
+
+    Args:
+        inner: The transport.
+        faults: The faults that strike; more can be injected at any time.
+        packets: Whether each read of `inner` is one packet rather than part of a stream.
+    """
+
+    def __init__(
+        self, inner: Transport, faults: Faults | None = None, packets: bool = False
+    ) -> None:
+        super().__init__(inner, faults, packets)
+        self._inner = inner
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return the bytes that get through, waiting at most `timeout_s` for the first."""
+        return b"".join(self._read(self._inner.read, timeout_s))
+
+    def write(self, data: bytes) -> None:
+        """Send `data`, as far as the taps let it."""
+        self._require_link()
+        changed = self.outgoing(data)
+        if changed:
+            self._inner.write(changed)
+
+
+class FaultyCanBus(_Cable[CanFrame]):
     """Any bus behind a bad cable. A frame is hit as a whole: CAN's checksum drops a damaged one.
 
     Args:
@@ -220,49 +228,23 @@ class FaultyCanBus:
         faults: The faults that strike; more can be injected at any time.
     """
 
-    def __init__(self, inner: CanBus, faults: Faults | None = None) -> None:
-        self.url = inner.url
-        self.counters = inner.counters
-        """The inner bus's counters."""
-        self._cable = FaultyTransport(_Packets(inner), faults, packets=True, instant_s=1e-9)
-        self.faults = self._cable.faults
-        self.close = inner.close
+    _instant_s = 1e-9
 
-    @property
-    def now_s(self) -> float:
-        """The clock of the inner bus, seconds."""
-        return self._cable.now_s
+    def __init__(self, inner: CanBus, faults: Faults | None = None) -> None:
+        super().__init__(inner, faults, packets=True)
+        self._inner = inner
+        self.counters = inner.counters
 
     def send(self, frame: CanFrame) -> None:
         """Send a frame."""
-        self._cable.write(frame.to_bytes())
+        self._require_link()
+        self._inner.send(self.outgoing(frame))
 
     def read(self, timeout_s: float) -> CanFrame | None:
         """Return the next frame that gets through, waiting at most `timeout_s` for it."""
-        packet = self._cable.read(timeout_s)
-        return CanFrame.from_bytes(packet) if packet else None
+        return next(iter(self._read(self._inner.read, timeout_s)), None)
 
 
-class _Packets:
-    """The frames of a bus as packets of a transport."""
-
-    def __init__(self, bus: CanBus) -> None:
-        self._bus = bus
-        self.url = bus.url
-        self.close = bus.close
-
-    @property
-    def now_s(self) -> float:
-        return self._bus.now_s
-
-    def read(self, timeout_s: float) -> bytes:
-        frame = self._bus.read(timeout_s)
-        return frame.to_bytes() if frame else b""
-
-    def write(self, data: bytes) -> None:
-        self._bus.send(CanFrame.from_bytes(data))
-
-
-def unchanged(data: bytes) -> bytes:
-    """Let bytes pass as they are."""
-    return data
+def unchanged(chunk: Chunk) -> Chunk:
+    """Let a chunk pass as it is."""
+    return chunk
