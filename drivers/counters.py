@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
+from drivers.errors import LinkTimeoutError
+
 TRIES = 3
 """How often a question is asked before its device is taken for silent."""
 
@@ -65,3 +67,16 @@ class DeviceCounters(LinkCounters):
             self.retries += attempt > 0
             yield attempt
         self.timeouts += 1
+
+
+def silent(title: str, where: str, timeout_s: float, check: str) -> LinkTimeoutError:
+    """Return the error of a device that answers no question.
+
+    Args:
+        title: The device.
+        where: Where it was asked.
+        timeout_s: Time it had for each answer, s.
+        check: What a person should check.
+    """
+    why = f"It was asked {TRIES} times and had {timeout_s:g} s each."
+    return LinkTimeoutError(f"No {title} answers at {where}.", why, check)

@@ -79,6 +79,16 @@ def require_whole(batch: Batch, names: Iterable[str], title: str) -> None:
         )
 
 
+def _passed_on(call: str) -> Any:
+    """Return a method that passes a call on."""
+
+    def pass_on(self: "Guarded", *arguments: Any) -> Any:
+        with blaming(self._title):
+            return getattr(self._device, call)(*arguments)
+
+    return pass_on
+
+
 class Guarded(Device):
     """See `guarded`.
 
@@ -94,6 +104,10 @@ class Guarded(Device):
     def __getattr__(self, name: str) -> Any:
         """Return a member that this device has and others lack."""
         return getattr(self._device, name)
+
+    start = _passed_on("start")
+    stop = _passed_on("stop")
+    close = _passed_on("close")
 
     @property
     def name(self) -> str:
@@ -118,34 +132,23 @@ class Guarded(Device):
         with blaming(self._title):
             return require(self._device.identify(), DeviceIdentity, self._title, "identify")
 
-    def start(self) -> None:
-        """Let samples come."""
-        with blaming(self._title):
-            self._device.start()
-
     def read(self, timeout_s: float) -> Batch:
         """Return the samples that have come."""
         with blaming(self._title):
             batch = require(self._device.read(timeout_s), Batch, self._title, "read")
             if len(batch):
-                require_whole(
-                    batch, [channel.name for channel in self._device.channels], self._title
-                )
+                names = [channel.name for channel in self._device.channels]
+                require_whole(batch, names, self._title)
             return batch
-
-    def stop(self) -> None:
-        """Let no more samples come."""
-        with blaming(self._title):
-            self._device.stop()
-
-    def close(self) -> None:
-        """Stop, and let go of the link."""
-        with blaming(self._title):
-            self._device.close()
 
 
 class GuardedDrive(Guarded, Drive):
     """A drive; see `guarded`."""
+
+    idle = _passed_on("idle")
+    arm = _passed_on("arm")
+    command = _passed_on("command")
+    disarm = _passed_on("disarm")
 
     @property
     def axis(self) -> Axis:  # type: ignore[override]
@@ -165,23 +168,3 @@ class GuardedDrive(Guarded, Drive):
         """Time until the next sample is due."""
         with blaming(self._title):
             return float(self._device.wait_s)
-
-    def idle(self, wait_s: float) -> None:
-        """Let time pass."""
-        with blaming(self._title):
-            self._device.idle(wait_s)
-
-    def arm(self) -> None:
-        """Energise the motor."""
-        with blaming(self._title):
-            self._device.arm()
-
-    def command(self, ratio: float) -> None:
-        """Command a share of full scale."""
-        with blaming(self._title):
-            self._device.command(ratio)
-
-    def disarm(self) -> None:
-        """Take the motor out of force."""
-        with blaming(self._title):
-            self._device.disarm()

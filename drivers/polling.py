@@ -5,49 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from drivers.counters import DeviceCounters
 from drivers.device import Batch, Clocked, LinkedDevice
 from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError, LinkTimeoutError
-
-
-class PollSchedule:
-    """When the next question is due, and the numbers of those that brought no sample.
-
-    Args:
-        rate_hz: Questions a second.
-        counters: Counters of gaps and lost samples.
-    """
-
-    def __init__(self, rate_hz: float, counters: DeviceCounters) -> None:
-        self._period_s = 1.0 / rate_hz
-        self._counters = counters
-        self.restart(0.0)
-
-    def restart(self, now_s: float) -> None:
-        """Number the questions from 0, the first being due now."""
-        self._began_s = now_s
-        self.asked = 0
-        """Number of the next question, and so of its sample."""
-        self.lost = 0
-        """Questions since `restart` that brought no sample."""
-
-    def wait_s(self, now_s: float) -> float:
-        """Return the time until the next question is due, 0 when it is."""
-        wait_s = self._began_s + self.asked * self._period_s - now_s
-        return wait_s if wait_s > 1e-9 else 0.0
-
-    def skip_missed(self, now_s: float) -> None:
-        """Count the questions for which the caller came too late as lost."""
-        missed = int((now_s - self._began_s) / self._period_s + 1e-6) - self.asked
-        if missed > 0:
-            self.lose(missed)
-
-    def lose(self, samples: int = 1) -> None:
-        """Count questions that brought no sample."""
-        self.asked += samples
-        self.lost += samples
-        self._counters.gaps += 1
-        self._counters.lost += samples
 
 
 class PolledDevice(LinkedDevice):
@@ -69,8 +28,7 @@ class PolledDevice(LinkedDevice):
             raise ValueError(f"a rate is above 0 Hz, not {rate_hz}")
         super().__init__(way, rate_hz)
         self._late_s = late_s
-        self._schedule = PollSchedule(rate_hz, self._counters)
-        self._schedule.restart(way.now_s)
+        self._restart()
 
     @property
     def now_s(self) -> float:
@@ -80,7 +38,8 @@ class PolledDevice(LinkedDevice):
     @property
     def wait_s(self) -> float:
         """Time until the next sample is due, 0 when it is."""
-        return self._schedule.wait_s(self._way.now_s)
+        wait_s = self._began_s + self._asked / self._rate_hz - self._way.now_s
+        return wait_s if wait_s > 1e-9 else 0.0
 
     def idle(self, wait_s: float) -> None:
         """Let time pass; what comes unasked is late, and dropped."""
@@ -103,7 +62,7 @@ class PolledDevice(LinkedDevice):
         if not self._identified:
             self.identify()
         self.idle(0.0)
-        self._schedule.restart(self._way.now_s)
+        self._restart()
 
     def read(self, timeout_s: float) -> Batch:
         """Ask when the next sample is due and return it, or nothing when it is not due in time.
@@ -116,20 +75,34 @@ class PolledDevice(LinkedDevice):
         self.idle(max(0.0, min(self.wait_s, timeout_s)))
         if self.wait_s > 0:
             return self._batch(None)
-        self._schedule.skip_missed(self._way.now_s - self._late_s)
+        late_s = self._way.now_s - self._late_s - self._began_s
+        missed = int(late_s * self._rate_hz + 1e-6) - self._asked
+        if missed > 0:
+            self._lose(missed)
         sample = None
         try:
             sample = self.sample()
         except (LinkTimeoutError, FrameError):
-            self._schedule.lose()
+            self._lose(1)
         else:
-            self._schedule.asked += 1
+            self._asked += 1
             self._counters.frames += 1
         self.judge()
         return self._batch(sample)
 
     def stop(self) -> None:
         """Do nothing: a device that is not asked is silent."""
+
+    def _restart(self) -> None:
+        self._began_s = self._way.now_s
+        self._asked = self._lost = 0
+
+    def _lose(self, samples: int) -> None:
+        """Count questions that brought no sample."""
+        self._asked += samples
+        self._lost += samples
+        self._counters.gaps += 1
+        self._counters.lost += samples
 
     @cached_property
     def _names(self) -> list[str]:
@@ -142,9 +115,9 @@ class PolledDevice(LinkedDevice):
             {name: np.full(count, value) for name, value in zip(self._names, values, strict=True)},
             np.full(count, self._way.now_s),
             "host",
-            np.full(count, self._schedule.asked - 1, np.int64),
+            np.full(count, self._asked - 1, np.int64),
             np.full(count, flags, np.uint8),
-            self._schedule.lost,
+            self._lost,
         )
 
 

@@ -25,7 +25,7 @@ from drivers.epos4 import protocol as epos4
 from drivers.errors import DriverError
 from drivers.framing import FrameStream, encode_frame
 from drivers.qia128 import protocol as qia128
-from drivers.sliding import SlidingFrames
+from drivers.streaming import SlidingFrames
 from drivers.teensy import protocol as teensy
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench

@@ -8,13 +8,13 @@ from pydantic import Field
 
 from drivers.amt21 import protocol
 from drivers.amt21.turning import TOP_SPEED_RAD_S, RateGate, turns_at
-from drivers.counters import TRIES
+from drivers.counters import silent
 from drivers.device import Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.polling import PolledDevice
 from drivers.registry import BaudOption, Driver, RateOption, made
 from drivers.transport.serial_port import open_line
-from drivers.transport.transport import Transport
+from drivers.transport.transport import Transport, arriving
 
 REPLY_TIMEOUT_S = 0.01
 """Time for an answer: on a USB adapter it takes some milliseconds."""
@@ -65,11 +65,11 @@ class Amt21(PolledDevice):
             LinkTimeoutError: Nobody answers at this address.
         """
         if self._ask(turns=False) is None:
-            raise LinkTimeoutError(
-                f"No AMT21 answers at {self._transport.url}, address {self._address:#04x}.",
-                f"It was asked {TRIES} times.",
-                "Check supply, A and B, the address, and the bit rate (2 Mbit/s for types A to D).",
+            where = f"{self._transport.url}, address {self._address:#04x}"
+            check = (
+                "Check supply, A and B, the address, and the bit rate (2 Mbit/s for types A to D)."
             )
+            raise silent("AMT21", where, REPLY_TIMEOUT_S, check)
         return DeviceIdentity("AMT21", "", "")
 
     def start(self) -> None:
@@ -146,13 +146,10 @@ class Amt21(PolledDevice):
 
     def _receive(self, request: bytes) -> bytes:
         """Return the answer, without the request where the adapter returns it."""
-        give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
         came = b""
-        while len(came) < protocol.REPLY_SIZE:
-            remaining_s = give_up_s - self._transport.now_s
-            if remaining_s <= 0:
+        for came in arriving(self._transport, REPLY_TIMEOUT_S):
+            if len(came) >= protocol.REPLY_SIZE:
                 break
-            came += self._transport.read(remaining_s)
         came += self._transport.read(0.0)
         if len(came) == protocol.REPLY_SIZE + 1 and came.startswith(request):
             self._discard(came[:1])

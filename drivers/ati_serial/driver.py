@@ -12,24 +12,13 @@ from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT, slopes
 from drivers.ati_serial import protocol
 from drivers.device import DeviceIdentity, flags_of
 from drivers.errors import DriverError
-from drivers.modbus import Stream, StreamedSensor
+from drivers.modbus import StreamedSensor
 from drivers.registry import BaudOption, Driver, RateOption, made
 from drivers.streaming import QUIET_S
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 
 GAUGE_LIMIT = 32767
-_STREAM = Stream(
-    slave=protocol.SLAVE,
-    title="digital F/T",
-    check="Check its supply, the line, 1.25 Mbit/s and even parity.",
-    jam=protocol.JAM,
-    begin=protocol.encode(protocol.STREAM, protocol.START_STREAM),
-    begun=(protocol.STREAM, protocol.SUCCESS),
-    frame_size=protocol.FRAME_SIZE,
-    frame_checks=protocol.frame_checks,
-    agree=5,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +54,13 @@ class AtiSerial(StreamedSensor):
     """
 
     name = "ati-serial"
+    slave, title = protocol.SLAVE, "digital F/T"
+    check = "Check its supply, the line, 1.25 Mbit/s and even parity."
+    jam = protocol.JAM
+    begin_request = protocol.encode(protocol.STREAM, protocol.START_STREAM)
+    begin_answer = (protocol.STREAM, protocol.SUCCESS)
+    frame_size, agree = protocol.FRAME_SIZE, 5
+    frame_checks = staticmethod(protocol.frame_checks)
 
     def __init__(
         self,
@@ -75,7 +71,7 @@ class AtiSerial(StreamedSensor):
     ) -> None:
         if not 1 <= calibration <= 16:
             raise DriverError(f"A digital F/T has calibrations 1 to 16, none {calibration}.")
-        super().__init__(transport, _STREAM, rate_hz)
+        super().__init__(transport, rate_hz)
         self._number = calibration
         self._assumed = assumed
         self._calibration: protocol.Calibration | None = None
@@ -97,7 +93,7 @@ class AtiSerial(StreamedSensor):
         self.quieten()
         first = protocol.FIRST_CALIBRATION + (self._number - 1) * protocol.CALIBRATION_STEP
         registers = b"".join(
-            self._line.read(first + offset, count) for offset, count in protocol.PIECES
+            self.read_registers(first + offset, count) for offset, count in protocol.PIECES
         )
         told = protocol.decode_calibration(registers)
         found = replace(
@@ -125,7 +121,7 @@ class AtiSerial(StreamedSensor):
         assert self._calibration is not None  # noqa: S101
         active = self._calibration.gains + self._calibration.offsets
         self._set_lock(protocol.UNLOCK)
-        self._line.write(protocol.ACTIVE_GAINS, active)
+        self.ask(protocol.write_registers(protocol.ACTIVE_GAINS, active))
         self._set_lock(protocol.LOCK)
 
     def decode(self, frames: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
@@ -138,16 +134,16 @@ class AtiSerial(StreamedSensor):
     def _set_lock(self, state: bytes) -> None:
         message = protocol.encode(protocol.STORAGE, state)
         if self._assumed.lock_answers:
-            answer = self._line.ask(message)
+            answer = self.ask(message)
             if answer != protocol.SUCCESS:
-                raise self._line.refused(protocol.STORAGE, answer)
+                raise self.refused(protocol.STORAGE, answer)
             return
         self._transport.write(message)
         self._transport.read(QUIET_S)  # an answer all the same is let go
 
     def status(self) -> int:
         """Return the status register; only while it does not stream."""
-        return int.from_bytes(self._line.read(protocol.STATUS, 1), "big")
+        return int.from_bytes(self.read_registers(protocol.STATUS, 1), "big")
 
 
 def open_ati_serial(

@@ -1,9 +1,9 @@
 """Questions and answers on a Dynamixel's line: each is asked again when its answer is bad."""
 
-from drivers.counters import TRIES, DeviceCounters
+from drivers.counters import DeviceCounters, silent
 from drivers.dynamixel import protocol
 from drivers.dynamixel.protocol import Register
-from drivers.errors import CodedError, FrameError, LinkTimeoutError
+from drivers.errors import CodedError, FrameError
 from drivers.transport.transport import Transport
 
 REPLY_TIMEOUT_S = 0.02
@@ -56,11 +56,9 @@ class Line:
             answer = self._receive()
             if answer is not None:
                 return self._checked(answer, instruction)
-        raise LinkTimeoutError(
-            f"No Dynamixel answers at {self._transport.url}, identifier {self._id}.",
-            f"It was asked {TRIES} times and had {REPLY_TIMEOUT_S:g} s each.",
-            "Check its supply, the identifier and the bit rate (57600 from the factory).",
-        )
+        where = f"{self._transport.url}, identifier {self._id}"
+        check = "Check its supply, the identifier and the bit rate (57600 from the factory)."
+        raise silent("Dynamixel", where, REPLY_TIMEOUT_S, check)
 
     def discard(self, wait_s: float = 0.0) -> None:
         """Drop what comes unasked in a time: it is late."""

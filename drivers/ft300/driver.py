@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from drivers.device import DeviceIdentity, flags_of
 from drivers.errors import DriverError
 from drivers.ft300 import protocol
-from drivers.modbus import WRITE, Stream, StreamedSensor, write_registers
+from drivers.modbus import WRITE, StreamedSensor, write_registers
 from drivers.registry import BaudOption, Driver
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
@@ -14,18 +14,6 @@ from drivers.transport.transport import Transport
 RATE_HZ = 100.0
 RANGE = np.array([300.0] * 3 + [30.0] * 3)
 """Measuring range, N and N m; shape (6,)."""
-_BEGIN = write_registers(protocol.SLAVE, protocol.SELECT_OUTPUT, (protocol.STREAM,))
-_STREAM = Stream(
-    slave=protocol.SLAVE,
-    title="FT 300",
-    check="Check its 24 V, the line, 19200 bit/s, no parity, and the adapter's A and B.",
-    jam=protocol.JAM,
-    begin=_BEGIN,
-    begun=(WRITE, _BEGIN[2:6]),
-    frame_size=protocol.MESSAGE_SIZE,
-    frame_checks=protocol.message_checks,
-    agree=2,
-)
 
 
 class Ft300(StreamedSensor):
@@ -36,10 +24,17 @@ class Ft300(StreamedSensor):
     """
 
     name = "ft300"
+    slave, title = protocol.SLAVE, "FT 300"
+    check = "Check its 24 V, the line, 19200 bit/s, no parity, and the adapter's A and B."
+    jam = protocol.JAM
+    begin_request = write_registers(protocol.SLAVE, protocol.SELECT_OUTPUT, (protocol.STREAM,))
+    begin_answer = (WRITE, begin_request[2:6])
+    frame_size, agree = protocol.MESSAGE_SIZE, 2
+    frame_checks = staticmethod(protocol.message_checks)
     tops = tuple((protocol.STEPS * 32768).tolist())
 
     def __init__(self, transport: Transport) -> None:
-        super().__init__(transport, _STREAM, RATE_HZ)
+        super().__init__(transport, RATE_HZ)
 
     def identify(self) -> DeviceIdentity:
         """End the stream; ask for firmware and serial number.
@@ -50,7 +45,7 @@ class Ft300(StreamedSensor):
         """
         self.quieten()
         firmware, serial = (
-            self._line.read(*place) for place in (protocol.FIRMWARE, protocol.SERIAL)
+            self.read_registers(*place) for place in (protocol.FIRMWARE, protocol.SERIAL)
         )
         if firmware[:1] != b"F":
             raise DriverError(

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from drivers.counters import TRIES, DeviceCounters
-from drivers.errors import FrameError, LinkTimeoutError
+from drivers.counters import DeviceCounters, silent
+from drivers.errors import FrameError
 from drivers.moteus import protocol
 from drivers.transport.transport import Transport
 
@@ -45,11 +45,9 @@ class FdcanusbLink:
                 return decode(answer)
             except FrameError:
                 self._counters.crc_errors += 1
-        raise LinkTimeoutError(
-            f"No moteus answers at {self._transport.url}, identifier {self._id}.",
-            f"It was asked {TRIES} times and had {REPLY_TIMEOUT_S:g} s each.",
-            "Check its supply, the identifier, and both terminators of the bus.",
-        )
+        where = f"{self._transport.url}, identifier {self._id}"
+        check = "Check its supply, the identifier, and both terminators of the bus."
+        raise silent("moteus", where, REPLY_TIMEOUT_S, check)
 
     def discard(self, wait_s: float = 0.0) -> None:
         """Drop what comes unasked in a time: it is late."""

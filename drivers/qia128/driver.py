@@ -7,15 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.counters import TRIES
+from drivers.counters import silent
 from drivers.device import Channel, DeviceIdentity, flags_of
-from drivers.errors import DriverError, LinkTimeoutError
+from drivers.errors import DriverError
 from drivers.qia128 import protocol
 from drivers.registry import BaudOption, Driver, RateOption
-from drivers.sliding import SlidingFrames
-from drivers.streaming import StreamedDevice
+from drivers.streaming import SlidingFrames, StreamedDevice
 from drivers.transport.serial_port import open_line
-from drivers.transport.transport import Transport
+from drivers.transport.transport import Transport, arriving
 
 RATE_HZ = 1300.0
 Unit = Literal["N m", "N", "1"]
@@ -115,19 +114,13 @@ class Qia128(StreamedDevice):
         """Return the 32-bit number a question is answered with."""
         for _ in self._counters.attempts():
             self._transport.write(question)
-            give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
-            came = b""
-            while self._transport.now_s < give_up_s:
-                came += self._transport.read(give_up_s - self._transport.now_s)
+            for came in arriving(self._transport, REPLY_TIMEOUT_S):
                 found = protocol.find_packet(came, command)
                 if found is not None and len(found[0]) == 4:
                     return int.from_bytes(found[0], "big")
             self._counters.discarded_bytes += len(came)
-        raise LinkTimeoutError(
-            f"No QIA128 answers at {self._transport.url}.",
-            f"It was asked {TRIES} times.",
-            "Check its supply, the two data lines, and the bit rate.",
-        )
+        check = "Check its supply, the two data lines, and the bit rate."
+        raise silent("QIA128", self._transport.url, REPLY_TIMEOUT_S, check)
 
 
 def open_qia128(

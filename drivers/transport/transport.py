@@ -1,7 +1,7 @@
 """The way bytes travel to a device, opened by URL, and the registry of URL schemes."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from time import monotonic
 from typing import Protocol
 
@@ -40,6 +40,15 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Let go of the link. Closing twice does nothing."""
+
+
+def arriving(transport: Transport, timeout_s: float) -> Iterator[bytes]:
+    """Yield all that has come from now on, again after each read, until the time is over."""
+    give_up_s = transport.now_s + timeout_s
+    came = b""
+    while (remaining_s := give_up_s - transport.now_s) > 0:
+        came += transport.read(remaining_s)
+        yield came
 
 
 class HostLink:

@@ -10,7 +10,7 @@ from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.qia128 import protocol
 from drivers.qia128.driver import Qia128
 from drivers.qia128.fake import Qia128Fake
-from drivers.sliding import SlidingFrames
+from drivers.streaming import SlidingFrames
 from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 
