@@ -6,7 +6,7 @@ looked at the cause. The power stage stays off.
 
 from dataclasses import dataclass
 
-from drivers.epos4.drive import Epos4
+from drivers.epos4.driver import Epos4
 from drivers.epos4.faults import explain
 from drivers.registry import made
 from drivers.teensy.driver import TeensyLogger

@@ -6,7 +6,7 @@ Not modelled, in addition to the limits of the drive's fake: the load motor, whi
 import ctypes
 import os
 
-from drivers.epos4.drive import Epos4
+from drivers.epos4.driver import Epos4
 from drivers.epos4.fake import Epos4Fake
 from drivers.transport.can_bus import CanBus
 from drivers.transport.live_can import LiveCanBus

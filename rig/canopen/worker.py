@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from time import monotonic
 
-from drivers.epos4.drive import Epos4
+from drivers.epos4.driver import Epos4
 from drivers.errors import DriverError
 from drivers.registry import made
 from drivers.transport.python_can import open_can

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.amt21 import protocol
-from drivers.amt21.driver import Amt21, open_amt21
+from drivers.amt21.driver import Amt21, open_amt21, turns_at
 from drivers.amt21.fake import Amt21Fake
-from drivers.amt21.turning import turns_at
 from drivers.errors import FrameError, LinkError, LinkTimeoutError
 from drivers.transport.simulated import SimulatedTransport
 

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from drivers.device import SampleFlag
 from drivers.dynamixel import protocol
-from drivers.dynamixel.driver import Dynamixel, open_dynamixel
+from drivers.dynamixel.driver import Dynamixel, InstructionRefusedError, open_dynamixel
 from drivers.dynamixel.fake import DynamixelFake
-from drivers.dynamixel.line import InstructionRefusedError
 from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError, LinkError
 from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport

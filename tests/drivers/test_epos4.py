@@ -11,8 +11,7 @@ from drivers.counters import DeviceCounters
 from drivers.device import SampleFlag
 from drivers.epos4 import faults, protocol
 from drivers.epos4.canopen_link import CanopenLink, ObjectRefusedError
-from drivers.epos4.drive import Epos4
-from drivers.epos4.driver import open_epos4
+from drivers.epos4.driver import Epos4, open_epos4
 from drivers.epos4.fake import Epos4Fake
 from drivers.epos4.faults import DriveFaultError
 from drivers.epos4.protocol import Ratings, State

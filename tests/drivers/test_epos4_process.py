@@ -10,8 +10,7 @@ from pathlib import Path
 import can
 import pytest
 
-from drivers.epos4.drive import Epos4
-from drivers.epos4.driver import open_epos4
+from drivers.epos4.driver import Epos4, open_epos4
 from drivers.epos4.faults import DriveFaultError
 from drivers.errors import DriverError
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.epos4.drive import Epos4
+from drivers.epos4.driver import Epos4
 from drivers.epos4.fake import Epos4Fake
 from drivers.epos4.faults import DriveFaultError
 from drivers.epos4.protocol import State
