@@ -220,10 +220,6 @@ class LinkedDevice(Device):
     """What every driver of a device on one link has.
 
     A driver gives `channels`, `identify`, `start`, `read` and `stop`.
-
-    Args:
-        way: The way to the device, closed with it.
-        rate_hz: Samples a second.
     """
 
     def __init__(self, way: Clocked, rate_hz: float) -> None:

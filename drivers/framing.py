@@ -38,11 +38,7 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def cobs_decode(encoded: bytes) -> bytes:
-    """Return the bytes that `cobs_encode` stuffed.
-
-    Raises:
-        FrameError: A zero byte inside, or a block that runs past the end.
-    """
+    """Return the bytes that `cobs_encode` stuffed; `FrameError` for what is not COBS."""
     data = np.empty(len(encoded), np.uint8)
     size = compiled.cobs_decode(np.frombuffer(encoded, np.uint8), data)
     if size < 0:

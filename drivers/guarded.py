@@ -90,12 +90,7 @@ def _passed_on(call: str) -> Any:
 
 
 class Guarded(Device):
-    """See `guarded`.
-
-    Args:
-        device: The device.
-        title: Its driver and package.
-    """
+    """See `guarded`."""
 
     def __init__(self, device: Any, title: str) -> None:
         self._device = device

@@ -21,7 +21,6 @@ class FramedLink:
     Frames of `payload_size` are the device's stream and wait in bulk; all others wait one by one.
 
     Args:
-        transport: The way to the device.
         payload_size: Size of a stream frame's payload, bytes.
     """
 

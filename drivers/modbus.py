@@ -66,7 +66,6 @@ class StreamedSensor(StreamedDevice):
     attributes below.
 
     Args:
-        transport: The way to it; the device closes it.
         rate_hz: Frames a second.
     """
 

@@ -15,7 +15,6 @@ class PolledDevice(LinkedDevice):
     A driver gives `channels`, `identify`, `idle` and `sample`, and may give `judge`.
 
     Args:
-        way: The way to the device, closed with it.
         rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
         late_s: How late a question may be and still be asked; later ones are lost.
 
@@ -127,9 +126,7 @@ class PolledDrive(PolledDevice):
     A driver gives `energise`, `release` and `zero` besides what every polled device gives.
 
     Args:
-        way: The way to the drive, closed with it.
         rate_hz: Polling rate.
-        title: The drive in messages, such as `moteus 1`.
         own_watch: What a working drive does by itself when nobody asks, one sentence.
         late_s: See `PolledDevice`.
     """

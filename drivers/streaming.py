@@ -23,7 +23,6 @@ class Arrivals:
     """Numbers the samples of a stream that does not, and notices its silences.
 
     Args:
-        counters: Counters to add silences to.
         longest_silence_s: Longest time between samples that is not a fault, s.
     """
 
@@ -64,7 +63,6 @@ class SlidingFrames:
     Args:
         size: Bytes of a frame, which begins wherever checksums agree.
         check: The checksum.
-        counters: Counters of frames, bad ones and discarded bytes.
         agree: Frames in a row that must hold.
     """
 
@@ -149,11 +147,6 @@ class StreamedDevice(LinkedDevice):
     """A device that streams by itself.
 
     A driver gives `channels`, `identify`, `begin`, `receive` and `stop`.
-
-    Args:
-        transport: The way to it; the device closes it.
-        rate_hz: Samples a second.
-        title: The device in messages.
     """
 
     def __init__(self, transport: Transport, rate_hz: float, title: str) -> None:

@@ -84,7 +84,6 @@ class Amt21(PolledDevice):
     """One encoder on an RS-485 line. Nothing else on the line may be asked at the same time.
 
     Args:
-        transport: The way to the line; the device closes it.
         address: The encoder's address.
         multi_turn: Whether it also counts turns.
         rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
@@ -119,11 +118,7 @@ class Amt21(PolledDevice):
         return self._channels
 
     def identify(self) -> DeviceIdentity:
-        """Request one position: the encoder has no other identification.
-
-        Raises:
-            LinkTimeoutError: Nobody answers at this address.
-        """
+        """Request one position: the encoder has no other identification."""
         if self._ask(turns=False) is None:
             where = f"{self._transport.url}, address {self._address:#04x}"
             check = (

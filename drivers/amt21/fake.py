@@ -11,14 +11,7 @@ from drivers.transport.simulated import Outbox, SimulatedTransport
 
 
 class Amt21Fake(Outbox):
-    """An encoder, with the interface of `drivers.transport.simulated.Board`.
-
-    Args:
-        address: Its address; it stays silent for any other.
-        counts_a_tick: Counts its shaft turns in 1 ms.
-        multi_turn: Whether it answers for turns.
-        echo: True if the adapter returns the host's own bytes.
-    """
+    """An encoder, with the interface of `drivers.transport.simulated.Board`."""
 
     def __init__(
         self,

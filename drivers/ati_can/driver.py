@@ -27,7 +27,6 @@ class AtiCan(PolledDevice):
     """One force/torque sensor on a CAN bus.
 
     Args:
-        bus: The bus; the device closes it.
         base: The sensor's base identifier, 0 to 127.
         calibration: Which of its 16 calibrations to use.
         rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
@@ -80,7 +79,6 @@ class AtiCan(PolledDevice):
         """Ask for serial number and firmware, and read the calibration.
 
         Raises:
-            LinkTimeoutError: Nobody answers with this base identifier.
             FrameError: The answer is not of a NETCANOEM, or its calibration is empty.
         """
         version = protocol.decode_firmware(self._ask(protocol.FIRMWARE)[0])
@@ -109,7 +107,6 @@ class AtiCan(PolledDevice):
         A saturated gauge makes the whole wrench wrong: it is flagged `SATURATED` and `SUSPECT`.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             DriverError: The sensor has restarted and does not use the calibration that was chosen;
                 every reading says so until `start`.
         """

@@ -39,13 +39,7 @@ def swaying(tick: int) -> NDArray[np.int64]:
 
 
 class AtiCanFake:
-    """A sensor, with the interface of `drivers.transport.simulated_can.CanNode`.
-
-    Args:
-        base: Its base identifier.
-        load: What its gauges read.
-        firmware: Major and minor version and build.
-    """
+    """A sensor, with the interface of `drivers.transport.simulated_can.CanNode`."""
 
     def __init__(
         self,

@@ -104,11 +104,7 @@ def decode_matrix_row(replies: list[bytes]) -> NDArray[np.float64]:
 
 
 def decode_counts_per_unit(reply: bytes) -> tuple[int, int]:
-    """Return counts per unit of force and of torque.
-
-    Raises:
-        FrameError: The frame has the wrong size, or a value is 0.
-    """
+    """Return counts per unit of force and of torque; `FrameError` for a wrong size or a 0."""
     force, torque = _COUNTS.unpack(_sized(reply, _COUNTS.size, "counts frame"))
     if not (force and torque):
         raise FrameError("The sensor has no counts per unit.")
@@ -121,11 +117,7 @@ def encode_counts_per_unit(force: int, torque: int) -> bytes:
 
 
 def decode_firmware(reply: bytes) -> tuple[int, int, int]:
-    """Return major and minor version and build.
-
-    Raises:
-        FrameError: The frame has the wrong size.
-    """
+    """Return major and minor version and build; `FrameError` for a wrong size."""
     major, minor, build = _FIRMWARE.unpack(_sized(reply, _FIRMWARE.size, "firmware frame"))
     return major, minor, build
 
@@ -136,11 +128,7 @@ def encode_firmware(major: int, minor: int, build: int) -> bytes:
 
 
 def decode_serial(reply: bytes) -> str:
-    """Return the serial number.
-
-    Raises:
-        FrameError: The frame has the wrong size, or is not text.
-    """
+    """Return the serial number; `FrameError` for a wrong size, or where it is not text."""
     text = _sized(reply, 8, "serial number frame").rstrip(b"\0 ")
     if not text.isascii():
         raise FrameError("The sensor's serial number is not text.")

@@ -27,7 +27,6 @@ class AtiNet(StreamedDevice):
     """One force/torque sensor with a Net Box, or an Ethernet Axia.
 
     Args:
-        transport: The way to its RDT port; the device closes it.
         open_calibration: Opens the way to its TCP port, used to ask for counts per unit.
         rate_hz: The RDT rate set on its web page.
     """
@@ -67,7 +66,6 @@ class AtiNet(StreamedDevice):
         """Read the calibration: units and counts per unit. Serial and firmware are not available.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             FrameError: The answer is not a calibration.
         """
         link = self._open_calibration()

@@ -22,9 +22,6 @@ class RdtFake:
     """The UDP side, 1000 records a second, with `drivers.transport.simulated.Board`'s interface.
 
     `transmit` gives one datagram at a time.
-
-    Args:
-        first_sequence: `rdt_sequence` of the first record after each start.
     """
 
     def __init__(self, first_sequence: int = 1) -> None:
@@ -92,11 +89,7 @@ class RdtFake:
 
 
 class CalibrationFake(Outbox):
-    """The TCP side, with the interface of `drivers.transport.simulated.Board`.
-
-    Args:
-        calibration: What it answers with.
-    """
+    """The TCP side, with the interface of `drivers.transport.simulated.Board`."""
 
     def __init__(self, calibration: Calibration = NEWTON_AND_NEWTON_METRE) -> None:
         super().__init__()

@@ -111,11 +111,7 @@ def encode_command(command: int, samples: int = 0) -> bytes:
 
 
 def decode_command(datagram: bytes) -> tuple[int, int]:
-    """Return command and sample count of a request.
-
-    Raises:
-        FrameError: It is none.
-    """
+    """Return command and sample count of a request; `FrameError` where it is none."""
     if len(datagram) != _COMMAND.size or datagram[:2] != HEADER.to_bytes(2, "big"):
         raise FrameError("A datagram is not an RDT request.")
     _, command, samples = _COMMAND.unpack(datagram)

@@ -28,11 +28,7 @@ LEAST_REPEATS = 5
 
 
 class RecordSequence:
-    """The thread through a stream of records that may be lost, repeated or overtaken.
-
-    Args:
-        counters: Counters of its errors.
-    """
+    """The thread through a stream of records that may be lost, repeated or overtaken."""
 
     def __init__(self, counters: DeviceCounters) -> None:
         self._counters = counters
@@ -96,9 +92,7 @@ class StreamWatch:
     """The life of one stream.
 
     Args:
-        url: Name for messages.
         rate_hz: Records a second.
-        counters: Where requests sent again and frozen sensors are counted.
     """
 
     def __init__(self, url: str, rate_hz: float, counters: DeviceCounters) -> None:

@@ -44,7 +44,6 @@ class AtiSerial(StreamedSensor):
     """One sensor on an RS-485 line.
 
     Args:
-        transport: The way to it; the device closes it.
         calibration: Which of its 16 calibrations to use, from 1.
         rate_hz: Frames a second it sends.
         assumed: What is taken for granted about it.
@@ -87,7 +86,6 @@ class AtiSerial(StreamedSensor):
         """End the stream and read the calibration.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             DriverError: The calibration is empty, or in unknown units.
         """
         self.quieten()

@@ -24,12 +24,7 @@ _OWN_FUNCTION_SIZE = 5
 
 
 class ModbusServer:
-    """Registers behind Modbus RTU, with the sensor's lock and its switch into the stream.
-
-    Args:
-        first: Register where `block` begins.
-        block: Registers that are not 0, as bytes.
-    """
+    """Registers behind Modbus RTU, with the sensor's lock and its switch into the stream."""
 
     def __init__(self, first: int, block: bytes) -> None:
         values = [0] * REGISTERS

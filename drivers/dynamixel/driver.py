@@ -43,7 +43,6 @@ class Line:
         """Return the value of a register.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             InstructionRefusedError: The device refuses.
         """
         return self.ask(protocol.READ, protocol.read_question(register))
@@ -116,7 +115,6 @@ class Dynamixel(PolledDrive):
     """One drive on a serial line. Nothing else on the line may be asked at the same time.
 
     Args:
-        transport: The way to the line; the device closes it.
         device_id: The drive's identifier.
         rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
         watchdog_ms: Silence after which an armed drive stops by itself, in steps of 20 ms.
@@ -178,7 +176,6 @@ class Dynamixel(PolledDrive):
         """Ask for model and firmware, and read the current limit.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             DriverError: The model is not known, or controls no current.
         """
         number, firmware = protocol.decode_ping(self._line.ask(protocol.PING))

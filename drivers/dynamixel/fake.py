@@ -23,12 +23,7 @@ _ACCELERATION, _FRICTION = 40.0, 4.0
 
 
 class DynamixelFake(Outbox):
-    """A drive, with the interface of `drivers.transport.simulated.Board`.
-
-    Args:
-        model: Its model number.
-        echo: Whether the adapter returns the host's own bytes.
-    """
+    """A drive, with the interface of `drivers.transport.simulated.Board`."""
 
     def __init__(self, model: int = XL330_M288, echo: bool = False) -> None:
         super().__init__()

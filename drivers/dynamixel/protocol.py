@@ -157,11 +157,7 @@ def decode_ping(parameters: bytes) -> tuple[int, int]:
 
 
 def decode_present(data: bytes) -> Present:
-    """Return the values of the registers from 126 on.
-
-    Raises:
-        FrameError: They are not 21 bytes.
-    """
+    """Return the values of the registers from 126 on; `FrameError` unless they are 21 bytes."""
     if len(data) != _PRESENT.size:
         raise FrameError(f"The present values have {_PRESENT.size} bytes, not {len(data)}.")
     current, velocity, position, _, _, voltage, temperature = _PRESENT.unpack(data)
@@ -187,11 +183,7 @@ MODELS = {
 
 
 def model_of(number: int) -> tuple[str, float]:
-    """Return a model's name and its amperes a unit of current.
-
-    Raises:
-        DriverError: It is not known, or it measures no current.
-    """
+    """Return a model's name and its amperes a unit of current; `DriverError` where it has none."""
     name, unit_a = MODELS.get(number, ("", 0.0))
     if not name:
         raise DriverError(

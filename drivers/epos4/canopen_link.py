@@ -31,9 +31,7 @@ class CanopenLink:
     """One node's objects and frames.
 
     Args:
-        bus: The bus; closed by whoever opened it.
         node_id: The node.
-        counters: Where retries and time-outs are counted.
     """
 
     def __init__(self, bus: CanBus, node_id: int, counters: DeviceCounters) -> None:
@@ -71,7 +69,6 @@ class CanopenLink:
 
         Raises:
             ObjectRefusedError: The drive has no such object, or does not let it be read.
-            LinkTimeoutError: It does not answer.
         """
         variable = self._variable(index, subindex)
         data = self._transfer("read", index, subindex, lambda: self._sdo.upload(index, subindex))

@@ -27,7 +27,6 @@ class Epos4(PolledDrive):
     """One drive on a CAN bus of its own, or one that this host masters.
 
     Args:
-        bus: The bus; the device closes it.
         node_id: The drive's node number.
         rate_hz: How often SYNC is sent.
         host_timeout_ms: Silence of the host after which the drive stops by itself; 0 for never.
@@ -117,7 +116,6 @@ class Epos4(PolledDrive):
         """Ask who is there, and read the motor data.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             ProtocolMismatchError: It is not maxon's, or has no cyclic torque mode.
         """
         identity, self._ratings = identify(self._link)
@@ -194,11 +192,7 @@ class Epos4(PolledDrive):
         return super().wait_s if self._node.started else math.inf
 
     def sample(self) -> tuple[Sequence[float], int]:
-        """Send command and SYNC, and return the drive's answer.
-
-        Raises:
-            LinkTimeoutError: There is none.
-        """
+        """Send command and SYNC, and return the drive's answer."""
         if self._node.in_trouble:
             self._armed = False  # it is not commanded any more
         self._feedback = self._cycle.exchange(self._target if self._armed else None)
@@ -233,11 +227,7 @@ class Epos4(PolledDrive):
             self._require_operation(self._feedback)
 
     def idle(self, wait_s: float) -> None:
-        """Serve the bus for a while; an answer that comes is to a SYNC that was given up.
-
-        Raises:
-            LinkLostError: The bus is gone.
-        """
+        """Serve the bus for a while; an answer that comes is to a SYNC that was given up."""
         self._node.idle(wait_s)
         self._cycle.drop_late()
 

@@ -122,14 +122,7 @@ class FreeMotor:
 
 
 class Epos4Fake:
-    """A drive, with the interface of `drivers.transport.simulated_can.CanNode`.
-
-    Args:
-        node_id: Its node number.
-        motor: What its motor does.
-        objects: Values of its objects by (index, subindex), over those it comes with.
-        absent: Indices of objects it does not have.
-    """
+    """A drive, with the interface of `drivers.transport.simulated_can.CanNode`."""
 
     def __init__(
         self,

@@ -40,9 +40,7 @@ class Node:
     """What the network says of one drive.
 
     Args:
-        link: The way to the drive's objects.
         host_timeout_ms: Silence of the host after which the drive stops by itself; 0 for never.
-        counters: Where restarts, errors and silences are counted.
     """
 
     def __init__(self, link: "CanopenLink", host_timeout_ms: int, counters: DeviceCounters) -> None:
@@ -210,10 +208,8 @@ class Cycle:
     """The process data of one drive.
 
     Args:
-        link: The way to it.
         rate_hz: How often SYNC is sent.
         late_s: How late a SYNC may be; 0 where none is sent late.
-        counters: Where damaged and late answers are counted.
     """
 
     def __init__(

@@ -133,12 +133,7 @@ def _switch_off(link: "CanopenLink", communication: int, cob_base: int) -> None:
 
 
 class PowerStage:
-    """The state machine of one drive.
-
-    Args:
-        link: The way to its objects.
-        node: Its network state, served while it is waited for.
-    """
+    """The state machine of one drive."""
 
     def __init__(self, link: "CanopenLink", node: Node) -> None:
         self._link = link

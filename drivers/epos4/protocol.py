@@ -73,11 +73,7 @@ _STATES = (
 
 
 def state_of(statusword: int) -> State:
-    """Return the state of a statusword.
-
-    Raises:
-        FrameError: It contains none.
-    """
+    """Return the state of a statusword; `FrameError` where it contains none."""
     for mask, value, state in _STATES:
         if statusword & mask == value:
             return state
@@ -105,11 +101,7 @@ def encode_feedback(feedback: Feedback) -> bytes:
 
 
 def decode_feedback(data: bytes) -> Feedback:
-    """Return the content of a TPDO1.
-
-    Raises:
-        FrameError: It has not 8 bytes.
-    """
+    """Return the content of a TPDO1; `FrameError` where it has not 8 bytes."""
     if len(data) != _TPDO.size:
         raise FrameError(f"The drive's process data have {_TPDO.size} bytes, not {len(data)}.")
     return Feedback(*_TPDO.unpack(data))

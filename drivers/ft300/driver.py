@@ -17,11 +17,7 @@ RANGE = np.array([300.0] * 3 + [30.0] * 3)
 
 
 class Ft300(StreamedSensor):
-    """One sensor on an RS-485 line.
-
-    Args:
-        transport: The way to it; the device closes it.
-    """
+    """One sensor on an RS-485 line."""
 
     name = "ft300"
     slave, title = protocol.SLAVE, "FT 300"
@@ -40,7 +36,6 @@ class Ft300(StreamedSensor):
         """End the stream; ask for firmware and serial number.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             DriverError: It is another device.
         """
         self.quieten()

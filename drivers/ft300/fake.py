@@ -22,11 +22,7 @@ ILLEGAL_FUNCTION, FAILED = b"\x01", 0x80
 
 
 class Ft300Fake(Outbox):
-    """A sensor, with the interface of `drivers.transport.simulated.Board`.
-
-    Args:
-        firmware: Its three registers of the firmware version.
-    """
+    """A sensor, with the interface of `drivers.transport.simulated.Board`."""
 
     def __init__(self, firmware: bytes = b"FTS\x02\x00\x09") -> None:
         super().__init__()

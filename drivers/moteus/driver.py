@@ -94,7 +94,6 @@ class Moteus(PolledDrive):
     """One controller behind an fdcanusb. Nothing else on the bus may be asked at the same time.
 
     Args:
-        transport: The way to the fdcanusb; the device closes it.
         device_id: The controller's identifier.
         rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
         torque_limit_n_m: The most it may be commanded, at the output.
@@ -149,7 +148,6 @@ class Moteus(PolledDrive):
         """Ask for model, firmware and serial number.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             FrameError: The answer is not of a moteus.
         """
         question = protocol.read(protocol.INT32, protocol.MODEL, 2)

@@ -141,11 +141,7 @@ def subframes(data: bytes) -> Iterator[tuple[int, int, int, int, tuple[float, ..
 
 
 def registers(data: bytes) -> dict[int, float]:
-    """Return the values of an answer by register.
-
-    Raises:
-        FrameError: It is none.
-    """
+    """Return the values of an answer by register; `FrameError` where it is none."""
     found: dict[int, float] = {}
     for operation, _, first, _, values in subframes(data):
         if operation != REPLY:

@@ -27,7 +27,6 @@ class Qia128(StreamedDevice):
     """One amplifier on a UART.
 
     Args:
-        transport: The way to it; the device closes it.
         rated_load: Load of the calibration's full-scale point, from the certificate.
         unit: Unit of `rated_load`, `N m` or `N`; `1` gives the fraction of full scale.
         rate_hz: Samples a second. 1300 is set; for any other rate, the amplifier is left as it is.
@@ -65,7 +64,6 @@ class Qia128(StreamedDevice):
         """End the stream, ask for the serial number and the calibration.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             DriverError: The calibration's two points are the same.
         """
         self.quieten()

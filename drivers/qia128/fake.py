@@ -16,13 +16,7 @@ RATE_HZ = 1300
 
 
 class Qia128Fake(Outbox):
-    """An amplifier, with the interface of `drivers.transport.simulated.Board`.
-
-    Args:
-        serial: Its serial number.
-        zero: Reading without load.
-        full_scale: Reading at rated load.
-    """
+    """An amplifier, with the interface of `drivers.transport.simulated.Board`."""
 
     def __init__(
         self,

@@ -9,11 +9,7 @@ _WRAP = 2**32
 
 
 class Continuity:
-    """The thread through a stream of samples.
-
-    Args:
-        counters: Counters of gaps, lost samples and duplicates.
-    """
+    """The thread through a stream of samples."""
 
     def __init__(self, counters: LinkCounters) -> None:
         self._counters = counters

@@ -54,7 +54,6 @@ class TeensyDevice(LinkedDevice):
     """The logger's stream in units, time-stamped by its own clock. It is never armed.
 
     Args:
-        transport: The way to the board; the device closes it.
         wired: Meaning of the fields of a sample; raw counts by default.
         profile: Samples of the board.
     """

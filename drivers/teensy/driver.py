@@ -55,7 +55,6 @@ class TeensyLogger:
     with; otherwise it goes to its safe state.
 
     Args:
-        transport: The way to the board; the logger closes it.
         profile: Samples and motors of the board.
     """
 
@@ -82,7 +81,6 @@ class TeensyLogger:
         """Read the board's identity and check its protocol version.
 
         Raises:
-            LinkTimeoutError: Nobody answers.
             ProtocolMismatchError: Its protocol differs; the message names both.
         """
         self._link.break_frame()
@@ -192,11 +190,7 @@ class TeensyLogger:
         return self.queue_free
 
     def read(self, timeout_s: float) -> SampleBatch:
-        """Return the samples that have come, waiting at most `timeout_s` for the first.
-
-        Raises:
-            LinkLostError: The link is gone.
-        """
+        """Return the samples that have come, waiting at most `timeout_s` for the first."""
         give_up_s = self._link.transport.now_s + timeout_s
         while True:
             remaining_s = max(0.0, give_up_s - self._link.transport.now_s)

@@ -34,14 +34,7 @@ _SILENT = protocol.STATUS_WATCHDOG_TRIPPED | Trip.HOST_SILENT << protocol.TRIP_S
 
 
 class PythonBoard(Outbox):
-    """A board for simulation on a bench, with the interface of `drivers.transport.simulated.Board`.
-
-    Args:
-        bench: The physics.
-        start_tick_us: Device clock at the first tick.
-        protocol_hash: Protocol hash of the board; its profile's if None.
-        logic: What its profile does a tick.
-    """
+    """A board on a bench, with the interface of `drivers.transport.simulated.Board`."""
 
     def __init__(
         self,

@@ -16,11 +16,7 @@ POTS = tuple(
 
 
 class TeensyMaster(TeensyDevice):
-    """Counts of the potentiometers at 2 kHz, on the board's clock. It is never armed.
-
-    Args:
-        transport: The way to the board; the device closes it.
-    """
+    """Counts of the potentiometers at 2 kHz, on the board's clock. It is never armed."""
 
     name = "teensy-master"
 

@@ -197,8 +197,6 @@ class FaultyTransport(_Cable[bytes]):
     """Any transport behind a bad cable.
 
     Args:
-        inner: The transport.
-        faults: The faults that strike; more can be injected at any time.
         packets: Whether each read of `inner` is one packet rather than part of a stream.
     """
 
@@ -221,12 +219,7 @@ class FaultyTransport(_Cable[bytes]):
 
 
 class FaultyCanBus(_Cable[CanFrame]):
-    """Any bus behind a bad cable. A frame is hit as a whole: CAN's checksum drops a damaged one.
-
-    Args:
-        inner: The bus.
-        faults: The faults that strike; more can be injected at any time.
-    """
+    """Any bus behind a bad cable. A frame is hit as a whole: CAN's checksum drops a damaged one."""
 
     _instant_s = 1e-9
 

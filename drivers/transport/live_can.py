@@ -13,13 +13,7 @@ from drivers.transport.simulated_can import TICK_S, CanNode
 
 
 class LiveCanBus:
-    """The host's place on a bus of python-can whose other nodes are fakes.
-
-    Args:
-        bus: The host's place; closed with this.
-        theirs: The nodes' place on the same bus; closed with this.
-        nodes: Who is there.
-    """
+    """The host's place on a bus of python-can whose other nodes are fakes."""
 
     def __init__(self, bus: CanBus, theirs: CanBus, nodes: Sequence[CanNode]) -> None:
         self.url = bus.url

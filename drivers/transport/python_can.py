@@ -58,8 +58,6 @@ class PythonCanBus(HostLink):
     """A bus over an open python-can interface.
 
     Args:
-        url: The URL the user gave, for messages.
-        bus: The open interface; closed with this.
         echoes: Whether the interface returns own frames. Each is then dropped once.
     """
 

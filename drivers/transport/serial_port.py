@@ -33,12 +33,7 @@ else:
 
 
 class SerialTransport(HostLink):
-    """A transport over an open pyserial port.
-
-    Args:
-        url: The URL the user gave, for messages.
-        port: The open port.
-    """
+    """A transport over an open pyserial port."""
 
     def __init__(self, url: str, port: serial.SerialBase) -> None:
         super().__init__(url)

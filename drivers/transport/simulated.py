@@ -72,8 +72,6 @@ class SimulatedTransport(HostLink):
     """A transport to a board in this process.
 
     Args:
-        board: The board.
-        url: Name for messages.
         step_s: Longest virtual time between looks at the board's output.
         pace: Virtual seconds a real second, None for as fast as possible.
         tick_s: A tick of the board, s.

@@ -29,12 +29,7 @@ class CanNode(Protocol):
 
 
 class SimulatedCanBus(HostLink):
-    """The host's place on a bus of nodes in this process.
-
-    Args:
-        nodes: Who else is on the bus.
-        url: Name for messages.
-    """
+    """The host's place on a bus of nodes in this process."""
 
     def __init__(self, nodes: Sequence[CanNode], url: str = "sim://can") -> None:
         super().__init__(url)

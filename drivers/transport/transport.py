@@ -52,11 +52,7 @@ def arriving(transport: Transport, timeout_s: float) -> Iterator[bytes]:
 
 
 class HostLink:
-    """What every link of this computer has: its URL, the host's clock, and that it may be lost.
-
-    Args:
-        url: The URL the user gave, for messages.
-    """
+    """What every link of this computer has: its URL, the host's clock, and that it may be lost."""
 
     def __init__(self, url: str) -> None:
         self.url = url

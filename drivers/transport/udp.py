@@ -15,12 +15,7 @@ RECEIVE_BUFFER = 1 << 20
 
 
 class UdpTransport(HostLink):
-    """Datagrams to and from one address.
-
-    Args:
-        url: The URL the user gave, for messages.
-        connected: A connected datagram socket.
-    """
+    """Datagrams to and from one address."""
 
     def __init__(self, url: str, connected: socket.socket) -> None:
         super().__init__(url)
@@ -86,11 +81,7 @@ def open_udp(url: str) -> UdpTransport:
 
 
 def split_address(url: str) -> tuple[str, int]:
-    """Return host and port of `udp:HOST:PORT`.
-
-    Raises:
-        LinkError: It is not so written.
-    """
+    """Return host and port of `udp:HOST:PORT`; `LinkError` where it is not so written."""
     host, colon, port = url.removeprefix("udp:").removeprefix("//").rpartition(":")
     if not (colon and host and port.isdecimal() and 0 < int(port) < 65536):
         raise LinkError(

@@ -23,7 +23,6 @@ class Usb520(StreamedDevice):
     """One amplifier on USB, sending lines by itself.
 
     Args:
-        transport: The way to it; the device closes it.
         rate_hz: Lines a second, at most 10.
     """
 
@@ -45,11 +44,7 @@ class Usb520(StreamedDevice):
         return (Channel(quantity.name, quantity.unit, self._rate_hz, -np.inf, np.inf, text),)
 
     def identify(self) -> DeviceIdentity:
-        """Wait for a whole line. The device reports no name and no number.
-
-        Raises:
-            LinkTimeoutError: No such line comes.
-        """
+        """Wait for a whole line. The device reports no name and no number."""
         give_up_s = self._transport.now_s + PATIENCE_S
         while self._unit is None:
             remaining_s = give_up_s - self._transport.now_s

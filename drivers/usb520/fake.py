@@ -16,11 +16,7 @@ LINE_TICKS = 100
 
 
 class Usb520Fake(Outbox):
-    """An amplifier, with the interface of `drivers.transport.simulated.Board`.
-
-    Args:
-        unit: Unit on its lines.
-    """
+    """An amplifier, with the interface of `drivers.transport.simulated.Board`."""
 
     def __init__(self, unit: str = "N-m") -> None:
         super().__init__()

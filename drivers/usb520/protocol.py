@@ -40,11 +40,7 @@ QUANTITIES = {
 
 
 def decode_line(line: bytes) -> tuple[float, str]:
-    """Return value and unit of a whole line, its end included.
-
-    Raises:
-        FrameError: It is not a value and a known unit.
-    """
+    """Return value and unit of a whole line, its end included; `FrameError` for any other."""
     found = _LINE.fullmatch(line)
     if found is None:
         raise FrameError(f"{line!r} is not a USB520's value and unit.", "Bytes were lost.")
