@@ -48,8 +48,6 @@ class ClockLine:
         host_s: The host time there, s.
         rate: Host seconds a device second.
         residual_s: Root mean square distance of the exchanges used from the line, s.
-        bound_s: Largest error of the host time at `device_s` that the exchanges allow: half the
-            shortest round trip, s.
         exchanges: Exchanges used.
     """
 
@@ -57,7 +55,6 @@ class ClockLine:
     host_s: float
     rate: float
     residual_s: float
-    bound_s: float
     exchanges: int
 
     def to_host(self, device_s: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -177,7 +174,7 @@ def _fit(exchanges: NDArray[np.float64]) -> ClockLine:
     good = trip_s <= np.quantile(trip_s, 0.5) + 1e-9
     off_s = np.abs(_distance_from_middle_line(device_s, middle_s, good))
     good &= off_s <= max(OFF_LINE * float(np.median(off_s[good])), RESOLUTION_S)
-    return _straight(device_s[good], middle_s[good], float(trip_s[good].min()))
+    return _straight(device_s[good], middle_s[good])
 
 
 def _distance_from_middle_line(
@@ -198,9 +195,7 @@ def _distance_from_middle_line(
     return np.asarray(rest - np.median(rest[good]))
 
 
-def _straight(
-    device_s: NDArray[np.float64], host_s: NDArray[np.float64], trip_s: float
-) -> ClockLine:
+def _straight(device_s: NDArray[np.float64], host_s: NDArray[np.float64]) -> ClockLine:
     """Return the least-squares line, its rate no further from 1 than a crystal's can be."""
     device_mean_s, host_mean_s = float(device_s.mean()), float(host_s.mean())
     device = device_s - device_mean_s
@@ -209,7 +204,7 @@ def _straight(
     drift = float(device @ skew) / spread if spread > 0 else 0.0
     drift = min(max(drift, -MAX_DRIFT), MAX_DRIFT)
     residual_s = float(np.sqrt(np.mean((skew - drift * device) ** 2)))
-    return ClockLine(device_mean_s, host_mean_s, 1 + drift, residual_s, trip_s / 2, len(host_s))
+    return ClockLine(device_mean_s, host_mean_s, 1 + drift, residual_s, len(host_s))
 
 
 def rising(times_s: NDArray[np.float64], after_s: float, step_s: float) -> NDArray[np.float64]:
@@ -234,7 +229,7 @@ def arrival_fit(
 
     Samples that came in one burst all carry the burst's time: only the newest of each arrival time
     is used, and of those the earlier half relative to the line. The host time is late by the
-    shortest delay of the link, which is not observable from arrivals alone: `bound_s` is infinite.
+    shortest delay of the link, which is not observable from arrivals alone.
 
     Args:
         sequence: Numbers of samples, rising, shape (n,).
@@ -248,12 +243,12 @@ def arrival_fit(
     if newest.size < 2:
         raise ClockError("One arrival makes no line.", "The stream has only begun.")
     device_s, host_s = sequence[newest] / rate_hz, arrived_s[newest]
-    line = _straight(device_s, host_s, np.inf)
+    line = _straight(device_s, host_s)
     early = np.ones(newest.size, np.bool_)
     for _ in range(3):
         delay_s = host_s - line.to_host(device_s)
         early = delay_s <= np.median(delay_s[early])
         if early.sum() < 2:
             break
-        line = _straight(device_s[early], host_s[early], np.inf)
+        line = _straight(device_s[early], host_s[early])
     return line

@@ -166,7 +166,7 @@ class StreamedSensor(StreamedDevice):
         size: int | None = None,
         before_again: Callable[[], None] = lambda: None,
     ) -> bytes:
-        """Return the bytes that came, of which the first `size` (all when None) are a good answer."""
+        """Return the bytes that came; the first `size`, or all, are a good answer."""
         for attempt in self._counters.attempts():
             if attempt:
                 before_again()

@@ -46,7 +46,7 @@ def arriving(transport: Transport, timeout_s: float) -> Iterator[bytes]:
     """Yield all that has come from now on, again after each read, until the time is over."""
     give_up_s = transport.now_s + timeout_s
     came = b""
-    while (remaining_s := give_up_s - transport.now_s) > 0:
+    while (remaining_s := give_up_s - transport.now_s) > 1e-9:  # less is a sum's rounding
         came += transport.read(remaining_s)
         yield came
 

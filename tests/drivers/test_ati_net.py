@@ -17,18 +17,22 @@ from drivers.counters import DeviceCounters
 from drivers.errors import DriverError, FrameError, LinkError, LinkLostError, LinkTimeoutError
 from drivers.transport import open_transport
 from drivers.transport.simulated import SimulatedTransport
+from tests.drivers.taps import started
 
 
-def device_of(fake: RdtFake) -> AtiNet:
-    return AtiNet(SimulatedTransport(fake), fake_calibration)
+def start(fake: RdtFake) -> AtiNet:
+    return started(AtiNet, fake, open_calibration=fake_calibration)
 
 
 def test_requests_are_the_bytes_of_the_manual():
-    assert protocol.encode_command(protocol.STREAM) == bytes.fromhex("12 34 00 02 00 00 00 00")
-    assert protocol.encode_command(protocol.SET_BIAS) == bytes.fromhex("12 34 00 42 00 00 00 00")
-    assert protocol.encode_command(protocol.STREAM, 258) == bytes.fromhex("1234 0002 0000 0102")
-    assert protocol.encode_command(protocol.STOP) == bytes.fromhex("12 34 00 00 00 00 00 00")
-    assert protocol.encode_command(protocol.RESET_LATCH) == bytes.fromhex("1234 0041 0000 0000")
+    requests = {
+        protocol.encode_command(protocol.STOP): "1234 0000 00000000",
+        protocol.encode_command(protocol.STREAM): "1234 0002 00000000",
+        protocol.encode_command(protocol.STREAM, 258): "1234 0002 00000102",
+        protocol.encode_command(protocol.RESET_LATCH): "1234 0041 00000000",
+        protocol.encode_command(protocol.SET_BIAS): "1234 0042 00000000",
+    }
+    assert all(request == bytes.fromhex(manual) for request, manual in requests.items())
     assert (protocol.RDT_PORT, protocol.CALIBRATION_PORT) == (49152, 49151)
     assert protocol.READ_CALIBRATION.hex() == "01" + 19 * "00"
 
@@ -36,10 +40,9 @@ def test_requests_are_the_bytes_of_the_manual():
 def test_a_record_is_big_endian_and_36_bytes():
     datagram = struct.pack(">IIIiiiiii", 7, 49, 0x80010000, -1, 2, -3, 4, -5, 6)
     (record,) = protocol.decode_records(datagram)
-    assert record["rdt_sequence"] == 7
-    assert record["ft_sequence"] == 49
-    assert record["status"] == 0x80010000
-    assert record["counts"].tolist() == [-1, 2, -3, 4, -5, 6]
+    *numbers, counts = record.tolist()
+    assert numbers == [7, 49, 0x80010000]
+    assert counts.tolist() == [-1, 2, -3, 4, -5, 6]
     assert len(protocol.decode_records(datagram * 5)) == 5
     for size in (0, 35, 37, 8):
         with pytest.raises(FrameError):
@@ -64,11 +67,8 @@ def test_a_calibration_is_refused_unless_whole_and_of_known_units(answer):
 
 
 def test_counts_become_si_by_the_scale_of_the_device():
-    pounds = Calibration(1, 1, 1000, 500)
-    device = AtiNet(
-        SimulatedTransport(RdtFake()), lambda: SimulatedTransport(CalibrationFake(pounds))
-    )
-    device.start()
+    pounds = CalibrationFake(Calibration(1, 1, 1000, 500))
+    device = started(AtiNet, RdtFake(), open_calibration=lambda: SimulatedTransport(pounds))
     batch = device.read(0.1)
     newest = RdtFake().load(int(batch.sequence[-1]) + 1)
     assert batch.columns["force_x_n"][-1] == pytest.approx(newest[0] / 1000 * 4.4482216152605)
@@ -97,16 +97,10 @@ def test_a_status_bit_is_that_of_the_manual(row):
 
 
 def test_a_status_is_reported_in_words_and_flags_its_samples():
-    assert protocol.status_words(0) == []
-    assert protocol.status_words(0x80010000) == ["a threshold has been crossed"]
-    assert protocol.status_words(1 << 31 | 1 << 17 | 1 << 5) == [
-        "sensor saturated or its converter failed",
-        "supply too low",
-    ]
-    assert protocol.status_words(1) == ["bit 0 is set"]
+    words = ["sensor saturated or its converter failed", "supply too low", "bit 0 is set"]
+    assert protocol.status_words(1 << 31 | 1 << 17 | 1 << 5 | 1) == words
     fake = RdtFake()
-    device = device_of(fake)
-    device.start()
+    device = start(fake)
     fake.status = 0x80010000
     latched = device.read(0.1)
     assert not latched.flags.any()
@@ -121,9 +115,7 @@ def test_a_status_is_reported_in_words_and_flags_its_samples():
 
 
 def test_the_numbers_wrap_without_a_gap():
-    device = device_of(RdtFake(first_sequence=2**32 - 30))
-    device.start()
-    batch = device.read(0.1)
+    batch = start(RdtFake(first_sequence=2**32 - 30)).read(0.1)
     assert batch.sequence.tolist() == list(range(50))
     assert batch.lost == 0
 
@@ -157,8 +149,7 @@ def test_what_is_missing_is_counted_exactly(kept, first):
 @pytest.mark.parametrize("command", ["set_bias", "reset_latch"])
 @pytest.mark.parametrize("numbers_begin_at", [1, 2**32 - 10])
 def test_a_command_that_ends_the_stream_is_followed_by_a_request_for_it(command, numbers_begin_at):
-    device = device_of(RdtFake(numbers_begin_at))
-    device.start()
+    device = start(RdtFake(numbers_begin_at))
     before = device.read(0.1)
     getattr(device, command)()
     after = [device.read(0.1) for _ in range(4)]
@@ -180,52 +171,45 @@ def test_a_stream_that_goes_on_counting_after_a_command_loses_nothing():
     assert (counters.late, counters.restarts, counters.lost) == (1, 0, 0)
 
 
+def complaints(device: AtiNet, reads: int, words: str) -> tuple[int, int]:
+    """Return how many readings complain so, and the samples of the others."""
+    said = back = 0
+    for _ in range(reads):
+        try:
+            back += len(device.read(0.05))
+        except DriverError as error:
+            said += words in str(error)
+    return said, back
+
+
 def test_a_device_that_is_gone_is_reported_at_every_reading_until_it_is_back():
     fake = RdtFake()
-    device = device_of(fake)
-    device.start()
+    device = start(fake)
     device.read(0.1)
     fake.receive(protocol.encode_command(protocol.STOP))
     fake.deaf = 6
-    said = back = 0
-    for _ in range(100):
-        try:
-            back += len(device.read(0.05))
-        except LinkTimeoutError as error:
-            said += "fallen silent" in str(error)
+    said, back = complaints(device, 100, "fallen silent")
     assert said > 20
     assert back > 500
-    assert device.counters["stalls"] == 1
-    assert device.counters["retries"] == 7
+    assert (device.counters["stalls"], device.counters["retries"]) == (1, 7)
 
 
 def test_a_sensor_that_repeats_one_sample_for_ever_is_an_error():
     fake = RdtFake()
-    device = device_of(fake)
-    device.start()
+    device = start(fake)
     device.read(0.1)
     fake.frozen_at = 50
-    said = 0
-    for _ in range(10):
-        try:
-            device.read(0.05)
-        except DriverError as error:
-            said += "frozen" in str(error)
-    assert said >= 7
+    assert complaints(device, 10, "frozen")[0] >= 7
     assert device.counters["device_errors"] == 1
     fake.frozen_at = None
     assert len(device.read(0.05)) > 0
-    device.close()
 
 
 def test_the_bias_is_set_in_the_device():
-    fake = RdtFake()
-    device = device_of(fake)
-    device.start()
+    device = start(RdtFake())
     device.read(0.1)
     device.set_bias()
-    first = device.read(0.001)
-    assert abs(first.columns["force_z_n"][0]) < 0.3
+    assert abs(device.read(0.001).columns["force_z_n"][0]) < 0.3
 
 
 def test_nobody_there_is_a_timeout():

@@ -6,17 +6,8 @@ from collections.abc import Iterator
 import can
 import pytest
 
-from drivers.errors import (
-    BusOffError,
-    LinkError,
-    LinkLostError,
-    LinkTimeoutError,
-    MissingExtraError,
-    PortBusyError,
-    PortNotFoundError,
-    PortPermissionError,
-    UnknownSchemeError,
-)
+from drivers import errors
+from drivers.errors import BusOffError, LinkError, LinkLostError, LinkTimeoutError
 from drivers.transport.can_bus import CanFrame
 from drivers.transport.faulty import Fault, Faults, FaultyCanBus
 from drivers.transport.python_can import PythonCanBus, open_can
@@ -36,11 +27,7 @@ def test_frames_go_both_ways(other):
     frame = CanFrame(0x123, b"\x01\x02\x03")
     bus.send(frame)
     seen = other.recv(1.0)
-    assert (seen.arbitration_id, bytes(seen.data), seen.is_extended_id) == (
-        0x123,
-        b"\x01\x02\x03",
-        False,
-    )
+    assert CanFrame(seen.arbitration_id, bytes(seen.data), seen.is_extended_id) == frame
     other.send(can.Message(arbitration_id=0x1ABCDEF, data=b"", is_extended_id=True))
     assert bus.read(1.0) == CanFrame(0x1ABCDEF, b"", extended=True)
     assert bus.read(0.0) is None
@@ -121,8 +108,8 @@ def test_what_an_interface_raises_becomes_ours_and_stays_the_cause():
 @pytest.mark.parametrize(
     ("url", "error", "words"),
     [
-        ("can:pigeon:1", UnknownSchemeError, "socketcan, slcan"),
-        ("can:socketcan:", UnknownSchemeError, "can0"),
+        ("can:pigeon:1", errors.UnknownSchemeError, "socketcan, slcan"),
+        ("can:socketcan:", errors.UnknownSchemeError, "can0"),
         ("can:socketcan:can0?bitrate=5", LinkError, "ip link set"),
         ("can:slcan:/dev/ttyX?baud=5", LinkError, "no option baud"),
         ("can:slcan:/dev/ttyX", LinkError, "bitrate=1000000"),
@@ -138,11 +125,11 @@ def test_a_url_that_opens_nothing_reports_why(url, error, words):
 @pytest.mark.parametrize(
     ("raised", "error", "words"),
     [
-        (OSError(errno.ENODEV, "No such device"), PortNotFoundError, "up type can"),
+        (OSError(errno.ENODEV, "No such device"), errors.PortNotFoundError, "up type can"),
         (OSError(errno.EAFNOSUPPORT, "Address family"), LinkError, "has no CAN support"),
-        (OSError(errno.EPERM, "Not permitted"), PortPermissionError, "udev"),
-        (can.CanInitializationError("held", errno.EBUSY), PortBusyError, "in use"),
-        (can.CanInterfaceNotImplementedError("no module"), MissingExtraError, "extra 'can'"),
+        (OSError(errno.EPERM, "Not permitted"), errors.PortPermissionError, "udev"),
+        (can.CanInitializationError("held", errno.EBUSY), errors.PortBusyError, "in use"),
+        (can.CanInterfaceNotImplementedError("no module"), errors.MissingExtraError, "extra 'can'"),
         (ValueError("odd"), LinkError, "odd"),
     ],
 )
@@ -185,15 +172,11 @@ class Parrot:
 def test_virtual_time_passes_by_reading_alone():
     bus = SimulatedCanBus([Parrot()])
     bus.send(CanFrame(1, b"hi"))
-    assert bus.read(0.0) is None
-    assert bus.now_s == 0.0
+    assert (bus.read(0.0), bus.now_s) == (None, 0.0)
     assert bus.read(1.0) == CanFrame(2, b"hi")
     assert bus.now_s == pytest.approx(0.003)
     assert bus.read(0.05) is None
     assert bus.now_s == pytest.approx(0.053)
-    bus.close()
-    with pytest.raises(LinkLostError):
-        bus.read(1.0)
 
 
 def test_a_late_frame_comes_though_its_time_is_but_a_rounding_away():
@@ -201,5 +184,4 @@ def test_a_late_frame_comes_though_its_time_is_but_a_rounding_away():
     bus.faults.inject(Fault.DELAY, duration_s=0.05 + 5e-10)
     bus.send(CanFrame(1, b"\x07"))
     assert bus.read(0.05) is None
-    late = bus.read(0.1)
-    assert late.data == b"\x07"
+    assert bus.read(0.1) == CanFrame(2, b"\x07")

@@ -58,13 +58,6 @@ def test_offset_and_drift_are_found_whatever_the_jitter(ppm, start_us, jitter_s,
     assert fit.line.residual_s <= 2 * jitter_s + 1e-6
 
 
-def test_the_wrap_of_the_counter_is_no_jump():
-    clock = DriftingClock(20.0, WRAP - 30_000_000)
-    fit = fitted(clock, 60, 1e-4)
-    assert fit.line.to_host(np.array([clock.device_s(60.0)]))[0] == pytest.approx(60, abs=2e-4)
-    assert fit.resets == 0
-
-
 @given(
     start=st.integers(0, WRAP - 1),
     steps=st.lists(st.integers(-(10**6), 2**31 - 1), min_size=1, max_size=20),
@@ -78,27 +71,17 @@ def test_a_wrapped_counter_is_followed_out_of_order(start, steps):
         newest = max(newest, asked)
 
 
-def test_late_answers_do_not_pull_the_line():
-    clock = DriftingClock(-35.0, seed=3)
+def test_neither_late_answers_nor_a_damaged_one_pull_the_line():
+    clock = DriftingClock(-35.0, WRAP - 30_000_000, seed=3)  # the counter wraps on the way
     fit = ClockFit()
     for quarter in range(240):
         sent_s, received_s, tick_us = clock.exchange(quarter / 4, 5e-5)
         if quarter % 5 == 2:  # the host was busy and read this one late
             received_s += 0.08
-        fit.add(sent_s, received_s, tick_us)
-    assert fit.line.to_host(np.array([clock.device_s(60.0)]))[0] == pytest.approx(60, abs=1e-4)
-    assert fit.line.residual_s < 1e-4
-    assert fit.line.bound_s < 2e-4
-
-
-def test_one_damaged_answer_is_set_aside():
-    clock = DriftingClock(0.0, seed=5)
-    fit = ClockFit()
-    for quarter in range(80):
-        sent_s, received_s, tick_us = clock.exchange(quarter / 4, 5e-5)
         fit.add(sent_s, received_s, 123 if quarter == 40 else tick_us)
     assert (fit.rejected, fit.resets) == (1, 0)
-    assert fit.line.to_host(np.array([clock.device_s(20.0)]))[0] == pytest.approx(20, abs=1e-4)
+    assert fit.line.to_host(np.array([clock.device_s(60.0)]))[0] == pytest.approx(60, abs=1e-4)
+    assert fit.line.residual_s < 1e-4
 
 
 @pytest.mark.parametrize("start_us", [0, 5_000_000, WRAP - 1000])
@@ -131,10 +114,8 @@ def test_a_stream_without_a_clock_is_placed_by_its_arrivals(ppm, burst, seed):
     place = np.searchsorted(wakes, sent_s)
     seen = place < len(wakes)
     line = arrival_fit(sequence[seen], wakes[place[seen]], 1000.0)
-    error_s = line.to_host(sequence / 1000) - sent_s
-    assert np.abs(error_s).max() < 2e-3
+    assert np.abs(line.to_host(sequence / 1000) - sent_s).max() < 2e-3
     assert line.residual_s < 2e-3
-    assert line.bound_s == np.inf
 
 
 def test_many_exchanges_a_second_reach_as_far_back_as_few():
@@ -143,9 +124,8 @@ def test_many_exchanges_a_second_reach_as_far_back_as_few():
     for millisecond in range(20_000):
         fit.add(*clock.exchange(millisecond / 1000, 2e-4))
     assert fit.line.exchanges <= 80
-    assert 1e6 * (fit.line.rate - 1) == pytest.approx(
-        -30, abs=0.5
-    )  # the best of 250 is within 2e-6 s
+    # the best of 250 is within 2e-6 s
+    assert 1e6 * (fit.line.rate - 1) == pytest.approx(-30, abs=0.5)
 
 
 def test_too_little_makes_no_line():

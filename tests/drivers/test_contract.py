@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.reliability.fault_names import EVIDENCE, SAID
+from drivers.amt21.driver import Amt21
 from drivers.device import Batch, Device, SampleFlag
-from drivers.errors import DriverError, LinkLostError
+from drivers.errors import DriverError, LinkLostError, LinkTimeoutError
 from drivers.registry import DRIVERS, Driver, drivers, fakes, open_device
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import PythonBoard
@@ -202,6 +203,33 @@ def test_a_cut_link_is_reported_and_it_can_be_opened_again(name):
     again.start()
     check(again, read_some(again, 10))
     again.close()
+
+
+SILENCE = {
+    "amt21": "address 0x54",
+    "ati-can": r"base 0x20.*250 kbit/s",
+    "ati-serial": "even parity",
+    "dynamixel": "identifier 1",
+    "ft300": "24 V",
+    "moteus": "identifier 1",
+    "qia128": "bit rate",
+    "teensy": "sim://",
+    "teensy-master": "sim://",
+    "usb520": "plug it in again",
+}
+"""What the error names where nobody answers; the others are in tests of their own."""
+
+
+@pytest.mark.parametrize("name", SILENCE)
+def test_a_device_that_does_not_answer_is_an_error_and_is_not_read_unasked(name):
+    faults = Faults()
+    faults.inject(Fault.STALL, duration_s=1e6)
+    device = opened(name, faults)
+    if not isinstance(device, TeensyDevice | Amt21):
+        with pytest.raises(DriverError, match="Call start"):
+            device.read(0.1)
+    with pytest.raises(LinkTimeoutError, match=SILENCE[name]):
+        device.identify()
 
 
 def test_an_unknown_driver_or_option_is_named():

@@ -13,39 +13,30 @@ from drivers.dynamixel.fake import DynamixelFake
 from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError, LinkError
 from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
-from tests.drivers.taps import once
+from tests.drivers.taps import once, started
 
-POSITION = protocol.Register(132, 4)
-GOAL_POSITION = protocol.Register(116, 4)
-GOAL_VELOCITY = protocol.Register(104, 4)
-EXAMPLES = [
-    (1, protocol.PING, b"", "FF FF FD 00 01 03 00 01 19 4E"),
-    (254, protocol.PING, b"", "FF FF FD 00 FE 03 00 01 31 42"),
-    (1, protocol.STATUS, b"\0\x06\x04\x26", "FF FF FD 00 01 07 00 55 00 06 04 26 65 5D"),
-    (2, protocol.STATUS, b"\0\x06\x04\x26", "FF FF FD 00 02 07 00 55 00 06 04 26 6F 6D"),
-    (
-        *(1, protocol.READ, protocol.read_question(POSITION)),
-        "FF FF FD 00 01 07 00 02 84 00 04 00 1D 15",
-    ),
-    (1, protocol.STATUS, b"\0\xa6\0\0\0", "FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0"),
-    (
-        *(1, protocol.WRITE, protocol.write_question(GOAL_POSITION, 512)),
-        "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89",
-    ),
-    (
-        *(1, 0x04, protocol.write_question(GOAL_VELOCITY, 200)),
-        "FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E",
-    ),
-    (1, protocol.STATUS, b"\0", "FF FF FD 00 01 04 00 55 00 A1 0C"),
-]
+READ_POSITION = protocol.read_question(protocol.Register(132, 4))
+GOAL_POSITION = protocol.write_question(protocol.Register(116, 4), 512)
+GOAL_VELOCITY = protocol.write_question(protocol.Register(104, 4), 200)
+EXAMPLES = {
+    "FF FF FD 00 01 03 00 01 19 4E": (1, protocol.PING, b""),
+    "FF FF FD 00 FE 03 00 01 31 42": (254, protocol.PING, b""),
+    "FF FF FD 00 01 07 00 55 00 06 04 26 65 5D": (1, protocol.STATUS, b"\0\x06\x04\x26"),
+    "FF FF FD 00 02 07 00 55 00 06 04 26 6F 6D": (2, protocol.STATUS, b"\0\x06\x04\x26"),
+    "FF FF FD 00 01 07 00 02 84 00 04 00 1D 15": (1, protocol.READ, READ_POSITION),
+    "FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0": (1, protocol.STATUS, b"\0\xa6\0\0\0"),
+    "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89": (1, protocol.WRITE, GOAL_POSITION),
+    "FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E": (1, 0x04, GOAL_VELOCITY),
+    "FF FF FD 00 01 04 00 55 00 A1 0C": (1, protocol.STATUS, b"\0"),
+}
 """Source: ROBOTIS e-Manual, Protocol 2.0, the examples of ping, read, write and reg write."""
 
 
-@pytest.mark.parametrize(("device_id", "instruction", "parameters", "packet"), EXAMPLES)
-def test_packets_are_those_of_the_manual(device_id, instruction, parameters, packet):
+@pytest.mark.parametrize("packet", EXAMPLES)
+def test_packets_are_those_of_the_manual(packet):
     data = bytes.fromhex(packet)
-    assert protocol.encode(device_id, instruction, parameters) == data
-    assert protocol.decode(data) == (device_id, instruction, parameters)
+    assert protocol.encode(*EXAMPLES[packet]) == data
+    assert protocol.decode(data) == EXAMPLES[packet]
     assert protocol.find(b"\xff\xff" + data + b"x") == (data, b"x")
 
 
@@ -101,8 +92,7 @@ def test_a_header_within_a_packet_is_stuffed():
 
 def armed(**options: int) -> tuple[DynamixelFake, Dynamixel]:
     fake = DynamixelFake()
-    device = Dynamixel(SimulatedTransport(fake), **options)
-    device.start()
+    device = started(Dynamixel, fake, **options)
     device.arm()
     return fake, device
 
@@ -114,12 +104,10 @@ def test_a_current_turns_the_horn_and_the_end_is_without_force():
     for _ in range(200):
         batch = device.read(0.1)
         assert batch.flags[0] == 0
-    assert batch.columns["current_a"][0] == pytest.approx(0.030)
-    assert batch.columns["command_current_a"][0] == pytest.approx(0.030)
-    assert batch.columns["supply_v"][0] == pytest.approx(5.0)
-    assert batch.columns["temperature_k"][0] == pytest.approx(304.15)
-    assert batch.columns["speed_rad_s"][0] == pytest.approx(300 * 0.229 * math.tau / 60, rel=0.02)
-    assert batch.columns["angle_rad"][0] > 5.0
+    values = {name: value[0] for name, value in batch.columns.items()}
+    assert values.pop("angle_rad") > 5.0
+    assert values.pop("speed_rad_s") == pytest.approx(300 * 0.229 * math.tau / 60, rel=0.02)
+    assert list(values.values()) == pytest.approx([0.030, 0.030, 5.0, 304.15])
     device.close()
     assert not fake.in_force
 
@@ -150,8 +138,11 @@ def test_a_hardware_error_is_reported_in_words_and_cleared_by_a_restart():
     device.close()
 
 
-def test_a_disarm_is_not_believed_while_the_register_differs():
+def test_a_refusal_gives_its_reason_and_a_disarm_is_not_believed_while_the_register_differs():
     fake, device = armed()
+    with pytest.raises(InstructionRefusedError, match="cannot be accessed") as caught:
+        device._line.write(protocol.OPERATING_MODE, 3)
+    assert caught.value.code == 7
     write = fake._write
     fake._write = lambda address, data: 0 if address == 64 else write(address, data)
     with pytest.raises(DisarmUnconfirmedError, match="holds 1"):
@@ -166,27 +157,17 @@ def test_damage_is_asked_for_again_and_an_echo_is_dealt_with():
     device = Dynamixel(cable)
     cable.incoming = once(lambda data: data[:-1] + bytes([data[-1] ^ 1]))
     assert device.identify().model == "Dynamixel XL330-M288"
-    assert device.counters["retries"] == 1
-    assert device.counters["crc_errors"] == 1
-    device.close()
+    assert (device.counters["retries"], device.counters["crc_errors"]) == (1, 1)
 
 
-def test_models_that_cannot_be_driven_so_are_refused():
-    with pytest.raises(DriverError, match="XL430-W250 neither"):
-        Dynamixel(SimulatedTransport(DynamixelFake(model=1060))).start()
-    with pytest.raises(DriverError, match="9999 is not known"):
-        Dynamixel(SimulatedTransport(DynamixelFake(model=9999))).start()
-    other = Dynamixel(SimulatedTransport(DynamixelFake(model=9999)), current_unit_a=1e-3)
-    assert other.identify().model == "Dynamixel model 9999"
-    with pytest.raises(LinkError, match="identifier"):
-        open_dynamixel("loop://", device_id=253)
-    with pytest.raises(LinkError, match="watchdog"):
-        open_dynamixel("loop://", watchdog_ms=10)
+@pytest.mark.parametrize(("model", "words"), [(1060, "XL430-W250 neither"), (9999, "not known")])
+def test_models_that_cannot_be_driven_so_are_refused(model, words):
+    with pytest.raises(DriverError, match=words):
+        started(Dynamixel, DynamixelFake(model))
+    started(Dynamixel, DynamixelFake(model), current_unit_a=1e-3)
 
 
-def test_a_refusal_gives_its_reason():
-    _, device = armed()
-    with pytest.raises(InstructionRefusedError, match="cannot be accessed") as caught:
-        device._line.write(protocol.OPERATING_MODE, 3)
-    assert caught.value.code == 7
-    device.close()
+@pytest.mark.parametrize(("option", "value"), [("device_id", 253), ("watchdog_ms", 10)])
+def test_options_that_are_no_drives(option, value):
+    with pytest.raises(LinkError, match=r"an identifier lies|a watchdog has"):
+        open_dynamixel("loop://", **{option: value})

@@ -15,7 +15,7 @@ from drivers.moteus.fake import MoteusFake
 from drivers.moteus.protocol import State
 from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
-from tests.drivers.taps import once
+from tests.drivers.taps import once, started
 
 EXAMPLE = "01000a07206000200150ff140400130d"
 """Source: moteus documentation, "CAN protocol", Example: a command and what is read with it."""
@@ -35,27 +35,24 @@ def test_the_documented_frame_is_read_subframe_by_subframe():
     assert (written + asked).hex() == EXAMPLE
 
 
-def test_the_documented_answer_is_read():
-    assert protocol.registers(bytes.fromhex(ANSWER)) == {
+def test_the_documented_answer_and_lines_are_read():
+    data, answer = bytes.fromhex(EXAMPLE), bytes.fromhex(ANSWER)
+    assert protocol.registers(answer) == {
         **{0x000: 10, 0x001: 80, 0x002: 256, 0x003: -144},
         **{0x00D: 24, 0x00E: 20, 0x00F: 0},
     }
-    answer = protocol.reply(1, 0, [10, 80, 256, -144]) + protocol.reply(0, 0x00D, [24, 20, 0])
-    assert answer.hex() == ANSWER
-
-
-def test_the_documented_lines():
-    data = bytes.fromhex(EXAMPLE)
+    made = protocol.reply(1, 0, [10, 80, 256, -144]) + protocol.reply(0, 0x00D, [24, 20, 0])
+    assert made == answer
     assert protocol.send_line(1, data) == f"can send 8001 {EXAMPLE}\n".encode()
-    assert protocol.decode_line(f"rcv 100 {ANSWER}\r\n".encode()) == (0x100, bytes.fromhex(ANSWER))
-    assert protocol.decode_line(protocol.receive_line(1, bytes.fromhex(ANSWER))) == (
-        0x100,
-        bytes.fromhex(ANSWER),
-    )
+    for line in (f"rcv 100 {ANSWER}\r\n".encode(), protocol.receive_line(1, answer)):
+        assert protocol.decode_line(line) == (0x100, answer)
     assert protocol.decode_line(b"OK\r\n") is None
-    for line in (b"rcv 100", b"rcv 100 2x", b"noise", b"rcv zz 24"):
-        with pytest.raises(FrameError):
-            protocol.decode_line(line)
+
+
+@pytest.mark.parametrize("line", [b"rcv 100", b"rcv 100 2x", b"noise", b"rcv zz 24"])
+def test_another_line_is_refused(line):
+    with pytest.raises(FrameError):
+        protocol.decode_line(line)
 
 
 def test_modes_faults_and_sizes_are_the_documented_ones():
@@ -113,8 +110,7 @@ def test_any_frame_is_read_or_refused(data):
 
 def armed() -> tuple[MoteusFake, Moteus]:
     fake = MoteusFake()
-    device = Moteus(SimulatedTransport(fake))
-    device.start()
+    device = started(Moteus, fake)
     device.arm()
     return fake, device
 
@@ -125,19 +121,19 @@ def test_a_torque_turns_the_output_and_the_end_is_without_force():
     for _ in range(100):
         batch = device.read(0.1)
         assert batch.flags[0] == 0
-    assert batch.columns["torque_n_m"][0] == pytest.approx(0.01)
-    assert batch.columns["command_torque_n_m"][0] == 0.01
-    assert batch.columns["supply_v"][0] == 24.0
-    assert batch.columns["temperature_k"][0] == pytest.approx(302.15)
-    assert batch.columns["speed_rad_s"][0] == pytest.approx(50.0, rel=0.02)
-    assert batch.columns["angle_rad"][0] > 5.0
+    angle, speed, torque, _, commanded, supply, temperature = (
+        value[0] for value in batch.columns.values()
+    )
+    assert angle > 5.0
+    assert speed == pytest.approx(50.0, rel=0.02)
+    assert (torque, commanded) == pytest.approx((0.01, 0.01))
+    assert (supply, temperature) == pytest.approx((24.0, 302.15))
     device.close()
     assert fake.mode == protocol.STOPPED
 
 
 def test_a_fault_is_reported_in_words_and_cleared_by_arming():
     fake, device = armed()
-    device.read(0.1)
     fake.fail(35)
     with pytest.raises(DriverError, match=r"fit no magnet \(code 35\)"):
         device.read(0.1)
@@ -167,14 +163,12 @@ def test_a_disarm_is_not_believed_while_the_mode_differs():
     assert fake.mode == protocol.STOPPED
 
 
-def test_who_answers_and_who_does_not():
+def test_who_answers():
     cable = FaultyTransport(SimulatedTransport(MoteusFake()))
     cable.incoming = once(lambda data: data.replace(b"rcv", b"r\xffv"))
     device = Moteus(cable)
     identity = device.identify()
-    assert identity.model == "moteus 0x0700"
-    assert identity.serial == "333333332222222211111111"
-    assert device.counters["retries"] == 1
-    assert device.counters["crc_errors"] == 1
+    assert (identity.model, identity.serial) == ("moteus 0x0700", "333333332222222211111111")
+    assert (device.counters["retries"], device.counters["crc_errors"]) == (1, 1)
     with pytest.raises(LinkError, match="identifier"):
         open_moteus("loop://", device_id=127)

@@ -11,28 +11,27 @@ from drivers.qia128 import protocol
 from drivers.qia128.driver import Qia128
 from drivers.qia128.fake import Qia128Fake
 from drivers.streaming import SlidingFrames
-from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
+from tests.drivers.taps import gathered, started
+
+PUBLISHED = {
+    "00 05 00 01 0E": protocol.encode_packet(protocol.LOOP_BACK),
+    "00 05 01 00 0D": protocol.get_serial(),
+    "00 06 00 0C 00 3C": protocol.set_stream(False),
+    "00 06 00 0C 01 41": protocol.set_stream(True),
+    "00 07 03 19 00 00 7B": protocol.get_calibration(protocol.ZERO_POINT),
+    "00 07 03 19 00 05 99": protocol.get_calibration(protocol.FULL_SCALE_POINT),
+    "00 07 03 11 00 00 5B": protocol.encode_packet((0x03, 0x11), b"\0\0"),
+    "00 08 04 11 00 00 07 91": protocol.encode_packet((0x04, 0x11), b"\0\0\x07"),
+    "00 07 04 1E 00 07 BC": protocol.set_rate(),
+}
 
 
-@pytest.mark.parametrize(
-    ("packet", "published"),
-    [
-        (protocol.encode_packet(protocol.LOOP_BACK), "00 05 00 01 0E"),
-        (protocol.get_serial(), "00 05 01 00 0D"),
-        (protocol.set_stream(False), "00 06 00 0C 00 3C"),
-        (protocol.set_stream(True), "00 06 00 0C 01 41"),
-        (protocol.get_calibration(protocol.ZERO_POINT), "00 07 03 19 00 00 7B"),
-        (protocol.get_calibration(protocol.FULL_SCALE_POINT), "00 07 03 19 00 05 99"),
-        (protocol.encode_packet((0x03, 0x11), b"\0\0"), "00 07 03 11 00 00 5B"),
-        (protocol.encode_packet((0x04, 0x11), b"\0\0\x07"), "00 08 04 11 00 00 07 91"),
-        (protocol.set_rate(), "00 07 04 1E 00 07 BC"),
-    ],
-)
-def test_packets_are_the_published_bytes(packet, published):
+@pytest.mark.parametrize("published", PUBLISHED)
+def test_packets_are_the_published_bytes(published):
+    packet = PUBLISHED[published]
     assert packet == bytes.fromhex(published)
-    command, payload = protocol.decode_packet(packet)
-    assert protocol.encode_packet(command, payload) == packet
+    assert protocol.encode_packet(*protocol.decode_packet(packet)) == packet
 
 
 @pytest.mark.parametrize(
@@ -45,11 +44,12 @@ def test_readings_are_the_published_bytes(raw, published):
     assert protocol.readings(frames).tolist() == [raw]
 
 
-def test_a_command_damaged_on_the_way_is_refused():
-    with pytest.raises(FrameError, match="checksum"):
-        protocol.decode_packet(bytes.fromhex("00 06 00 0C 01 42"))
-    with pytest.raises(FrameError, match="length"):
-        protocol.decode_packet(bytes.fromhex("00 07 00 0C 01 41"))
+@pytest.mark.parametrize(
+    ("packet", "words"), [("00 06 00 0C 01 42", "checksum"), ("00 07 00 0C 01 41", "length")]
+)
+def test_a_damaged_packet_is_refused(packet, words):
+    with pytest.raises(FrameError, match=words):
+        protocol.decode_packet(bytes.fromhex(packet))
 
 
 def found(stream: bytes, cuts: list[int]) -> tuple[list[int], DeviceCounters]:
@@ -75,8 +75,7 @@ def test_a_stream_that_begins_within_a_reading_is_found(raw, skipped, cuts):
         windows = np.lib.stride_tricks.sliding_window_view(held, 4)
         assert protocol.frame_checks(windows)[1:4].any()
         return
-    assert counters.crc_errors == 0
-    assert counters.frames == len(expected)
+    assert (counters.crc_errors, counters.frames) == (0, len(expected))
 
 
 @pytest.mark.parametrize("damage", ["drop", "repeat", "change"])
@@ -102,14 +101,14 @@ def test_a_damaged_stretch_is_left_out_and_counted(damage):
 
 def test_it_identifies_itself_and_streams_in_the_unit_of_its_certificate():
     fake = Qia128Fake(serial=4711)
+    fake.receive(protocol.set_stream(True))  # as another program left it
+    fake.advance(100)
     device = Qia128(SimulatedTransport(fake), rated_load=0.5, unit="N m")
     assert device.identify().serial == "4711"
     device.start()
-    batches = [device.read(0.1) for _ in range(40)]
-    load = np.concatenate([batch.columns["torque_n_m"] for batch in batches])
+    load, _ = gathered(device, 40)
     assert abs(len(load) - 2600) < 70
-    assert load.max() == pytest.approx(0.2, abs=1e-6)
-    assert load.min() == pytest.approx(-0.2, abs=1e-6)
+    assert (load.min(), load.max()) == pytest.approx((-0.2, 0.2), abs=1e-6)
     (channel,) = device.channels
     assert (channel.name, channel.unit, channel.rate_hz) == ("torque_n_m", "N m", 1300.0)
     assert channel.lower < -0.5 < 0.5 < channel.upper
@@ -117,30 +116,13 @@ def test_it_identifies_itself_and_streams_in_the_unit_of_its_certificate():
     assert not fake.streaming
 
 
-def test_a_stream_left_on_by_another_program_is_ended_first():
-    fake = Qia128Fake()
-    fake.receive(protocol.set_stream(True))
-    fake.advance(100)
-    assert Qia128(SimulatedTransport(fake)).identify().serial == "712345"
-
-
-def test_silence_is_a_timeout_and_two_equal_points_are_no_calibration():
-    cable = FaultyTransport(SimulatedTransport(Qia128Fake()))
-    cable.incoming = lambda data: b""
-    with pytest.raises(LinkTimeoutError, match="bit rate"):
-        Qia128(cable).identify()
+def test_two_equal_points_are_no_calibration_and_the_end_of_the_range_is_flagged():
     with pytest.raises(DriverError, match="no calibration"):
-        Qia128(SimulatedTransport(Qia128Fake(zero=5, full_scale=5))).identify()
-
-
-def test_a_reading_at_the_end_of_the_range_is_flagged():
+        started(Qia128, Qia128Fake(zero=5, full_scale=5))
     fake = Qia128Fake(zero=protocol.TOP - 100, full_scale=protocol.TOP)
     fake.raw = lambda numbers: np.full(len(numbers), protocol.TOP)
-    device = Qia128(SimulatedTransport(fake))
-    device.start()
-    batch = device.read(0.1)
-    assert len(batch)
-    assert (batch.flags == 1).all()
+    _, flags = gathered(started(Qia128, fake), 1)
+    assert set(flags) == {1}
 
 
 def test_a_serial_number_from_the_label_is_not_asked_for():
@@ -150,6 +132,5 @@ def test_a_serial_number_from_the_label_is_not_asked_for():
                 super().receive(data)
 
     with pytest.raises(LinkTimeoutError):
-        Qia128(SimulatedTransport(Deaf())).identify()
-    device = Qia128(SimulatedTransport(Deaf()), serial="A-17")
-    assert device.identify().serial == "A-17"
+        started(Qia128, Deaf())
+    assert Qia128(SimulatedTransport(Deaf()), serial="A-17").identify().serial == "A-17"

@@ -20,7 +20,7 @@ from drivers.errors import (
     PortPermissionError,
     UnknownSchemeError,
 )
-from drivers.transport import open_transport, register_scheme
+from drivers.transport import Transport, open_transport, register_scheme
 from drivers.transport.serial_port import SerialTransport, open_line
 from drivers.transport.simulated import SimulatedTransport
 
@@ -48,19 +48,21 @@ def pty() -> Iterator[Pty]:
     cable.unplug()
 
 
+def received(transport: Transport, size: int) -> bytes:
+    got = b""
+    while len(got) < size:
+        got += transport.read(1.0)
+    return got
+
+
 def test_bytes_go_both_ways(pty):
     transport = open_transport(pty.path)
     os.write(pty.device, b"\x00\x11from the device\x13\xff")
-    got = b""
-    while len(got) < 19:
-        got += transport.read(1.0)
-    assert got == b"\x00\x11from the device\x13\xff"
+    assert received(transport, 19) == b"\x00\x11from the device\x13\xff"
     transport.write(b"\x00to the device\r\n")
     assert os.read(pty.device, 100) == b"\x00to the device\r\n"
     assert transport.read(0.0) == b""
     assert transport.url == pty.path
-    before_s = transport.now_s
-    assert transport.now_s >= before_s
     transport.close()
     transport.close()
     with pytest.raises(LinkLostError, match="closed"):
@@ -70,10 +72,7 @@ def test_bytes_go_both_ways(pty):
 def test_a_line_has_its_own_speed_and_parity(pty):
     transport = open_line(pty.path, 1_250_000)
     os.write(pty.device, b"at this speed")
-    got = b""
-    while len(got) < 13:
-        got += transport.read(1.0)
-    assert got == b"at this speed"
+    assert received(transport, 13) == b"at this speed"
     transport.close()
     with pytest.raises(LinkError, match="parity Z"):
         open_line(pty.path, 9600, "Z")
@@ -165,12 +164,10 @@ def test_a_usb_device_is_found_by_its_serial_number(monkeypatch, pty):
     os.write(pty.device, b"it is me")
     assert transport.read(1.0)
     transport.close()
-    with pytest.raises(PortNotFoundError, match="Several"):
-        open_transport("usb:16C0:0483")
-    with pytest.raises(PortNotFoundError, match="No device"):
-        open_transport("usb:16c0:0483:3")
-    with pytest.raises(PortNotFoundError, match="usb:16c0:0483:SERIAL"):
-        open_transport("usb:teensy")
+    wrong = {"16C0:0483": "Several", "16c0:0483:3": "No device", "teensy": "usb:16c0:0483:SERIAL"}
+    for identity, words in wrong.items():
+        with pytest.raises(PortNotFoundError, match=words):
+            open_transport(f"usb:{identity}")
 
 
 def test_a_socket_url_is_a_client():
@@ -179,9 +176,7 @@ def test_a_socket_url_is_a_client():
         device, _ = server.accept()
         with device:
             device.sendall(b"x" * 5000)
-            got = b""
-            while len(got) < 5000:
-                got += transport.read(1.0)
+            assert received(transport, 5000) == b"x" * 5000
             transport.write(b"answer")
             assert device.recv(100) == b"answer"
         with pytest.raises(LinkLostError):
@@ -215,17 +210,12 @@ class CountingBoard:
 
 def test_virtual_time_passes_by_reading_alone():
     transport = SimulatedTransport(CountingBoard(), step_s=0.01)
-    assert transport.now_s == 0.0
     transport.write(b"echo")
-    assert transport.read(1.0) == b"echo"
-    assert transport.now_s == 0.0
-    assert transport.read(1.0) == b"."
-    assert transport.now_s == pytest.approx(0.04)
-    assert transport.read(0.025) == b""
-    assert transport.now_s == pytest.approx(0.065)
+    reads = ((1.0, b"echo", 0.0), (1.0, b".", 0.04), (0.025, b"", 0.065), (1e-12, b"", 0.066))
+    for timeout_s, expected, now_s in reads:
+        assert transport.read(timeout_s) == expected
+        assert transport.now_s == pytest.approx(now_s)
     assert transport.read(0.0) == b""
-    assert transport.read(1e-12) == b""
-    assert transport.now_s == pytest.approx(0.066)
     transport.close()
     with pytest.raises(LinkLostError):
         transport.read(1.0)
