@@ -209,11 +209,15 @@ class Clocked(Protocol):
     """The way to a device: a transport or a CAN bus."""
 
     @property
+    def url(self) -> str:
+        """The URL it was opened by."""
+
+    @property
     def now_s(self) -> float:
-        """Its clock, s."""
+        """Its clock, seconds from an arbitrary zero; virtual where time is."""
 
     def close(self) -> None:
-        """Let go of it."""
+        """Let go of it. Closing twice does nothing."""
 
 
 class LinkedDevice(Device):

@@ -1,7 +1,6 @@
 """The logger as a device among others: it only measures; `TeensyLogger` also moves things."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -19,42 +18,29 @@ ADC_BITS = 12
 _TRIPPED = STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED
 
 
-@dataclass(frozen=True, slots=True)
-class TeensyChannel:
-    """The counts of one field of a sample.
-
-    Attributes:
-        field: Field of a sample, see `drivers.teensy.reference.SAMPLE_DTYPE`.
-        channel: Name, rate and range.
-    """
-
-    field: str
-    channel: Channel
-
-
 def raw_channel(
     name: str, field: str, profile: Profile = REFERENCE, description: str = ""
-) -> TeensyChannel:
-    """Return a field of a board's samples as a channel."""
+) -> Channel:
+    """Return a field of a board's samples as a channel of its counts."""
     low, high = 0, 2**ADC_BITS - 1
     if not field.startswith(("fsr", "force_")):
         bounds = np.iinfo(profile.sample[field])
         low, high = int(bounds.min), int(bounds.max)
     about = description or f"field {field}"
-    return TeensyChannel(field, Channel(name, "count", profile.rate_hz, low, high, about))
+    return Channel(name, "count", profile.rate_hz, low, high, about)
 
 
-def raw_channels(profile: Profile = REFERENCE) -> tuple[TeensyChannel, ...]:
-    """Return every input of a board."""
+def raw_channels(profile: Profile = REFERENCE) -> dict[str, Channel]:
+    """Return every input of a board, by its field of a sample."""
     inputs = [*profile.input_names, *(["fsr"] if profile is REFERENCE else [])]
-    return tuple(raw_channel(f"{field}_count", field, profile) for field in inputs)
+    return {field: raw_channel(f"{field}_count", field, profile) for field in inputs}
 
 
 class TeensyDevice(LinkedDevice):
     """The logger's stream in units, time-stamped by its own clock. It is never armed.
 
     Args:
-        wired: Meaning of the fields of a sample; raw counts by default.
+        wired: Channels by the field of a sample; all inputs by default.
         profile: Samples of the board.
     """
 
@@ -63,18 +49,18 @@ class TeensyDevice(LinkedDevice):
     def __init__(
         self,
         transport: Transport,
-        wired: Sequence[TeensyChannel] | None = None,
+        wired: Mapping[str, Channel] | None = None,
         profile: Profile = REFERENCE,
     ) -> None:
         super().__init__(transport, profile.rate_hz)
-        self._wired = tuple(raw_channels(profile) if wired is None else wired)
+        self._wired = raw_channels(profile) if wired is None else wired
         self.logger = TeensyLogger(transport, profile)
         self._arrivals = Arrivals(self._counters, LONGEST_SILENCE_S)
 
     @property
     def channels(self) -> tuple[Channel, ...]:
         """What is wired, in the order given."""
-        return tuple(wired.channel for wired in self._wired)
+        return tuple(self._wired.values())
 
     @property
     def counters(self) -> dict[str, int]:
@@ -103,8 +89,8 @@ class TeensyDevice(LinkedDevice):
         status = batch.samples["status"]
         return Batch(
             {
-                wired.channel.name: batch.samples[wired.field].astype(np.float64)
-                for wired in self._wired
+                channel.name: batch.samples[field].astype(np.float64)
+                for field, channel in self._wired.items()
             },
             np.multiply(batch.tick_us, 1e-6),
             "device",

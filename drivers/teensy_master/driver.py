@@ -6,12 +6,12 @@ from drivers.teensy.grasper import GRASPER
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 
-JOINTS = ("yaw", "pitch", "grasp")
+JOINTS = {"yaw": "force_1", "pitch": "force_2", "grasp": "force_3"}
 
-POTS = tuple(
-    raw_channel(f"{joint}_count", f"force_{k}", GRASPER, f"potentiometer of the {joint}, 12 bits")
-    for k, joint in enumerate(JOINTS, start=1)
-)
+POTS = {
+    field: raw_channel(f"{joint}_count", field, GRASPER, f"potentiometer of the {joint}, 12 bits")
+    for joint, field in JOINTS.items()
+}
 """The board's three analogue inputs, which at a grasper are its force sensors."""
 
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+from drivers.device import Clocked
+
 MAX_STANDARD_ID = 0x7FF
 MAX_EXTENDED_ID = 0x1FFFFFFF
 MAX_DATA = 8
@@ -53,16 +55,8 @@ class CanCounters:
     ignored: int = 0
 
 
-class CanBus(Protocol):
+class CanBus(Clocked, Protocol):
     """Frames to and from one bus, read where they are wanted. Not for two threads at once."""
-
-    @property
-    def url(self) -> str:
-        """The URL the bus was opened by."""
-
-    @property
-    def now_s(self) -> float:
-        """The bus's clock, seconds from an arbitrary zero; virtual where time is."""
 
     @property
     def counters(self) -> CanCounters:
@@ -82,6 +76,3 @@ class CanBus(Protocol):
         Raises:
             LinkLostError: The bus is gone; every later call raises it again.
         """
-
-    def close(self) -> None:
-        """Let go of the bus. Closing twice does nothing."""

@@ -5,21 +5,14 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 from typing import Protocol
 
+from drivers.device import Clocked
 from drivers.errors import LinkLostError, UnknownSchemeError
 
 _SCHEME = re.compile(r"([a-z][a-z0-9+.-]*):", re.IGNORECASE)
 
 
-class Transport(Protocol):
+class Transport(Clocked, Protocol):
     """Bytes to and from one device. Not for use by two threads at once."""
-
-    @property
-    def url(self) -> str:
-        """The URL the transport was opened by."""
-
-    @property
-    def now_s(self) -> float:
-        """The transport's clock, seconds from an arbitrary zero; virtual where time is."""
 
     def read(self, timeout_s: float) -> bytes:
         """Return the bytes that are there, waiting at most `timeout_s` for the first.
@@ -37,9 +30,6 @@ class Transport(Protocol):
             LinkLostError: The link is gone.
             LinkTimeoutError: The device does not take the bytes.
         """
-
-    def close(self) -> None:
-        """Let go of the link. Closing twice does nothing."""
 
 
 def arriving(transport: Transport, timeout_s: float) -> Iterator[bytes]:

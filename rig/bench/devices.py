@@ -42,5 +42,6 @@ def _open_board(config: Config) -> Device:
     if config.logger.driver == "epos4" or config.logger.profile == DRIVE:
         counts -= {"current"}  # a drive that is switched off reports no current
     profile = machine_of(config).profile
-    wired = [channel for channel in raw_channels(profile) if channel.field in counts]
+    every = raw_channels(profile)
+    wired = {field: channel for field, channel in every.items() if field in counts}
     return TeensyDevice(open_logger(config, step_s=SIMULATED_STEP_S), wired, profile)
