@@ -105,12 +105,9 @@ class ClockFit:
         self._line: ClockLine | None = None
 
     def add(self, sent_s: float, received_s: float, tick_us: int) -> None:
-        """Take an exchange; one that was taken before is ignored.
+        """Take an exchange: question left, answer read, device clock in between modulo 2^32.
 
-        Args:
-            sent_s: Host clock when the question left.
-            received_s: Host clock when the answer was read.
-            tick_us: Device clock in between, modulo 2^32.
+        One that was taken before is ignored.
 
         Raises:
             ClockError: The answer is older than the question.
@@ -159,7 +156,6 @@ class ClockFit:
         self._line = None
 
     def _possible(self, sent_s: float, received_s: float, device_s: float) -> bool:
-        """Whether this answer is possible for a running clock with a crystal's drift."""
         last_sent_s, last_received_s, last_device_s = self._exchanges[-1]
         step_s = device_s - last_device_s
         slack_s = MAX_DRIFT * abs(step_s) + RESET_S
@@ -208,14 +204,10 @@ def _straight(device_s: NDArray[np.float64], host_s: NDArray[np.float64]) -> Clo
 
 
 def rising(times_s: NDArray[np.float64], after_s: float, step_s: float) -> NDArray[np.float64]:
-    """Return times of which each is at least a step after the one before.
+    """Return times, shape (n,), each at least a step after the one before, the first `after_s`.
 
-    A line that is fitted again moves; times by the new one may lie before those by the old.
-
-    Args:
-        times_s: Times by the line, s, shape (n,).
-        after_s: The time before the first, s; minus infinity without one.
-        step_s: Least distance, s; below the true one, so that the times return to the line.
+    A line that is fitted again moves; times by the new one may lie before those by the old. The
+    step is below the true one, so that the times return to the line.
     """
     floor_s = step_s * np.arange(1, times_s.size + 1)
     ahead_s = np.maximum.accumulate(times_s - floor_s)

@@ -45,9 +45,9 @@ class Channel:
         name: Column in a batch.
         unit: Unit of its values; `count` where a calibration has yet to be applied, `1` for none.
         rate_hz: Nominal sample rate.
-        lower: Lowest value the device can give, in `unit`; minus infinity where it is not known.
-        upper: Highest value the device can give.
-        description: Description in a few words.
+        lower: Lowest value the device can give; minus infinity where it is not known.
+        upper: Highest.
+        description: A few words.
     """
 
     name: str

@@ -19,14 +19,7 @@ class ForeignDriverError(DriverError):
 
 @contextmanager
 def blaming(title: str) -> Iterator[None]:
-    """Raise a fault of a driver as an error that names the driver.
-
-    Args:
-        title: The driver and its package, such as `The driver acme of acme-drivers`.
-
-    Raises:
-        ForeignDriverError: The driver raised it.
-    """
+    """Raise a fault of a driver as a `ForeignDriverError` that names it and its package."""
     try:
         yield
     except DriverError:
@@ -47,11 +40,7 @@ def guarded(device: Device, title: str) -> Device:
 
 
 def require(answer: object, kind: type[Answer], title: str, call: str) -> Answer:
-    """Return the answer of a driver, which is of the kind that the interface states.
-
-    Raises:
-        ForeignDriverError: It is of another kind.
-    """
+    """Return the answer of a driver; `ForeignDriverError` unless it is of the kind stated."""
     if not isinstance(answer, kind):
         raise ForeignDriverError(
             f"{title} returned {type(answer).__name__} from {call}.",
@@ -61,11 +50,7 @@ def require(answer: object, kind: type[Answer], title: str, call: str) -> Answer
 
 
 def require_whole(batch: Batch, names: Iterable[str], title: str) -> None:
-    """Refuse a batch that lacks a column, or whose columns differ in length.
-
-    Raises:
-        ForeignDriverError: Names the column.
-    """
+    """Refuse, by `ForeignDriverError`, a batch without a column or with one of another length."""
     whole = (len(batch),)
     columns: dict[str, Any] = {"sequence": batch.sequence, "flags": batch.flags}
     columns |= {name: batch.columns[name] for name in names if name in batch.columns}

@@ -75,13 +75,8 @@ class Driver:
 def made(way: Way, make: Callable[[Way], Made], title: str) -> Made:
     """Return a device on an open way, which is closed where the device cannot be made.
 
-    Args:
-        way: A transport or a CAN bus.
-        make: Makes the device; it raises `ValueError` for options that are no device's.
-        title: The device in messages.
-
     Raises:
-        LinkError: The options are no such device's.
+        LinkError: `make` raised `ValueError`: the options are no such device's.
     """
     try:
         return make(way)
@@ -185,12 +180,7 @@ def _open_fake(entry: EntryPoint, faults: Faults) -> Device:
 
 
 def open_device(name: str, url: str, **options: Any) -> Device:
-    """Open a device by the name of its driver.
-
-    Args:
-        name: Name of the driver.
-        url: URL of the device.
-        **options: The driver's own options.
+    """Open a device by the name of its driver, which gives the options.
 
     Raises:
         UnknownDriverError: No driver has this name, or it does not load.

@@ -20,11 +20,7 @@ Check = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
 
 
 class Arrivals:
-    """Numbers the samples of a stream that does not, and notices its silences.
-
-    Args:
-        longest_silence_s: Longest time between samples that is not a fault, s.
-    """
+    """Numbers the samples of a stream that does not, and notices its silences."""
 
     def __init__(self, counters: DeviceCounters, longest_silence_s: float) -> None:
         self._counters = counters
@@ -110,13 +106,7 @@ class SlidingFrames:
         return frames
 
     def read(self, transport: Transport, timeout_s: float, early: bytes = b"") -> NDArray[np.uint8]:
-        """Read until a frame is confirmed or nothing comes; return the frames, shape (n, size).
-
-        Args:
-            transport: Where the bytes come from.
-            timeout_s: Longest wait for the first.
-            early: Bytes that came before.
-        """
+        """Return the next frames, shape (n, size), waiting for the first; `early` came before."""
         give_up_s = transport.now_s + timeout_s
         while True:
             wait_s = 0.0 if early else max(0.0, give_up_s - transport.now_s)

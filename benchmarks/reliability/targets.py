@@ -261,7 +261,11 @@ TARGETS = (
     Target("commands to the board", _commands, _board_takes, 2),
     Target(
         "QIA128 packets",
-        lambda: [qia128.get_serial(), qia128.set_rate(), qia128.get_calibration(5)],
+        lambda: [
+            qia128.encode_packet(qia128.GET_SERIAL),
+            qia128.set_rate(),
+            qia128.encode_packet(qia128.GET_CALIBRATION, b"\0\5"),
+        ],
         _packet,
         60,
     ),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.ati_can import protocol
-from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT, slopes
+from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT, Calibration
 from drivers.counters import TRIES
 from drivers.device import Channel, DeviceIdentity, SampleFlag, wrench_channels
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
@@ -181,7 +181,7 @@ class AtiCan(PolledDevice):
         codes = self._ask(protocol.UNIT_CODES)[0]
         if len(codes) != 2 or codes[0] not in N_PER_UNIT or codes[1] not in N_M_PER_UNIT:
             raise FrameError(f"The sensor's units have the unknown codes {codes.hex(' ')}.")
-        return slopes(codes[0], codes[1], force, torque)
+        return Calibration(codes[0], codes[1], force, torque).slopes()
 
     def _flag(self, gauges: NDArray[np.int16]) -> int:
         if protocol.is_saturated(gauges):

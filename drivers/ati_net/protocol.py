@@ -5,7 +5,7 @@ Ethernet Axia.
 """
 
 import struct
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,8 @@ RECORD_DTYPE = np.dtype(
 """One record: 36 bytes, one or more a datagram."""
 READ_CALIBRATION = bytes([0x01]) + bytes(19)
 _COMMAND = struct.Struct(">HHI")
-_CALIBRATION = struct.Struct(">HBBII6H")
+_CALIBRATION = struct.Struct(">HBBII12x")
+"""It ends with divisors of the 16-bit readings of other interfaces."""
 CALIBRATION_SIZE = _CALIBRATION.size
 
 SUMMARY, LATCHED, SATURATED = 1 << 31, 1 << 16, 1 << 17
@@ -67,42 +68,18 @@ N_M_PER_UNIT = {1: 0.1129848290276167, 2: 1.3558179483314004, 3: 1.0, 4: 1e-3, 5
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Conversion of counts to forces and torques.
-
-    Attributes:
-        force_unit: Code of the force unit.
-        torque_unit: Code of the torque unit.
-        counts_per_force: Counts a unit of force.
-        counts_per_torque: Counts a unit of torque.
-        scale_factors: Divisors of the 16-bit readings of other interfaces.
-    """
+    """Units of force and torque by their codes, and how many counts each has."""
 
     force_unit: int
     torque_unit: int
     counts_per_force: int
     counts_per_torque: int
-    scale_factors: tuple[int, ...] = (0, 0, 0, 0, 0, 0)
 
     def slopes(self) -> NDArray[np.float64]:
         """Return N a count three times, then N m a count three times, shape (6,)."""
-        return slopes(
-            self.force_unit, self.torque_unit, self.counts_per_force, self.counts_per_torque
-        )
-
-
-def slopes(
-    force_unit: int, torque_unit: int, counts_per_force: int, counts_per_torque: int
-) -> NDArray[np.float64]:
-    """Return N a count three times, then N m a count three times, shape (6,).
-
-    Args:
-        force_unit: Code of the force unit, a key of `N_PER_UNIT`.
-        torque_unit: Code of the torque unit, a key of `N_M_PER_UNIT`.
-        counts_per_force: Counts a unit of force.
-        counts_per_torque: Counts a unit of torque.
-    """
-    force = N_PER_UNIT[force_unit] / counts_per_force
-    return np.repeat([force, N_M_PER_UNIT[torque_unit] / counts_per_torque], 3)
+        force = N_PER_UNIT[self.force_unit] / self.counts_per_force
+        torque = N_M_PER_UNIT[self.torque_unit] / self.counts_per_torque
+        return np.repeat([force, torque], 3)
 
 
 def encode_command(command: int, samples: int = 0) -> bytes:
@@ -131,14 +108,7 @@ def decode_records(datagram: bytes) -> NDArray[np.void]:
 
 def encode_calibration(calibration: Calibration) -> bytes:
     """Return the answer to `READ_CALIBRATION`."""
-    return _CALIBRATION.pack(
-        HEADER,
-        calibration.force_unit,
-        calibration.torque_unit,
-        calibration.counts_per_force,
-        calibration.counts_per_torque,
-        *calibration.scale_factors,
-    )
+    return _CALIBRATION.pack(HEADER, *astuple(calibration))
 
 
 def decode_calibration(answer: bytes) -> Calibration:
@@ -149,12 +119,12 @@ def decode_calibration(answer: bytes) -> Calibration:
     """
     if len(answer) != CALIBRATION_SIZE:
         raise FrameError(f"A calibration has {CALIBRATION_SIZE} bytes, not {len(answer)}.")
-    header, force_unit, torque_unit, per_force, per_torque, *scales = _CALIBRATION.unpack(answer)
+    header, force_unit, torque_unit, per_force, per_torque = _CALIBRATION.unpack(answer)
     if header != HEADER or force_unit not in N_PER_UNIT or torque_unit not in N_M_PER_UNIT:
         raise FrameError(f"{answer[:4].hex(' ')} does not begin a Net F/T's calibration.")
     if not (per_force and per_torque):
         raise FrameError("A Net F/T's calibration has no counts per unit.")
-    return Calibration(force_unit, torque_unit, per_force, per_torque, tuple(scales))
+    return Calibration(force_unit, torque_unit, per_force, per_torque)
 
 
 def status_words(status: int) -> list[str]:

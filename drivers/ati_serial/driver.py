@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT, slopes
+from drivers.ati_net.protocol import N_M_PER_UNIT, N_PER_UNIT
 from drivers.ati_serial import protocol
 from drivers.device import DeviceIdentity, flags_of
 from drivers.errors import DriverError
@@ -106,10 +106,7 @@ class AtiSerial(StreamedSensor):
                 f"Their codes are {found.force_unit} and {found.torque_unit}.",
                 "Choose another calibration, or set `force_unit` and `torque_unit`.",
             )
-        per_count = slopes(
-            found.force_unit, found.torque_unit, found.counts_per_force, found.counts_per_torque
-        )
-        self._matrix = found.matrix * per_count[:, np.newaxis]
+        self._matrix = found.matrix * found.slopes()[:, np.newaxis]
         self._calibration = found
         self._identified = True
         return DeviceIdentity(f"ATI digital F/T {found.part_number}".strip(), found.serial, "")

@@ -28,7 +28,14 @@ def example_calibration() -> Calibration:
     """Return a calibration of this fake's own: each gauge drives mostly one axis."""
     matrix = 1500.0 * np.eye(6) + 20.0 * np.arange(36).reshape(6, 6) % 7
     gains, offsets = (543, 540, 545, 541, 544, 542), (34927, 34900, 34950, 34910, 34940, 34920)
-    return Calibration("FT99999", "SI-145-5", matrix, 2, 3, 1_000_000, 1_000_000, gains, offsets)
+    return Calibration(
+        *(2, 3, 1_000_000, 1_000_000),
+        serial="FT99999",
+        part_number="SI-145-5",
+        matrix=matrix,
+        gains=gains,
+        offsets=offsets,
+    )
 
 
 class AtiSerialFake(Outbox):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers import modbus
+from drivers.ati_net import protocol as ati_net
 from drivers.errors import FrameError
 
 SLAVE = 0x0A
@@ -34,18 +35,14 @@ FRAME_ORDER = (0, 3, 1, 4, 2, 5)
 _CALIBRATION = struct.Struct(">8s32s4s20s144sBB24sII6H6H")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Calibration:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Calibration(ati_net.Calibration):
     """Conversion of gauges to forces and torques.
 
     Attributes:
         serial: Serial number.
         part_number: Part number.
         matrix: Counts of force and torque a gauge count, shape (6, 6); rows Fx to Tz.
-        force_unit: Code of the force unit.
-        torque_unit: Code of the torque unit.
-        counts_per_force: Counts a unit of force.
-        counts_per_torque: Counts a unit of torque.
         gains: To be copied to the active gains, shape (6,).
         offsets: To be copied to the active offsets, shape (6,).
     """
@@ -53,10 +50,6 @@ class Calibration:
     serial: str
     part_number: str
     matrix: NDArray[np.float64]
-    force_unit: int
-    torque_unit: int
-    counts_per_force: int
-    counts_per_torque: int
     gains: tuple[int, ...]
     offsets: tuple[int, ...]
 
@@ -83,7 +76,12 @@ def decode_calibration(registers: bytes) -> Calibration:
     if not (per_force and per_torque and np.isfinite(wide).all()):
         raise FrameError("A digital F/T's calibration is empty or damaged.")
     return Calibration(
-        _text(serial), _text(part), wide, force, torque, per_force, per_torque, gains, offsets
+        *(force, torque, per_force, per_torque),
+        serial=_text(serial),
+        part_number=_text(part),
+        matrix=wide,
+        gains=gains,
+        offsets=offsets,
     )
 
 

@@ -77,19 +77,11 @@ class Node:
         self._link.send(0, bytes([command, self._link.node_id]))
 
     def reach(self, state: int) -> None:
-        """Wait until the drive's heartbeat has this network state.
-
-        Raises:
-            LinkTimeoutError: It does not come.
-        """
+        """Wait until the drive's heartbeat has this network state; errors as `wait`."""
         self.wait(f"network state {state}", lambda: self._state == state)
 
     def reset_communication(self) -> None:
-        """Reset the drive's communication objects to their stored values; wait until it has booted.
-
-        Raises:
-            LinkTimeoutError: It does not boot.
-        """
+        """Let communication objects have their stored values; wait for boot-up as `wait`."""
         self.started = False
         self.command(protocol.NMT_RESET_COMMUNICATION)
         self.wait("its boot-up", lambda: self._booted, BOOT_TIMEOUT_S)
@@ -224,11 +216,7 @@ class Cycle:
         link.subscribe(0x180 + link.node_id, self._take_feedback)
 
     def exchange(self, torque_per_mille: int | None) -> Feedback | None:
-        """Send SYNC and return the answer, None when there is none in time.
-
-        Args:
-            torque_per_mille: Torque that an armed drive is commanded; None for no command.
-        """
+        """Send an armed drive's torque, then SYNC; return the answer, None when none comes."""
         if torque_per_mille is not None:
             self.command(protocol.ENABLE_OPERATION, torque_per_mille)
         while self._bus.now_s < self._synced_s + self._least_s:

@@ -67,10 +67,9 @@ class Qia128(StreamedDevice):
             DriverError: The calibration's two points are the same.
         """
         self.quieten()
-        asked = "" if self._serial else self._number(protocol.get_serial(), protocol.GET_SERIAL)
-        serial = self._serial or str(asked)
+        serial = self._serial or str(self._number(protocol.GET_SERIAL))
         zero, full = (
-            self._number(protocol.get_calibration(point), protocol.GET_CALIBRATION)
+            self._number(protocol.GET_CALIBRATION, bytes([0, point]))
             for point in (protocol.ZERO_POINT, protocol.FULL_SCALE_POINT)
         )
         if zero == full:
@@ -108,8 +107,9 @@ class Qia128(StreamedDevice):
         zero, full = self._points
         return (raw - zero) * (self._rated_load / (full - zero))
 
-    def _number(self, question: bytes, command: tuple[int, int]) -> int:
-        """Return the 32-bit number a question is answered with."""
+    def _number(self, command: tuple[int, int], payload: bytes = b"") -> int:
+        """Return the 32-bit number that a command is answered with."""
+        question = protocol.encode_packet(command, payload)
         for _ in self._counters.attempts():
             self._transport.write(question)
             for came in arriving(self._transport, REPLY_TIMEOUT_S):

@@ -34,16 +34,6 @@ def encode_packet(command: tuple[int, int], payload: bytes = b"") -> bytes:
     return body + bytes([checksum(body)])
 
 
-def get_serial() -> bytes:
-    """Return the packet that asks for the serial number."""
-    return encode_packet(GET_SERIAL)
-
-
-def get_calibration(point: int) -> bytes:
-    """Return the packet that asks for the reading at a calibration point."""
-    return encode_packet(GET_CALIBRATION, bytes([0x00, point]))
-
-
 def set_stream(on: bool) -> bytes:
     """Return the packet that switches the stream of readings."""
     return encode_packet(STREAM, bytes([on]))

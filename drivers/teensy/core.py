@@ -72,9 +72,6 @@ class BoardStart:
     simulated: bool = True
 
 
-AS_SIMULATED = BoardStart()
-
-
 class FirmwareBoard:
     """The firmware core on a bench, with the interface of `drivers.transport.simulated.Board`.
 
@@ -93,7 +90,7 @@ class FirmwareBoard:
     def __init__(
         self,
         bench: FirmwareBench,
-        start: BoardStart = AS_SIMULATED,
+        start: BoardStart = BoardStart(),
         library: Path | None = None,
         profile: Profile = REFERENCE,
         own: tuple[Sequence[Any], ArmLimits] | None = None,

@@ -35,13 +35,7 @@ class SampleBatch:
 
 @dataclass(frozen=True, slots=True)
 class ClockExchange:
-    """One look at the board's clock.
-
-    Attributes:
-        sent_s: Host clock when the ping left.
-        received_s: Host clock when the pong was read.
-        tick_us: Board clock in between, modulo 2^32.
-    """
+    """The board's clock, us modulo 2^32, between two times of the host's: ping sent, pong read."""
 
     sent_s: float
     received_s: float
@@ -97,8 +91,7 @@ class TeensyLogger:
     def arm(self, gains: Sequence[Any] | NDArray[np.float64], limits: ArmLimits) -> None:
         """Switch the controllers on. The motors stay currentless until the first setpoint.
 
-        The board offers a number with which it is armed; only this logger, which arms with it, can
-        then move it or keep it armed.
+        Only this logger can then move the board or keep it armed.
 
         Args:
             gains: `drivers.teensy.control`'s gains, shape (5,) or (motors, 5).
@@ -127,10 +120,7 @@ class TeensyLogger:
             )
 
     def clear(self, code: int) -> None:
-        """Clear what the board tripped over first; nothing is armed by it.
-
-        Args:
-            code: The trip that was read and understood; 0 where there is none.
+        """Clear what the board tripped over first, by the code that was read; nothing is armed.
 
         Raises:
             CommandRefusedError: It is armed, or has tripped over something else.
@@ -265,7 +255,6 @@ class TeensyLogger:
         return self._command(kind, protocol.encode(kind, self._number()))
 
     def _command(self, kind: Kind, payload: bytes) -> Ack:
-        """Send a command and return its acknowledgement."""
         ack = protocol.decode_ack(self._request(Kind.ACK, payload))
         self.queue_free = ack.queue_free
         if ack.result != Result.OK:

@@ -30,12 +30,7 @@ class Drive:
 
     @classmethod
     def armed(cls, gains: Any, engaged: bool = True) -> "Drive":
-        """Return a drive that was just armed; `engaged` where a setpoint has come already.
-
-        Args:
-            gains: Shape (5,) or (motors, 5).
-            engaged: Whether its motors move.
-        """
+        """Return a drive just armed, gains (5,) or (motors, 5); engaged by a setpoint or not."""
         rows = np.atleast_2d(np.array(gains, np.float64))
         return cls(np.array((STATUS_ARMED, engaged), np.int64), np.zeros((len(rows), 4)), rows)
 

@@ -212,15 +212,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Ack:
-    """The board's answer to a command, in the order of its layout.
-
-    Attributes:
-        sequence: Number of the command.
-        command: Kind of the command.
-        result: What became of it.
-        status: State of the board after it.
-        queue_free: Setpoints that still fit into the board's queue.
-    """
+    """The board's answer to a command, in the order of its layout."""
 
     sequence: int
     command: int
@@ -235,13 +227,7 @@ def version_text(version: int) -> str:
 
 
 def encode(kind: Kind, sequence: int, *fields: Any) -> bytes:
-    """Return the payload of a frame whose layout every board has.
-
-    Args:
-        kind: Its kind.
-        sequence: Number of the command that it is or answers.
-        *fields: What follows in `LAYOUTS`.
-    """
+    """Return the payload of a frame: its command's number, and what follows in `LAYOUTS`."""
     return np.array((VERSION, kind, sequence, *fields), LAYOUTS[kind]).tobytes()
 
 

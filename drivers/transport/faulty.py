@@ -78,10 +78,7 @@ class Faults:
     def pass_on(self, chunk: Chunk, now_s: float, whole: bool) -> list[tuple[float, Chunk]]:
         """Return a chunk with faults: pieces, each with the time from which it may be read.
 
-        Args:
-            chunk: What the device sent.
-            now_s: Time of the link.
-            whole: Damage a packet as a whole rather than a run of a stream's bytes.
+        A packet is damaged as a `whole`, of a stream a run of bytes.
         """
         due_s = max(now_s, self.stalled_until_s(now_s))
         pieces = [chunk]

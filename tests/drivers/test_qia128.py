@@ -14,13 +14,18 @@ from drivers.streaming import SlidingFrames
 from drivers.transport.simulated import SimulatedTransport
 from tests.drivers.taps import gathered, started
 
+
+def calibration_question(point: int) -> bytes:
+    return protocol.encode_packet(protocol.GET_CALIBRATION, bytes([0, point]))
+
+
 PUBLISHED = {
     "00 05 00 01 0E": protocol.encode_packet(protocol.LOOP_BACK),
-    "00 05 01 00 0D": protocol.get_serial(),
+    "00 05 01 00 0D": protocol.encode_packet(protocol.GET_SERIAL),
     "00 06 00 0C 00 3C": protocol.set_stream(False),
     "00 06 00 0C 01 41": protocol.set_stream(True),
-    "00 07 03 19 00 00 7B": protocol.get_calibration(protocol.ZERO_POINT),
-    "00 07 03 19 00 05 99": protocol.get_calibration(protocol.FULL_SCALE_POINT),
+    "00 07 03 19 00 00 7B": calibration_question(protocol.ZERO_POINT),
+    "00 07 03 19 00 05 99": calibration_question(protocol.FULL_SCALE_POINT),
     "00 07 03 11 00 00 5B": protocol.encode_packet((0x03, 0x11), b"\0\0"),
     "00 08 04 11 00 00 07 91": protocol.encode_packet((0x04, 0x11), b"\0\0\x07"),
     "00 07 04 1E 00 07 BC": protocol.set_rate(),
@@ -128,7 +133,7 @@ def test_two_equal_points_are_no_calibration_and_the_end_of_the_range_is_flagged
 def test_a_serial_number_from_the_label_is_not_asked_for():
     class Deaf(Qia128Fake):
         def receive(self, data: bytes) -> None:
-            if data != protocol.get_serial():
+            if data != protocol.encode_packet(protocol.GET_SERIAL):
                 super().receive(data)
 
     with pytest.raises(LinkTimeoutError):
