@@ -65,8 +65,6 @@ def require_whole(batch: Batch, names: Iterable[str], title: str) -> None:
 
 
 def _passed_on(call: str) -> Any:
-    """Return a method that passes a call on."""
-
     def pass_on(self: "Guarded", *arguments: Any) -> Any:
         with blaming(self._title):
             return getattr(self._device, call)(*arguments)

@@ -97,7 +97,6 @@ class PolledDevice(LinkedDevice):
         self._asked = self._lost = 0
 
     def _lose(self, samples: int) -> None:
-        """Count questions that brought no sample."""
         self._asked += samples
         self._lost += samples
         self._counters.gaps += 1

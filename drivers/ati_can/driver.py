@@ -174,7 +174,6 @@ class AtiCan(PolledDevice):
         return gauges
 
     def _read_units(self, version: tuple[int, int]) -> NDArray[np.float64]:
-        """Return N a count three times, then N m a count three times, shape (6,)."""
         if version < protocol.TELLS_UNITS:
             return np.full(6, 1.0 / protocol.ASSUMED_COUNTS_PER_UNIT)
         force, torque = protocol.decode_counts_per_unit(self._ask(protocol.COUNTS_PER_UNIT)[0])
@@ -203,7 +202,6 @@ class AtiCan(PolledDevice):
                 self._counters.late += 1
 
     def _ask(self, operation: int, data: bytes = b"", frames: int = 1) -> list[bytes]:
-        """Return the data of an answer's frames."""
         question = protocol.request(self._base, operation, data)
         for _ in self._counters.attempts():
             self.idle(0.0)
@@ -258,7 +256,6 @@ def open_ati_can(
 
 
 def _identifiers(options: Mapping[str, Any]) -> frozenset[int]:
-    """Return the sixteen identifiers of a base, one an operation."""
     return frozenset(range(options["base"] << 4, (options["base"] << 4) + 16))
 
 

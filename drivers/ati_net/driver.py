@@ -155,7 +155,6 @@ class AtiNet(StreamedDevice):
         self._watch.follow(internal, now_s)
 
     def _records(self, timeout_s: float) -> NDArray[np.void]:
-        """Return the records of the datagrams that are there, waiting for the first."""
         good = []
         datagram = self._transport.read(timeout_s)
         while datagram:

@@ -111,7 +111,6 @@ class DynamixelFake(Outbox):
             self._answer(2)
 
     def _write(self, address: int, data: bytes) -> int:
-        """Write to the table and return the error's number, 0 for none."""
         tripped = self.table[protocol.BUS_WATCHDOG.address] == protocol.WATCHDOG_TRIPPED
         if address in _GOALS and tripped:
             return protocol.RANGE_ERROR

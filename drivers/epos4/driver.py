@@ -289,7 +289,6 @@ class Epos4(PolledDrive):
         self._node.started = True
 
     def _require_operation(self, feedback: Feedback) -> None:
-        """Raise, once, when an armed drive is not in operation any more."""
         if not self._armed:
             return
         state = protocol.state_of(feedback.statusword)

@@ -247,7 +247,6 @@ class Epos4Fake:
             self._host_silent_ms = None
 
     def _command(self, controlword: int) -> None:
-        """Go through the state machine of CiA 402."""
         before, reset = self._word(0x6040), protocol.FAULT_RESET
         if self.state is State.FAULT_REACTION:
             return
@@ -289,7 +288,6 @@ class Epos4Fake:
         return bool(self._node.nmt.state == "OPERATIONAL")
 
     def _synchronise(self) -> None:
-        """Send the process data as mapped."""
         cob_id = self._word(0x1800, 1)
         if not self._operational or cob_id & protocol.PDO_INVALID:
             return
@@ -300,7 +298,6 @@ class Epos4Fake:
         self._network.send_message(cob_id, data)
 
     def _take_process_data(self, data: bytes) -> None:
-        """Write the received process data to the objects they are mapped to."""
         for place in range(1, self._word(0x1600, 0) + 1):
             entry = self._word(0x1600, place)
             size = (entry & 0xFF) // 8

@@ -128,7 +128,6 @@ def _map(
 
 
 def _switch_off(link: "CanopenLink", communication: int, cob_base: int) -> None:
-    """Make sure that a PDO which is not used says nothing."""
     link.write(communication, 1, (cob_base + link.node_id) | protocol.PDO_INVALID)
 
 

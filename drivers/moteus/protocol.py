@@ -230,7 +230,6 @@ def _varuint(value: int) -> bytes:
 
 
 def _number(data: bytes, place: int) -> tuple[int, int]:
-    """Return a varuint and where it ends."""
     value = shift = 0
     while place < len(data) and shift < 35:
         byte = data[place]

@@ -108,7 +108,6 @@ class Qia128(StreamedDevice):
         return (raw - zero) * (self._rated_load / (full - zero))
 
     def _number(self, command: tuple[int, int], payload: bytes = b"") -> int:
-        """Return the 32-bit number that a command is answered with."""
         question = protocol.encode_packet(command, payload)
         for _ in self._counters.attempts():
             self._transport.write(question)

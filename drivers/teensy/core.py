@@ -250,7 +250,6 @@ def _library(path: Path | None) -> ctypes.CDLL:
 
 @cache
 def _load(path: Path, built_ns: int) -> ctypes.CDLL:
-    """Load a build of the library and declare its functions."""
     functions = ctypes.CDLL(str(path))
     pointer, text, size = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_size_t
     word, number = ctypes.c_uint32, ctypes.c_int32

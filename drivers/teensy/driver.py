@@ -289,7 +289,6 @@ class TeensyLogger:
                 self.counters.unknown_frames += 1
 
     def _known(self, samples: NDArray[np.void]) -> NDArray[np.void]:
-        """Drop frames of a sample's size that are no samples."""
         known = (samples["version"] == protocol.VERSION) & (samples["kind"] == Kind.SAMPLE)
         if known.all():
             return samples

@@ -92,7 +92,6 @@ class PythonBoard(Outbox):
     # commands
 
     def _answer(self, payload: bytes) -> None:
-        """Carry out one command and queue its answer."""
         if len(payload) < protocol.HEADER_DTYPE.itemsize:
             return
         number, sequence = payload[1], int.from_bytes(payload[2:4], "little")
@@ -284,7 +283,6 @@ class PythonBoard(Outbox):
     # samples
 
     def _log(self, counts: NDArray[np.int32], status: NDArray[np.uint16]) -> None:
-        """Let the clock go on and queue the samples of a block."""
         ticks = len(counts)
         tick_us = self._profile.tick_us
         ticks_us = (self._next_tick_us + tick_us * np.arange(ticks, dtype=np.int64)) % 2**32
@@ -316,7 +314,6 @@ def _hello_reply(sequence: int, identity: Identity) -> bytes:
 
 
 def _reason_of_refusal(payload: bytes) -> Result:
-    """Return why `protocol.decode` refused a frame with a header."""
     if payload[0] != protocol.VERSION:
         return Result.WRONG_VERSION
     if payload[1] not in [kind.value for kind in Kind if kind >= Kind.HELLO]:

@@ -181,7 +181,6 @@ def _fields(layout: np.dtype[np.void]) -> str:
 
 
 def _whole(values: NDArray[np.integer], kind: np.dtype[Any], name: str) -> NDArray[Any]:
-    """Return setpoints, whole numbers in one dimension, in the board's number type."""
     array = np.atleast_1d(np.asarray(values))
     bounds = np.iinfo(kind)
     if not np.issubdtype(array.dtype, np.integer) or array.ndim != 1:

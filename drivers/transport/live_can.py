@@ -64,7 +64,6 @@ class LiveCanBus:
         self._answer()
 
     def _answer(self) -> None:
-        """Let the nodes send their pending frames."""
         for node in self._nodes:
             for answer in node.transmit():
                 self._theirs.send(answer)

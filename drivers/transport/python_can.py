@@ -37,8 +37,6 @@ def _yes(text: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Interface:
-    """The options of an interface of python-can in a URL."""
-
     options: dict[str, Callable[[str], Any]]
     fixed: dict[str, Any]
     channel: Callable[[str], dict[str, Any]] = lambda text: {"channel": text}
@@ -128,7 +126,6 @@ class PythonCanBus(HostLink):
         return True
 
     def _note_error(self, message: can.Message) -> None:
-        """Count an error frame; raise when the controller has left the bus."""
         self.counters.error_frames += 1
         kind, data = message.arbitration_id, bytes(message.data)
         if kind & _CONTROLLER and len(data) > 1 and data[1] & _RX_OVERFLOW:
@@ -197,7 +194,6 @@ def open_can(url: str) -> CanBus:
 
 
 def _split(url: str) -> tuple[str, str, dict[str, str]]:
-    """Return interface, channel and options of a URL."""
     rest, _, query = url.partition("?")
     scheme, _, named = rest.partition(":")
     name, _, channel = named.partition(":")
@@ -221,7 +217,6 @@ def _split(url: str) -> tuple[str, str, dict[str, str]]:
 
 
 def _explain(url: str, name: str, channel: str, error: Exception) -> errors.LinkError:
-    """Turn an interface's refusal into what happened, why, and what to do."""
     code = getattr(error, "errno", None) or getattr(error, "error_code", None)
     up = f"Run: sudo ip link set {channel} up type can bitrate N."
     if isinstance(error, (ImportError, can.CanInterfaceNotImplementedError)):

@@ -189,7 +189,6 @@ def port_holders(path: str) -> list[str]:
 
 
 def _explain(url: str, name: str, error: Exception) -> errors.LinkError:
-    """Turn pyserial's refusal into what happened, why, and what to do."""
     code = getattr(error, "errno", None)
     if code in (errno.EAGAIN, errno.EBUSY):
         holders = ", ".join(port_holders(name)) or "a program of another user"
@@ -229,7 +228,6 @@ def _group(path: str) -> str:
 
 
 def _join(path: str) -> str:
-    """Return how the user gets access to a device."""
     try:
         shared = Path(path).stat().st_mode & stat.S_IRGRP
     except OSError:

@@ -74,7 +74,6 @@ class SimulatedCanBus(HostLink):
         self._closes()
 
     def _exchange(self) -> None:
-        """Carry frames until no node has any more."""
         sent = [(node, frame) for node in self._nodes for frame in node.transmit()]
         while sent:
             for sender, frame in sent:

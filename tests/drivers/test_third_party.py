@@ -47,20 +47,14 @@ DRIVER = Driver("acme-scale", "ACME bench scale", open_scale)
 '''
 
 
-FAKE = "[rig.driver_fakes]\nacme-scale = acme_scale:Scale\n"
-
-
-def install(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, entry: str, change: tuple[str, str] = ("", "")
-) -> None:
-    """Put a package with one driver on the path, as pip would."""
-    (folder / "acme_scale.py").write_text(MODULE.replace(*change) if change[0] else MODULE)
+def install(folder: Path, monkeypatch: pytest.MonkeyPatch, entry: str, *change: str) -> None:
+    """Put a package with one driver on the path, as pip would; a changed one has a fake."""
+    (folder / "acme_scale.py").write_text(MODULE.replace(*change) if change else MODULE)
     info = folder / "acme-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(
-        f"[rig.drivers]\nacme-scale = {entry}\n{FAKE if change[0] else ''}"
-    )
+    fake = "[rig.driver_fakes]\nacme-scale = acme_scale:Scale\n" if change else ""
+    (info / "entry_points.txt").write_text(f"[rig.drivers]\nacme-scale = {entry}\n{fake}")
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delitem(sys.modules, "acme_scale", raising=False)
 
@@ -70,7 +64,7 @@ def with_scale(url: str, **options: object) -> Config:
     return load_config().changed(devices={"scale": scale})
 
 
-def test_it_is_one_of_the_drivers_and_is_opened_with_its_options(tmp_path, monkeypatch):
+def test_it_is_opened_with_its_options_and_a_missing_fake_is_reported(tmp_path, monkeypatch):
     install(tmp_path, monkeypatch, "acme_scale:DRIVER")
     assert drivers()["acme-scale"].options == {"rate_hz": 10.0}
     with pytest.raises(DriverError, match=r"no scale at /dev/ttyS9, 5.0 Hz"):
@@ -78,10 +72,6 @@ def test_it_is_one_of_the_drivers_and_is_opened_with_its_options(tmp_path, monke
     assert not problems(with_scale("/dev/ttyS9"))
     (problem,) = problems(with_scale("/dev/ttyS9", colour="red"))
     assert "colour" in problem.what
-
-
-def test_a_missing_fake_is_reported_where_one_is_required(tmp_path, monkeypatch):
-    install(tmp_path, monkeypatch, "acme_scale:DRIVER")
     config = with_scale("sim://")
     (problem,) = problems(config)
     assert "no fake" in problem.what
@@ -96,10 +86,9 @@ BROKEN = ["acme_scale:NONE", "acme_nonesuch:DRIVER", "acme_scale:open_scale", "a
 def test_a_broken_one_names_its_package_and_stops_no_other(tmp_path, monkeypatch, entry):
     (tmp_path / "acme_bad.py").write_text("1 / 0")
     install(tmp_path, monkeypatch, entry)
-    with pytest.raises(UnknownDriverError, match=r"acme"):
-        driver("acme-scale")
-    with pytest.raises(UnknownDriverError, match=r"acme"):
-        open_device("acme-scale", "/dev/ttyS9")
+    for open_it in (driver, lambda name: open_device(name, "/dev/ttyS9")):
+        with pytest.raises(UnknownDriverError, match=r"acme"):
+            open_it("acme-scale")
     (problem,) = problems(with_scale("/dev/ttyS9"))
     assert "acme" in problem.what
     assert set(broken_drivers()) == {"acme-scale"}
@@ -108,17 +97,13 @@ def test_a_broken_one_names_its_package_and_stops_no_other(tmp_path, monkeypatch
     assert not problems(load_config())
 
 
-def test_the_doctor_reports_a_broken_one_and_goes_on(tmp_path, monkeypatch):
+def test_the_doctor_and_the_list_of_devices_have_a_broken_one(tmp_path, monkeypatch, capsys):
     install(tmp_path, monkeypatch, "acme_nonesuch:DRIVER")
     findings = list(examine(load_config()))
     (broken,) = (f for f in findings if f.subject == "drivers")
     assert broken.level is Level.WARNING
     assert "acme_nonesuch" in broken.what
     assert any(f.subject == "logger" for f in findings)
-
-
-def test_the_list_of_devices_has_a_broken_one(tmp_path, monkeypatch, capsys):
-    install(tmp_path, monkeypatch, "acme_nonesuch:DRIVER")
     assert main(["devices", "--sim"]) == 0
     out = capsys.readouterr().out
     assert "acme_nonesuch" in out
@@ -141,22 +126,16 @@ FAULTS = {
 @pytest.mark.parametrize(("old", "new", "message"), FAULTS.values(), ids=FAULTS)
 @pytest.mark.parametrize("place", ["logger", "beside"])
 def test_a_fault_of_one_names_it(tmp_path, monkeypatch, capsys, place, old, new, message):
-    install(tmp_path, monkeypatch, "acme_scale:DRIVER", (old, new))
-    assert main(["record", "-c", rig_with_scale(tmp_path, place), "-o", str(tmp_path / "r")]) == 3
+    install(tmp_path, monkeypatch, "acme_scale:DRIVER", old, new)
+    scale = 'driver = "acme-scale"\nurl = "sim://"\n'
+    head = 'name = "scale"\ncalibration = "sensor"\n[logger]\nprofile = "sensor"\n'
+    if place == "beside":
+        head = f"{SIMULATED.read_text()}\n[devices.scale]\n"
+    path = tmp_path / "rig.toml"
+    path.write_text(head + scale)
+    assert main(["record", "-c", str(path), "-o", str(tmp_path / "r")]) == 3
     said = capsys.readouterr().err
     assert re.search(f"driver (acme-scale of acme|scale) .*{message}", said, re.DOTALL)
-
-
-def rig_with_scale(folder: Path, place: str) -> str:
-    """Write a configuration with the scale in the logger's place, or beside it."""
-    path = folder / "rig.toml"
-    scale = 'driver = "acme-scale"\nurl = "sim://"\n'
-    if place == "logger":
-        head = 'name = "scale"\ncalibration = "sensor"\n[logger]\nprofile = "sensor"\n'
-        path.write_text(head + scale)
-    else:
-        path.write_text(f"{SIMULATED.read_text()}\n[devices.scale]\n{scale}")
-    return str(path)
 
 
 def test_a_driver_that_cannot_stop_its_device_cannot_be_made():
