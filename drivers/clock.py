@@ -66,35 +66,11 @@ class ClockLine:
         return self.device_s + (host_s - self.host_s) / self.rate
 
 
-class TickUnwrapper:
-    """Follows a 32-bit microsecond counter that may be looked at out of order.
-
-    The time between two calls must be less than half a wrap (35.8 min).
-    """
-
-    def __init__(self) -> None:
-        self._newest_us: int | None = None
-
-    def unwrap(self, tick_us: int) -> int:
-        """Return the counter without its wraps, us."""
-        if self._newest_us is None:
-            self._newest_us = tick_us % WRAP_US
-            return self._newest_us
-        step = (tick_us - self._newest_us + WRAP_US // 2) % WRAP_US - WRAP_US // 2
-        unwrapped = self._newest_us + step
-        self._newest_us = max(self._newest_us, unwrapped)
-        return unwrapped
-
-    def restart(self) -> None:
-        """Reset: the device's counter has restarted."""
-        self._newest_us = None
-
-
 class ClockFit:
     """The line from one device's clock to the host's, kept up to date."""
 
     def __init__(self) -> None:
-        self._unwrapper = TickUnwrapper()
+        self._newest_us: int | None = None
         self._exchanges: deque[tuple[float, float, float]] = deque(maxlen=KEPT)
         self._strange = 0
         self._last_sent_s = float("-inf")
@@ -117,7 +93,7 @@ class ClockFit:
         if sent_s <= self._last_sent_s:
             return
         self._last_sent_s = sent_s
-        device_s = self._unwrapper.unwrap(tick_us) * 1e-6
+        device_s = self._unwrapped_s(tick_us)
         if self._exchanges and not self._possible(sent_s, received_s, device_s):
             self._strange += 1
             self.rejected += 1
@@ -125,18 +101,14 @@ class ClockFit:
                 return  # one may be damage; a second is a restarted clock
             self.resets += 1
             self._exchanges.clear()
-            self._unwrapper.restart()
-            device_s = self._unwrapper.unwrap(tick_us) * 1e-6
+            self._newest_us = None
+            device_s = self._unwrapped_s(tick_us)
         self._strange = 0
         self._keep(sent_s, received_s, device_s)
 
     @property
     def line(self) -> ClockLine:
-        """The line through the exchanges.
-
-        Raises:
-            ClockError: No exchange so far.
-        """
+        """The line through the exchanges (`ClockError`: no exchange so far)."""
         if self._line is None:
             if not self._exchanges:
                 raise ClockError(
@@ -144,6 +116,16 @@ class ClockFit:
                 )
             self._line = _fit(np.array(self._exchanges))
         return self._line
+
+    def _unwrapped_s(self, tick_us: int) -> float:
+        """Return a device time without the counter's wraps, less than half a wrap from the last."""
+        if self._newest_us is None:
+            self._newest_us = tick_us % WRAP_US
+            return self._newest_us * 1e-6
+        step = (tick_us - self._newest_us + WRAP_US // 2) % WRAP_US - WRAP_US // 2
+        unwrapped = self._newest_us + step
+        self._newest_us = max(self._newest_us, unwrapped)
+        return unwrapped * 1e-6
 
     def _keep(self, sent_s: float, received_s: float, device_s: float) -> None:
         if self._exchanges:

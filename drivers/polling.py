@@ -122,7 +122,8 @@ class PolledDevice(LinkedDevice):
 class PolledDrive(PolledDevice):
     """A motor controller that is commanded and asked in one cycle.
 
-    A driver gives `energise`, `release` and `zero` besides what every polled device gives.
+    A driver gives `energise` and `release` besides what every polled device gives, and keeps its
+    command in `_goal`.
 
     Args:
         rate_hz: Polling rate.
@@ -137,6 +138,7 @@ class PolledDrive(PolledDevice):
         self._title = title
         self._own_watch = own_watch
         self._armed = self._may_be_armed = False
+        self._goal: float = 0
 
     def energise(self) -> None:
         """Energise the motor, without current."""
@@ -144,10 +146,6 @@ class PolledDrive(PolledDevice):
 
     def release(self) -> None:
         """Take the motor out of force, and return when the drive has confirmed it."""
-        raise NotImplementedError
-
-    def zero(self) -> None:
-        """Forget the command."""
         raise NotImplementedError
 
     def arm(self) -> None:
@@ -164,7 +162,7 @@ class PolledDrive(PolledDevice):
     def put_in_force(self) -> None:
         """Energise the motor of a healthy drive; errors as `arm`."""
         self._may_be_armed = True
-        self.zero()
+        self._goal = 0
         self.energise()
         self._armed = True
 
@@ -175,7 +173,7 @@ class PolledDrive(PolledDevice):
             DisarmUnconfirmedError: It has not confirmed it; its state is unknown.
         """
         self._armed = False
-        self.zero()
+        self._goal = 0
         try:
             self.release()
         except DriverError as error:

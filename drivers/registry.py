@@ -159,11 +159,7 @@ def fakes() -> dict[str, OpenFake]:
 
 
 def open_fake(name: str) -> Device:
-    """Open a driver on its fake.
-
-    Raises:
-        UnknownDriverError: It has none.
-    """
+    """Open a driver on its fake (`UnknownDriverError`: it has none)."""
     known = fakes()
     if name not in known:
         raise UnknownDriverError(

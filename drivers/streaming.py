@@ -189,11 +189,7 @@ class StreamedDevice(LinkedDevice):
         )
 
     def quieten(self) -> None:
-        """End the stream and wait until nothing more comes.
-
-        Raises:
-            LinkTimeoutError: It goes on.
-        """
+        """End the stream and wait until nothing more comes (`LinkTimeoutError`: it goes on)."""
         self.stop()
         give_up_s = self._transport.now_s + ENDS_S
         while self._transport.read(QUIET_S):

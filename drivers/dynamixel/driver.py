@@ -40,11 +40,7 @@ class Line:
         """Whether the newest answer says that the device has a hardware error."""
 
     def read(self, register: Register) -> bytes:
-        """Return the value of a register.
-
-        Raises:
-            InstructionRefusedError: The device refuses.
-        """
+        """Return the value of a register (`InstructionRefusedError`: the device refuses)."""
         return self.ask(protocol.READ, protocol.read_question(register))
 
     def read_number(self, register: Register) -> int:
@@ -150,7 +146,6 @@ class Dynamixel(PolledDrive):
         self._unit_a = current_unit_a
         self._line = Line(transport, device_id, self._counters)
         self._limit_a = math.inf
-        self._goal = 0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -203,10 +198,6 @@ class Dynamixel(PolledDrive):
     def release(self) -> None:
         """Take the motor out of force, and read it back."""
         self._write_and_check(protocol.TORQUE_ENABLE, 0)
-
-    def zero(self) -> None:
-        """Set the goal to 0."""
-        self._goal = 0
 
     def command(self, ratio: float) -> None:
         """Command a share of the drive's current limit, as `set_current`."""
@@ -261,7 +252,7 @@ class Dynamixel(PolledDrive):
 
     def _send_goal(self) -> None:
         try:
-            self._line.write(protocol.GOAL_CURRENT, self._goal)
+            self._line.write(protocol.GOAL_CURRENT, round(self._goal))
         except InstructionRefusedError as error:
             self._armed = False
             if self._line.read_number(protocol.BUS_WATCHDOG) == protocol.WATCHDOG_TRIPPED:

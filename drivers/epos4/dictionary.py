@@ -9,7 +9,6 @@ from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 OBJECTS = (
     (0x1000, "Device type", datatypes.UNSIGNED32, "ro"),
     (0x1001, "Error register", datatypes.UNSIGNED8, "ro"),
-    (0x1008, "Device name", datatypes.VISIBLE_STRING, "const"),
     (0x1017, "Producer heartbeat time", datatypes.UNSIGNED16, "rw"),
     (0x6007, "Abort connection option code", datatypes.INTEGER16, "rw"),
     (0x603F, "Error code", datatypes.UNSIGNED16, "ro"),
@@ -31,17 +30,12 @@ RECORDS = {
         for name in ("Vendor id", "Product code", "Revision number", "Serial number")
     ),
     0x1029: (("Communication error", datatypes.UNSIGNED8, "rw"),),
-    0x2200: (("Supply voltage", datatypes.UNSIGNED16, "ro"),),
     0x3001: (
         ("Nominal current", datatypes.UNSIGNED32, "rw"),
         ("Output current limit", datatypes.UNSIGNED32, "rw"),
         ("Number of pole pairs", datatypes.UNSIGNED8, "rw"),
         ("Thermal time constant winding", datatypes.UNSIGNED16, "rw"),
         ("Torque constant", datatypes.UNSIGNED32, "rw"),
-    ),
-    0x30D1: (
-        ("Current actual value averaged", datatypes.INTEGER32, "ro"),
-        ("Current actual value", datatypes.INTEGER32, "ro"),
     ),
     0x30D2: (("Torque actual value averaged", datatypes.INTEGER16, "ro"),),
 }

@@ -75,7 +75,6 @@ class Epos4(PolledDrive):
         self._cycle = Cycle(self._link, rate_hz, late_s, self._counters)
         self._ratings: Ratings | None = None
         self._feedback: Feedback | None = None
-        self._target = 0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -103,11 +102,7 @@ class Epos4(PolledDrive):
 
     @property
     def ratings(self) -> Ratings:
-        """The drive's motor data.
-
-        Raises:
-            DriverError: They have not been read yet.
-        """
+        """The drive's motor data (`DriverError`: they have not been read yet)."""
         if self._ratings is None:
             raise DriverError("The drive's motor data are not known.", fix="Call start first.")
         return self._ratings
@@ -154,18 +149,10 @@ class Epos4(PolledDrive):
         self._cycle.drop_late()
 
     def release(self) -> None:
-        """Voltage off, read back.
-
-        Raises:
-            DriverError: The drive has not said so.
-        """
+        """Voltage off, read back (`DriverError`: the drive has not said so)."""
         if self._node.started:
             self._cycle.command(protocol.DISABLE_VOLTAGE, 0)
         self._power.disable()
-
-    def zero(self) -> None:
-        """Set the target torque to 0."""
-        self._target = 0
 
     def set_torque(self, torque_n_m: float) -> float:
         """Command a motor torque, sent at the next reading and at every one from then on.
@@ -179,7 +166,7 @@ class Epos4(PolledDrive):
         per_mille = self.ratings.per_mille(torque_n_m)
         if not self._armed:
             raise DriverError("The drive is not armed.", fix="Call arm first.")
-        self._target = per_mille
+        self._goal = per_mille
         return self.ratings.torque_n_m(per_mille)
 
     def command(self, ratio: float) -> None:
@@ -195,7 +182,7 @@ class Epos4(PolledDrive):
         """Send command and SYNC, and return the drive's answer."""
         if self._node.in_trouble:
             self._armed = False  # it is not commanded any more
-        self._feedback = self._cycle.exchange(self._target if self._armed else None)
+        self._feedback = self._cycle.exchange(round(self._goal) if self._armed else None)
         if self._feedback is None:
             self._counters.timeouts += 1
             raise LinkTimeoutError("The drive does not answer a SYNC.")
@@ -204,7 +191,7 @@ class Epos4(PolledDrive):
             float(position),
             self.ratings.torque_n_m(torque),
             self.ratings.current_a(torque),
-            self.ratings.torque_n_m(self._target),
+            self.ratings.torque_n_m(round(self._goal)),
         )
         is_faulty = protocol.state_of(self._feedback.statusword) in FAULTY
         return values, SampleFlag.SUSPECT if is_faulty else 0

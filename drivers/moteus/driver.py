@@ -127,7 +127,6 @@ class Moteus(PolledDrive):
         self._limit_n_m = torque_limit_n_m
         self._watchdog_s = watchdog_s
         self._link = FdcanusbLink(transport, device_id, self._counters)
-        self._torque_n_m = 0.0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -182,18 +181,10 @@ class Moteus(PolledDrive):
             self._transport.read(1e-3)
 
     def release(self) -> None:
-        """Stop the controller, which clears a fault.
-
-        Raises:
-            DriverError: It is not stopped.
-        """
+        """Stop the controller, which clears a fault (`DriverError`: it is not stopped)."""
         state = self._exchange(protocol.stop_command())
         if state.mode != protocol.STOPPED:
             raise DriverError(f"It is in mode {state.mode}.")
-
-    def zero(self) -> None:
-        """Set the torque to 0."""
-        self._torque_n_m = 0.0
 
     def command(self, ratio: float) -> None:
         """Command a share of the torque limit, as `set_torque`."""
@@ -209,7 +200,7 @@ class Moteus(PolledDrive):
             DriverError: Not armed, not finite, or beyond the limit.
         """
         self.require(torque_n_m, self._limit_n_m, "N m")
-        self._torque_n_m = torque_n_m
+        self._goal = torque_n_m
         return torque_n_m
 
     def idle(self, wait_s: float) -> None:
@@ -233,14 +224,14 @@ class Moteus(PolledDrive):
             2 * math.pi * state.velocity_rev_s,
             state.torque_n_m,
             state.current_a,
-            self._torque_n_m,
+            self._goal,
             protocol.VOLTS_A_UNIT * state.voltage,
             state.temperature + _ZERO_K,
         )
         return values, SampleFlag.SUSPECT if state.mode == protocol.FAULT else 0
 
     def _position_command(self) -> bytes:
-        return protocol.torque_command(self._torque_n_m, self._limit_n_m, self._watchdog_s)
+        return protocol.torque_command(self._goal, self._limit_n_m, self._watchdog_s)
 
     def _exchange(self, command: bytes) -> State:
         return self._link.ask(command + protocol.STATE_QUESTION, protocol.decode_state)

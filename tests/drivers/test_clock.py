@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.clock import ClockError, ClockFit, TickUnwrapper, arrival_fit
+from drivers.clock import ClockError, ClockFit, arrival_fit
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.fake_device import HandMovedBench
@@ -56,19 +56,6 @@ def test_offset_and_drift_are_found_whatever_the_jitter(ppm, start_us, jitter_s,
     assert np.allclose(fit.line.to_device(fit.line.to_host(device_s)), device_s, atol=1e-9)
     assert (fit.resets, fit.rejected) == (0, 0)
     assert fit.line.residual_s <= 2 * jitter_s + 1e-6
-
-
-@given(
-    start=st.integers(0, WRAP - 1),
-    steps=st.lists(st.integers(-(10**6), 2**31 - 1), min_size=1, max_size=20),
-)
-def test_a_wrapped_counter_is_followed_out_of_order(start, steps):
-    unwrapper = TickUnwrapper()
-    newest = unwrapper.unwrap(start)
-    for step in steps:
-        asked = max(0, newest + step)
-        assert unwrapper.unwrap(asked % WRAP) == asked
-        newest = max(newest, asked)
 
 
 def test_neither_late_answers_nor_a_damaged_one_pull_the_line():
