@@ -138,7 +138,7 @@ class PolledDrive(PolledDevice):
         self._title = title
         self._own_watch = own_watch
         self._armed = self._may_be_armed = False
-        self._goal: float = 0
+        self._goal = 0.0
 
     def energise(self) -> None:
         """Energise the motor, without current."""
@@ -162,7 +162,7 @@ class PolledDrive(PolledDevice):
     def put_in_force(self) -> None:
         """Energise the motor of a healthy drive; errors as `arm`."""
         self._may_be_armed = True
-        self._goal = 0
+        self._goal = 0.0
         self.energise()
         self._armed = True
 
@@ -173,7 +173,7 @@ class PolledDrive(PolledDevice):
             DisarmUnconfirmedError: It has not confirmed it; its state is unknown.
         """
         self._armed = False
-        self._goal = 0
+        self._goal = 0.0
         try:
             self.release()
         except DriverError as error:

@@ -13,8 +13,7 @@ from pathlib import Path
 
 from drivers.teensy import protocol
 from drivers.teensy.grasper import AXIS_LIMIT_NAMES, GRASPER
-from drivers.teensy.limits import CHOICE_NAMES, LOOP_LIMIT_NAMES, MOTOR_LIMIT_NAMES
-from drivers.teensy.profile import Profile
+from drivers.teensy.profile import CHOICE_NAMES, LOOP_LIMIT_NAMES, MOTOR_LIMIT_NAMES, Profile
 from drivers.teensy.reference import LIMIT_NAMES, REFERENCE
 
 HEADER = Path(__file__).parent / "core" / "contract.hpp"

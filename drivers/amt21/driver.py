@@ -43,43 +43,6 @@ def turns_at(angle: int, before: int, after: int) -> int | None:
     return None
 
 
-class RateGate:
-    """Refuses a position that is further from the last one than the shaft can have turned.
-
-    Two check bits let one damaged answer in four pass.
-
-    Args:
-        top_speed_rad_s: The fastest the shaft turns.
-        multi_turn: Whether positions count turns; else they wrap at each turn.
-    """
-
-    def __init__(self, top_speed_rad_s: float, multi_turn: bool) -> None:
-        self._counts_a_second = top_speed_rad_s / (2 * math.pi) * protocol.FULL_TURN
-        self._wrap = protocol.FULL_TURN * (protocol.FULL_TURN if multi_turn else 1)
-        self._last: tuple[int, float] | None = None
-
-    def restart(self) -> None:
-        """Take the next position as it is."""
-        self._last = None
-
-    def fits(self, position: int, now_s: float) -> bool:
-        """Return whether the shaft can be at `position`, counts, at this time."""
-        if self._last is None:
-            return True
-        last, then_s = self._last
-        return self.is_near(position, last, now_s - then_s)
-
-    def is_near(self, position: int, other: int, apart_s: float) -> bool:
-        """Return whether the shaft can have turned from one position to the other in that time."""
-        half = self._wrap // 2
-        moved = abs((position - other + half) % self._wrap - half)
-        return moved <= apart_s * self._counts_a_second + _PLAY_COUNTS
-
-    def accept(self, position: int, now_s: float) -> None:
-        """Take a position for good."""
-        self._last = (position, now_s)
-
-
 class Amt21(PolledDevice):
     """One encoder on an RS-485 line. Nothing else on the line may be asked at the same time.
 
@@ -106,7 +69,9 @@ class Amt21(PolledDevice):
         self._address = address
         self._multi_turn = multi_turn
         self._identified = True  # it has nothing to be identified by but an answer
-        self._gate = RateGate(top_speed_rad_s, multi_turn)
+        self._counts_a_second = top_speed_rad_s / protocol.RAD_PER_COUNT
+        self._wrap = protocol.FULL_TURN * (protocol.FULL_TURN if multi_turn else 1)
+        self._last: tuple[int, float] | None = None
         angle = Channel("angle_rad", "rad", rate_hz, 0.0, 2 * math.pi, "absolute angle, one turn")
         half = protocol.FULL_TURN // 2
         turns = Channel("turns", "1", rate_hz, -half, half - 1, "whole turns")
@@ -130,7 +95,7 @@ class Amt21(PolledDevice):
     def start(self) -> None:
         """Number the samples from 0, the first being due now."""
         super().start()
-        self._gate.restart()
+        self._last = None
 
     def idle(self, wait_s: float) -> None:
         """Let time pass; what comes unasked is late, and dropped."""
@@ -145,7 +110,7 @@ class Amt21(PolledDevice):
         position = self._plausible()
         if position is None:
             raise LinkTimeoutError("The AMT21 gives no good position.")
-        self._gate.accept(position, self._transport.now_s)
+        self._last = position, self._transport.now_s
         turns, angle = divmod(position, protocol.FULL_TURN)
         values = (angle * protocol.RAD_PER_COUNT, float(protocol.signed(turns)))
         return values[: len(self._channels)], 0
@@ -154,10 +119,11 @@ class Amt21(PolledDevice):
         """Return a position that the shaft can have, None without a good one.
 
         A position out of reach is asked for again: it was damaged, unless the second one agrees.
+        Two check bits let one damaged answer in four pass.
         """
         first = self._measure()
         first_s = self._transport.now_s
-        if first is None or self._gate.fits(first, first_s):
+        if first is None or self._fits(first, first_s):
             return first
         self._counters.crc_errors += 1
         self._counters.retries += 1
@@ -165,11 +131,20 @@ class Amt21(PolledDevice):
         if second is None:
             return None
         now_s = self._transport.now_s
-        if self._gate.fits(second, now_s) or self._gate.is_near(second, first, now_s - first_s):
+        if self._fits(second, now_s) or self._is_near(second, first, now_s - first_s):
             return second
         self._counters.crc_errors += 1
         self._counters.timeouts += 1
         return None
+
+    def _fits(self, position: int, now_s: float) -> bool:
+        return self._last is None or self._is_near(position, self._last[0], now_s - self._last[1])
+
+    def _is_near(self, position: int, other: int, apart_s: float) -> bool:
+        """Return whether the shaft can have turned from one position to the other in that time."""
+        half = self._wrap // 2
+        moved = abs((position - other + half) % self._wrap - half)
+        return moved <= apart_s * self._counts_a_second + _PLAY_COUNTS
 
     def _measure(self) -> int | None:
         """Return the position, counts over all turns it counts; None without good answers."""

@@ -43,7 +43,6 @@ STATUS_BITS = {
 """Meaning of each bit of the status; bit 15 is set when any other is set."""
 UNUSABLE = sum(1 << bit for bit in (1, 2, 3, 4, 5, 6, 7, 11, 12))
 """Bits with which the readings are not to be used."""
-ANY_ERROR = 1 << 15
 
 _FIRST = struct.Struct(">H3h")
 _SECOND = struct.Struct(">3h")

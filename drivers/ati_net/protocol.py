@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from drivers.errors import FrameError
 
-RDT_PORT = 49152
 CALIBRATION_PORT = 49151
 HEADER = 0x1234
 STOP, STREAM, RESET_LATCH, SET_BIAS = 0x0000, 0x0002, 0x0041, 0x0042

@@ -13,7 +13,6 @@ FRAME_SIZE = 4
 MIDDLE = 1 << 23
 """Reading without input."""
 TOP = (1 << 24) - 1
-LOOP_BACK = (0x00, 0x01)
 STREAM = (0x00, 0x0C)
 GET_SERIAL = (0x01, 0x00)
 GET_CALIBRATION = (0x03, 0x19)

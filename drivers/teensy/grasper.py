@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy.limits import (
+from drivers.teensy.profile import (
     CHOICE_NAMES,
     LOOP_LIMIT_NAMES,
     MOTOR_LIMIT_NAMES,
     Choices,
     LoopLimits,
+    Profile,
 )
-from drivers.teensy.profile import Profile
 from drivers.teensy.protocol import GAIN_NAMES, SAMPLE_FIELDS, SESSION_FIELDS, TOP, layout
 
 MOTORS = (1, 2, 3)

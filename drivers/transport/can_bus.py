@@ -34,25 +34,15 @@ class CanFrame:
 
 @dataclass(slots=True)
 class CanCounters:
-    """Counters of a bus since it was opened.
+    """Troubles of a bus since it was opened, as reported by its controller.
 
     Attributes:
-        received: Data frames received.
-        sent: Data frames sent.
-        error_frames: Error frames the controller reported.
-        bus_off: Times the controller took itself off the bus.
-        overruns: Times the controller reported that it had to drop received frames.
-        echoes: Own frames that the interface returned; they are not passed on.
-        ignored: Remote frames and frames of more than 8 bytes; they are not passed on.
+        error_frames: Error frames.
+        overruns: Times that it had to drop received frames.
     """
 
-    received: int = 0
-    sent: int = 0
     error_frames: int = 0
-    bus_off: int = 0
     overruns: int = 0
-    echoes: int = 0
-    ignored: int = 0
 
 
 class CanBus(Clocked, Protocol):

@@ -47,7 +47,6 @@ class SimulatedCanBus(HostLink):
     def send(self, frame: CanFrame) -> None:
         """Hand a frame to every node."""
         self._require_link()
-        self.counters.sent += 1
         for node in self._nodes:
             node.receive(frame)
         self._exchange()
@@ -64,10 +63,7 @@ class SimulatedCanBus(HostLink):
             self._ticks += 1
             remaining -= 1
             self._exchange()
-        if not self._waiting:
-            return None
-        self.counters.received += 1
-        return self._waiting.popleft()
+        return self._waiting.popleft() if self._waiting else None
 
     def close(self) -> None:
         """Let go of the bus; its time stands still."""

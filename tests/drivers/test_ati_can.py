@@ -158,10 +158,10 @@ def test_the_status_is_reported_in_words_and_flags_what_cannot_be_used():
     node = AtiCanFake()
     device = AtiCan(SimulatedCanBus([node]))
     device.start()
-    node.status = protocol.ANY_ERROR | 1 << 5 | 1 << 6
+    node.status = 1 << 15 | 1 << 5 | 1 << 6
     assert device.read(0.1).flags[0] == SampleFlag.SUSPECT
     assert protocol.status_words(device.status) == ["supply too low", "active calibration is bad"]
-    node.status = protocol.ANY_ERROR | 1
+    node.status = 1 << 15 | 1
     assert device.read(0.1).flags[0] == 0
     assert protocol.status_words(1 << 9) == ["bit 9 is set"]
 

@@ -33,7 +33,7 @@ def test_requests_are_the_bytes_of_the_manual():
         protocol.encode_command(protocol.SET_BIAS): "1234 0042 00000000",
     }
     assert all(request == bytes.fromhex(manual) for request, manual in requests.items())
-    assert (protocol.RDT_PORT, protocol.CALIBRATION_PORT) == (49152, 49151)
+    assert protocol.CALIBRATION_PORT == 49151
     assert protocol.READ_CALIBRATION.hex() == "01" + 19 * "00"
 
 

@@ -20,7 +20,7 @@ def calibration_question(point: int) -> bytes:
 
 
 PUBLISHED = {
-    "00 05 00 01 0E": protocol.encode_packet(protocol.LOOP_BACK),
+    "00 05 00 01 0E": protocol.encode_packet((0x00, 0x01)),
     "00 05 01 00 0D": protocol.encode_packet(protocol.GET_SERIAL),
     "00 06 00 0C 00 3C": protocol.set_stream(False),
     "00 06 00 0C 01 41": protocol.set_stream(True),
