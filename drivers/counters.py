@@ -70,13 +70,6 @@ class DeviceCounters(LinkCounters):
 
 
 def silent(title: str, where: str, timeout_s: float, check: str) -> LinkTimeoutError:
-    """Return the error of a device that answers no question.
-
-    Args:
-        title: The device.
-        where: Where it was asked.
-        timeout_s: Time it had for each answer, s.
-        check: What a person should check.
-    """
+    """Return the error of a device that answers no question, and what a person should check."""
     why = f"It was asked {TRIES} times and had {timeout_s:g} s each."
     return LinkTimeoutError(f"No {title} answers at {where}.", why, check)

@@ -86,11 +86,9 @@ class DecodedFrames:
 
 
 def decode_frames(data: bytes, payload_size: int) -> DecodedFrames:
-    """Decode every whole frame in `data`, those of `payload_size` bytes by compiled code.
+    """Decode every whole frame in `data`, which starts at a frame's start.
 
-    Args:
-        data: Bytes as received, starting at a frame's start.
-        payload_size: Size of the frequent frames' payload, bytes, 0 to `MAX_BULK_PAYLOAD`.
+    Those of `payload_size`, 0 to `MAX_BULK_PAYLOAD` bytes, are decoded by compiled code.
     """
     tables, start = compiled.crc_tables(payload_size)
     stream = np.frombuffer(data, np.uint8)

@@ -85,7 +85,6 @@ class FramedLink:
 
         Raises:
             LinkTimeoutError: No answer to `TRIES` frames in `REPLY_TIMEOUT_S` each.
-            LinkLostError: The link is gone.
         """
         for attempt in range(TRIES):
             if attempt:

@@ -179,10 +179,6 @@ class AtiNet(StreamedDevice):
 def open_ati_net(url: str, rate_hz: Annotated[float, Field(ge=1, le=7800)] = 1000.0) -> AtiNet:
     """Open the sensor at `udp:HOST:49152`; its calibration is read from TCP port 49151.
 
-    Args:
-        url: URL; the port is 49152 on every such device.
-        rate_hz: The RDT rate set on its web page, 1 to 7000.
-
     Raises:
         LinkError: The URL is not a UDP address, or the host is out of reach.
     """

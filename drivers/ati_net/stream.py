@@ -46,14 +46,7 @@ class RecordSequence:
         self._may_restart = RESTART_STEP
 
     def follow(self, numbers: NDArray[np.uint32]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """Return which records are new and in order, with their numbers from 0 since `restart`.
-
-        Args:
-            numbers: `rdt_sequence` of the records as they came, shape (n,).
-
-        Returns:
-            A mask of shape (n,), and the numbers of the records it keeps.
-        """
+        """Return which `rdt_sequence` are new and in order, and their numbers since `restart`."""
         kept = np.zeros(len(numbers), np.bool_)
         given = []
         for index, number in enumerate(numbers.tolist()):
@@ -89,11 +82,7 @@ class RecordSequence:
 
 
 class StreamWatch:
-    """The life of one stream.
-
-    Args:
-        rate_hz: Records a second.
-    """
+    """The life of one stream of so many records a second."""
 
     def __init__(self, url: str, rate_hz: float, counters: DeviceCounters) -> None:
         self._url = url

@@ -206,8 +206,7 @@ class Dynamixel(PolledDrive):
     def set_current(self, current_a: float) -> float:
         """Command a motor current, sent before the next reading and every one from then on.
 
-        Returns:
-            The current that is sent: the nearest multiple of the model's unit.
+        Returns the current that is sent: the nearest multiple of the model's unit.
 
         Raises:
             DriverError: Not armed, not finite, or beyond the drive's current limit.

@@ -108,23 +108,13 @@ class Epos4(PolledDrive):
         return self._ratings
 
     def identify(self) -> DeviceIdentity:
-        """Ask who is there, and read the motor data.
-
-        Raises:
-            ProtocolMismatchError: It is not maxon's, or has no cyclic torque mode.
-        """
+        """Ask who is there, and read the motor data; errors as `objects.identify`."""
         identity, self._ratings = identify(self._link)
         self._identified = True
         return identity
 
     def start(self) -> None:
-        """Set up reactions, heartbeats and process data, check them, and let it answer SYNC.
-
-        The power stage stays as it is.
-
-        Raises:
-            ProtocolMismatchError: The drive does not hold what was written.
-        """
+        """Set the drive up and check it, and let it answer SYNC; errors as `objects.set_up`."""
         if not self._identified:
             self.identify()
         if not self._node.started:
@@ -157,8 +147,7 @@ class Epos4(PolledDrive):
     def set_torque(self, torque_n_m: float) -> float:
         """Command a motor torque, sent at the next reading and at every one from then on.
 
-        Returns:
-            The torque that is sent: the nearest multiple of `ratings.resolution_n_m`.
+        Returns the torque that is sent: the nearest multiple of `ratings.resolution_n_m`.
 
         Raises:
             DriverError: Not armed, not finite, or beyond the drive's current limit.
@@ -197,14 +186,7 @@ class Epos4(PolledDrive):
         return values, SampleFlag.SUSPECT if is_faulty else 0
 
     def judge(self) -> None:
-        """Look at the drive behind a SYNC.
-
-        Raises:
-            DriveFaultError: The drive has sent an emergency, or an armed one has left operation;
-                each is raised once. Or it has left operation of the network, so that no sample
-                comes; every reading raises that.
-            LinkTimeoutError: The drive's heartbeat is missing; every reading says so while it is.
-        """
+        """Raise what `Node` has of the drive, and once that an armed one has left operation."""
         if self._node.in_trouble:
             self._armed = False
             self._node.require_well()
@@ -225,8 +207,7 @@ class Epos4(PolledDrive):
         reset. That forgets heartbeats and process data, which are therefore set up again, before
         the edge of the reset: a controlword counts for certain in the operational state only.
 
-        Returns:
-            The fault's error code, 0 when the drive had none.
+        Returns the fault's error code, 0 when the drive had none.
 
         Raises:
             DisarmUnconfirmedError: The drive has not confirmed that its power stage is off.
@@ -245,11 +226,7 @@ class Epos4(PolledDrive):
         return code
 
     def stop(self) -> None:
-        """Disarm where the drive may be armed, and let it answer no more SYNC.
-
-        Raises:
-            DisarmUnconfirmedError: The drive's state is unknown.
-        """
+        """Disarm as every drive, and let it answer no more SYNC."""
         super().stop()
         if not self._node.started:
             return

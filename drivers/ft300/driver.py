@@ -59,11 +59,7 @@ class Ft300(StreamedSensor):
 
 
 def open_ft300(url: str, baud_rate: BaudOption = 19_200) -> Ft300:
-    """Open the sensor on an RS-485 adapter, 8 bits, no parity.
-
-    Args:
-        url: The adapter.
-        baud_rate: 19200, the only one Robotiq's driver uses.
+    """Open the sensor on an RS-485 adapter, 8 bits, no parity; Robotiq's driver uses 19200 bit/s.
 
     Raises:
         LinkError: The adapter cannot be opened.

@@ -193,9 +193,6 @@ class Moteus(PolledDrive):
     def set_torque(self, torque_n_m: float) -> float:
         """Command a torque at the output, sent with every question from the next one on.
 
-        Returns:
-            The torque that is sent.
-
         Raises:
             DriverError: Not armed, not finite, or beyond the limit.
         """

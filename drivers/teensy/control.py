@@ -28,12 +28,8 @@ def control_tick(
 ) -> int:
     """Do one tick of the controller and return the command in ticks of 1e-4 of full scale.
 
-    Args:
-        state: Controller state, shape (4,), changed in place.
-        gains: Shape (5,), see `KP` and the names next to it.
-        target_count: Target of the spindle, encoder counts.
-        spindle_count: Spindle encoder, counts.
-        motor_count: Motor encoder, counts.
+    The state, shape (4,), is changed in place; the gains, shape (5,), are `KP` and the names next
+    to it.
     """
     if state[PRIMED] == 0.0:
         state[PREVIOUS_MOTOR_COUNT] = motor_count

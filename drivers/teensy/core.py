@@ -56,14 +56,10 @@ def firmware_library() -> Path | None:
 
 @dataclass(frozen=True, slots=True)
 class BoardStart:
-    """How a board was started.
+    """How a board was started: its serial number, first tick and number of this start.
 
-    Attributes:
-        serial: Serial number the board gives.
-        tick_us: Device clock at the first tick.
-        boot: Number of this start of the board.
-        simulated: Whether the encoder counts have their zeros and the motors are cold, as on a
-            simulated rig; a real board is started with neither.
+    Where it is simulated its encoder counts have their zeros and its motors are cold; a real board
+    is started with neither.
     """
 
     serial: str = "SIM-0001"
@@ -76,10 +72,7 @@ class FirmwareBoard:
     """The firmware core on a bench, with the interface of `drivers.transport.simulated.Board`.
 
     Args:
-        bench: The physics.
-        start: How the board was started.
         library: The shared library; the built one when None.
-        profile: Samples and motors of the board.
         own: Widest gains and limits the board takes, as wiring*.hpp gives them to a real one; any
             when None.
 
@@ -169,13 +162,7 @@ class FirmwareBoard:
 
 
 class CoreGuard:
-    """The guards of a board alone, to hold its limits against samples as they arrive.
-
-    Args:
-        profile: Samples of the board.
-        gains: Gains it was armed with.
-        limits: Limits it was armed with.
-        library: The shared library; the built one when None.
+    """The guards of an armed board alone, to hold its limits against samples as they arrive.
 
     Raises:
         FirmwareMissingError: The library is missing.

@@ -33,9 +33,9 @@ def drive_tick(
         row: One row of `COLUMNS` counts; the inputs are read, the rest is written.
         target: Target of the spindle, counts, followed when armed and engaged.
         load_ma: Current of the load motor, mA, likewise.
-        state: The board's state.
-        control_state: State of the controller, shape (1, 4).
-        gains: Gains of the controller, shape (1, 5).
+        state: See `Drive`; so are the others.
+        control_state: Shape (1, 4).
+        gains: Shape (1, 5).
     """
     row[COMMAND_E4] = 0
     row[LOAD_MA] = 0

@@ -105,10 +105,7 @@ class SerialTransport(HostLink):
 
 
 def open_serial(url: str) -> SerialTransport:
-    """Open a serial port for this program alone.
-
-    Args:
-        url: A device path, `usb:VID:PID[:SERIAL]` (hexadecimal identifiers), or a pyserial URL.
+    """Open a port for this program alone: a path, `usb:VID:PID[:SERIAL]`, or a pyserial URL.
 
     Raises:
         PortNotFoundError: No such port or USB device, or the identity fits several.
@@ -127,12 +124,7 @@ def open_serial(url: str) -> SerialTransport:
 
 
 def open_line(url: str, baud_rate: int, parity: str = "N") -> Transport:
-    """Open a transport and, where it is a serial port, set its line.
-
-    Args:
-        url: Any URL `open_transport` takes.
-        baud_rate: Speed, bit/s.
-        parity: `N`, `E` or `O`.
+    """Open any transport; where it is a serial port, set its speed, bit/s, and its parity.
 
     Raises:
         LinkError: The link cannot be opened, or the port cannot be set so.

@@ -69,11 +69,10 @@ class Pace:
 
 
 class SimulatedTransport(HostLink):
-    """A transport to a board in this process.
+    """A transport to a board in this process; see also `Pace`.
 
     Args:
         step_s: Longest virtual time between looks at the board's output.
-        pace: Virtual seconds a real second, None for as fast as possible.
         tick_s: A tick of the board, s.
     """
 

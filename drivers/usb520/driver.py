@@ -119,12 +119,7 @@ class Usb520(StreamedDevice):
 def open_usb520(
     url: str, rate_hz: Annotated[float, Field(gt=0, le=10)] = 10.0, baud_rate: BaudOption = 115_200
 ) -> Usb520:
-    """Open the amplifier's virtual serial port.
-
-    Args:
-        url: The port.
-        rate_hz: Lines a second it is set to, at most 10.
-        baud_rate: 115200; one user reads it at 9600.
+    """Open the amplifier's virtual serial port; one user reads it at 9600 bit/s.
 
     Raises:
         LinkError: The port cannot be opened.
