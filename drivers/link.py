@@ -18,10 +18,8 @@ REPLY_TIMEOUT_S = 0.1
 class FramedLink:
     """Frames to and from one device.
 
-    Frames of `payload_size` are the device's stream and wait in bulk; all others wait one by one.
-
-    Args:
-        payload_size: Size of a stream frame's payload, bytes.
+    Frames with payloads of `payload_size` bytes are the device's stream and wait in bulk; all
+    others wait one by one.
     """
 
     def __init__(self, transport: Transport, payload_size: int) -> None:

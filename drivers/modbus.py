@@ -64,9 +64,6 @@ class StreamedSensor(StreamedDevice):
 
     A driver gives `identify` and `decode`, `prepare` where the stream needs more, and the
     attributes below.
-
-    Args:
-        rate_hz: Frames a second.
     """
 
     slave: int

@@ -55,11 +55,6 @@ class SlidingFrames:
     To get in step, `agree` frames in a row must hold. In step, a frame is believed when it and the
     next one hold: a lost byte then lets a wrong frame through once in the square of the checksum's
     range, not once in the range.
-
-    Args:
-        size: Bytes of a frame, which begins wherever checksums agree.
-        check: The checksum.
-        agree: Frames in a row that must hold.
     """
 
     def __init__(self, size: int, check: Check, counters: DeviceCounters, agree: int = 4) -> None:

@@ -28,9 +28,8 @@ def turns_at(angle: int, before: int, after: int) -> int | None:
     """Return the turns that go with an angle, from the turns asked before and after it.
 
     The shaft has moved less than half a turn in between: where the turns differ by one, the angle
-    says by its half of the turn on which side of the wrap it was read.
-
-    All are 14-bit values, of which turns wrap, too. None when the turns are further apart than one.
+    says by its half of the turn on which side of the wrap it was read. All are 14-bit values; the
+    result is None when the turns are further apart than one.
     """
     step = (after - before) % protocol.FULL_TURN
     if step == 0:
@@ -202,9 +201,6 @@ def open_amt21(
 
     Options are those of `Amt21`, and the bit rate: 2 Mbit/s for types A to D; types E to H are set
     to 9600 to 115200.
-
-    Raises:
-        LinkError: The adapter cannot be opened, or the options are no encoder's.
     """
     return made(
         open_line(url, baud_rate),

@@ -248,9 +248,6 @@ def open_ati_can(
 
     Options are those of `AtiCan`; at 250 kbit/s a question takes above 1 ms of the bus. A URL is
     e.g. `can:socketcan:can0`.
-
-    Raises:
-        LinkError: The bus cannot be opened, or the options are no sensor's.
     """
     return made(open_can(url), lambda bus: AtiCan(bus, base, calibration, rate_hz), "NETCANOEM")
 

@@ -177,11 +177,7 @@ class AtiNet(StreamedDevice):
 
 
 def open_ati_net(url: str, rate_hz: Annotated[float, Field(ge=1, le=7800)] = 1000.0) -> AtiNet:
-    """Open the sensor at `udp:HOST:49152`; its calibration is read from TCP port 49151.
-
-    Raises:
-        LinkError: The URL is not a UDP address, or the host is out of reach.
-    """
+    """Open the sensor at `udp:HOST:49152`; its calibration is read from TCP port 49151."""
     host, _ = split_address(url)
     calibration = f"socket://{host}:{protocol.CALIBRATION_PORT}"
     return AtiNet(open_transport(url), lambda: open_transport(calibration), rate_hz)

@@ -155,9 +155,6 @@ def open_ati_serial(
 
     Options are those of `AtiSerial` and its `Assumptions`, which a known weight checks, and the bit
     rate: 1250000 as delivered; 115200 and 19200 can be set.
-
-    Raises:
-        LinkError: The adapter cannot be opened or has no such speed.
     """
     assumed = Assumptions(matrix_by_rows, force_unit, torque_unit, lock_answers)
     return made(

@@ -298,9 +298,6 @@ def open_dynamixel(
     """Open the drive on a serial adapter.
 
     Options are those of `Dynamixel`, and the bit rate: 57600 from the factory.
-
-    Raises:
-        LinkError: The adapter cannot be opened, or the options are no drive's.
     """
     return made(
         open_line(url, baud_rate),

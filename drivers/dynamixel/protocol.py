@@ -32,12 +32,7 @@ ERRORS = {
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """One entry of the control table.
-
-    Attributes:
-        address: Where it begins.
-        size: Bytes it has.
-    """
+    """One entry of the control table, `size` bytes from `address` on."""
 
     address: int
     size: int

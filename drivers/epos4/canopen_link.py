@@ -78,12 +78,7 @@ class CanopenLink:
         return value
 
     def write(self, index: int, subindex: int, value: int) -> None:
-        """Write a number to an object.
-
-        Raises:
-            ObjectRefusedError: The drive refuses it.
-            LinkTimeoutError: It does not answer.
-        """
+        """Write a number to an object; errors as `read`."""
         data = self._variable(index, subindex).encode_raw(value)
         self._transfer(
             f"write {value} to",

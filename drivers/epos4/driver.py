@@ -279,9 +279,6 @@ def open_epos4(
 
     Options are those of `Epos4`; at 1 Mbit/s one node at 1 kHz takes a quarter of the bus. A URL is
     e.g. `can:socketcan:can0`.
-
-    Raises:
-        LinkError: The bus cannot be opened, an option is unknown, or `canopen` is missing.
     """
     return made(open_can(url), lambda bus: Epos4(bus, node_id, rate_hz, host_timeout_ms), "EPOS4")
 

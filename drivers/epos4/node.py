@@ -197,12 +197,7 @@ class Node:
 
 
 class Cycle:
-    """The process data of one drive.
-
-    Args:
-        rate_hz: How often SYNC is sent.
-        late_s: How late a SYNC may be; 0 where none is sent late.
-    """
+    """The process data of one drive, at a rate of SYNC of which none or some may be late."""
 
     def __init__(
         self, link: "CanopenLink", rate_hz: float, late_s: float, counters: DeviceCounters

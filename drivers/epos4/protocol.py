@@ -82,13 +82,7 @@ def state_of(statusword: int) -> State:
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """What the drive sends at each SYNC.
-
-    Attributes:
-        statusword: Its statusword.
-        position_count: Position, quadrature counts.
-        torque_per_mille: Averaged torque, per mille of the rated torque.
-    """
+    """What the drive sends at each SYNC: position in quadrature counts, and averaged torque."""
 
     statusword: int
     position_count: int
@@ -126,12 +120,9 @@ def decode_emergency(data: bytes) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Ratings:
-    """What the drive is set to, as read from it. Torques are the motor's, before any gearhead.
+    """What the drive is set to, as read from it; the output current limit is what takes effect.
 
-    Attributes:
-        rated_torque_n_m: Motor rated torque; torques are in thousandths of it.
-        torque_constant_n_m_per_a: Torque constant.
-        current_limit_a: Output current limit, the one that takes effect.
+    Torques are the motor's, before any gearhead, and in thousandths of the rated torque.
     """
 
     rated_torque_n_m: float

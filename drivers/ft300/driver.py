@@ -59,11 +59,7 @@ class Ft300(StreamedSensor):
 
 
 def open_ft300(url: str, baud_rate: BaudOption = 19_200) -> Ft300:
-    """Open the sensor on an RS-485 adapter, 8 bits, no parity; Robotiq's driver uses 19200 bit/s.
-
-    Raises:
-        LinkError: The adapter cannot be opened.
-    """
+    """Open the sensor on an RS-485 adapter, 8 bits, no parity; Robotiq's driver has 19200 bit/s."""
     return Ft300(open_line(url, baud_rate))
 
 

@@ -46,9 +46,8 @@ def encode_messages(counts: NDArray[np.integer]) -> bytes:
 def identity(firmware: bytes, serial: bytes) -> tuple[str, str]:
     """Return firmware and serial number as on the label, empty where it has none.
 
-    Args:
-        firmware: Three registers: three letters, then three numbers.
-        serial: Four registers: three letters and a zero, then a number, low word first.
+    Three registers have three letters, then three numbers; four have three letters and a zero, then
+    a number, low word first.
     """
     version = f"{_letters(firmware)}-{firmware[3]}.{firmware[4]}.{firmware[5]}"
     number = int.from_bytes(serial[6:8] + serial[4:6], "big")

@@ -265,9 +265,6 @@ def open_moteus(
     """Open the controller behind an fdcanusb.
 
     The URL is the fdcanusb's port; options are those of `Moteus`.
-
-    Raises:
-        LinkError: The port cannot be opened, or the options are no controller's.
     """
     return made(
         open_transport(url),

@@ -131,9 +131,6 @@ def open_qia128(
     """Open the amplifier on a serial adapter.
 
     Options are those of `Qia128`, and the bit rate of its UART; no public source gives it.
-
-    Raises:
-        LinkError: The adapter cannot be opened.
     """
     return Qia128(open_line(url, baud_rate), rated_load, unit, rate_hz, serial)
 

@@ -41,7 +41,6 @@ class TeensyDevice(LinkedDevice):
 
     Args:
         wired: Channels by the field of a sample; all inputs by default.
-        profile: Samples of the board.
     """
 
     name = "teensy"
@@ -68,12 +67,7 @@ class TeensyDevice(LinkedDevice):
         return super().counters | self.logger.counters.as_dict()
 
     def identify(self) -> DeviceIdentity:
-        """Read the board's identity and check its protocol version.
-
-        Raises:
-            LinkTimeoutError: Nobody answers.
-            ProtocolMismatchError: Its protocol differs.
-        """
+        """Read the board's identity and check its protocol version, as `TeensyLogger.identify`."""
         identity = self.logger.identify()
         return DeviceIdentity("Teensy logger", identity.serial, identity.firmware_version)
 

@@ -47,9 +47,6 @@ class TeensyLogger:
 
     While armed, the board needs a block of setpoints or a `heartbeat` within the time it was armed
     with; otherwise it goes to its safe state.
-
-    Args:
-        profile: Samples and motors of the board.
     """
 
     def __init__(self, transport: Transport, profile: Profile = REFERENCE) -> None:

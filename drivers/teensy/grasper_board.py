@@ -32,9 +32,9 @@ def grasper_tick(
     Args:
         row: One row of `COLUMNS` counts; the inputs are read, the rest is written.
         targets: Target of each motor, counts, shape (3,), followed when armed and engaged.
-        state: The board's state.
-        control_state: State of each controller, shape (3, 4).
-        gains: Gains of each controller, shape (3, 5).
+        state: See `Drive`; so are the others.
+        control_state: Shape (3, 4).
+        gains: Shape (3, 5).
     """
     moving = state[STATE] & STATUS_ARMED and state[ENGAGED]
     for k in range(MOTORS):

@@ -203,10 +203,7 @@ class Profile:
         return np.array((VERSION, Kind.ARM, sequence, session, *values), self.arm).tobytes()
 
     def whole_setpoints(self, columns: Sequence[NDArray[np.integer]]) -> list[NDArray[Any]]:
-        """Return the fields of setpoints in the board's number types, each of shape (n,).
-
-        Args:
-            columns: The fields, in the order of `setpoint`.
+        """Return the fields of setpoints, in the order of `setpoint`, in the board's number types.
 
         Raises:
             DriverError: The arrays do not fit each other or the board's number range.

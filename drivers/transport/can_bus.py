@@ -12,13 +12,7 @@ MAX_DATA = 8
 
 @dataclass(frozen=True, slots=True)
 class CanFrame:
-    """One classic CAN data frame.
-
-    Attributes:
-        can_id: Identifier, 11 bits, or 29 where `extended`.
-        data: 0 to 8 bytes.
-        extended: Whether the identifier has 29 bits.
-    """
+    """One classic CAN data frame: identifier of 11 bits, or 29 where `extended`; 0 to 8 bytes."""
 
     can_id: int
     data: bytes = b""
@@ -34,12 +28,7 @@ class CanFrame:
 
 @dataclass(slots=True)
 class CanCounters:
-    """Troubles of a bus since it was opened, as reported by its controller.
-
-    Attributes:
-        error_frames: Error frames.
-        overruns: Times that it had to drop received frames.
-    """
+    """Error frames of a bus's controller, and times that it had to drop received frames."""
 
     error_frames: int = 0
     overruns: int = 0

@@ -58,12 +58,8 @@ class Faults:
     def inject(self, fault: Fault, count: int = 1, duration_s: float = 0.3) -> None:
         """Let a fault strike the next `count` chunks, in the order of the calls.
 
-        A stall begins, and a disconnection happens, at the next look at the link.
-
-        Args:
-            fault: What happens.
-            count: Chunks hit.
-            duration_s: How long a delay or a stall lasts.
+        A stall begins, and a disconnection happens, at the next look at the link. The duration is
+        that of a delay or a stall.
         """
         if fault is Fault.DISCONNECT:
             self.disconnected = True

@@ -119,11 +119,7 @@ class Usb520(StreamedDevice):
 def open_usb520(
     url: str, rate_hz: Annotated[float, Field(gt=0, le=10)] = 10.0, baud_rate: BaudOption = 115_200
 ) -> Usb520:
-    """Open the amplifier's virtual serial port; one user reads it at 9600 bit/s.
-
-    Raises:
-        LinkError: The port cannot be opened.
-    """
+    """Open the amplifier's virtual serial port; one user reads it at 9600 bit/s."""
     return Usb520(open_line(url, baud_rate), rate_hz)
 
 

@@ -17,13 +17,7 @@ _LINE = re.compile(rb"([+-]\d{1,9}\.\d{5}) ([A-Za-z-]{1,8})\r\n")
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What a unit on a line stands for.
-
-    Attributes:
-        name: Column.
-        unit: SI unit.
-        factor: SI units a line's unit.
-    """
+    """What a unit on a line stands for: a column, its SI unit, and how many of it one is."""
 
     name: str
     unit: str
