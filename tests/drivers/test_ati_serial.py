@@ -1,5 +1,7 @@
 """The digital F/T: messages as published, its calibration put in force, its stream."""
 
+import struct
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -56,6 +58,26 @@ def test_a_frame_carries_the_gauges_in_the_published_order():
     assert wire[12:] == bytes([sum(wire[:12]) & 0x7F])
 
 
+def test_a_calibration_laid_out_by_hand_is_read():
+    """Source: the public driver `ati_force_torque`; offsets in registers, high byte first."""
+    matrix = np.arange(36, dtype=np.float32).reshape(6, 6) * 10 - 100
+    gains, offsets = (540, 541, 542, 543, 544, 545), (34920, 34921, 34922, 34923, 34924, 34925)
+    pieces = {
+        **{0: b"FT12345", 4: b"SI-130-10", 32: struct.pack(">36f", *matrix.ravel())},
+        **{104: bytes([2, 3]), 117: struct.pack(">II", 1_000_000, 500_000)},
+        **{121: struct.pack(">6H", *gains), 127: struct.pack(">6H", *offsets)},
+    }
+    block = bytearray(2 * 133)
+    for offset, data in pieces.items():
+        block[2 * offset : 2 * offset + len(data)] = data
+    found = protocol.decode_calibration(bytes(block))
+    assert (found.serial, found.part_number) == ("FT12345", "SI-130-10")
+    assert (found.gains, found.offsets) == (gains, offsets)
+    assert np.array_equal(found.matrix, matrix)
+    assert found.slopes().tolist() == [1e-6] * 3 + [2e-6] * 3
+    assert protocol.encode_calibration(found) == block
+
+
 def test_it_reads_its_calibration_and_puts_it_in_force():
     fake = AtiSerialFake()
     fake.receive(protocol.encode(protocol.STREAM, protocol.START_STREAM))  # another program's
@@ -66,6 +88,8 @@ def test_it_reads_its_calibration_and_puts_it_in_force():
     assert device.status() == 0
     device.start()
     calibration = example_calibration()
+    tops = np.abs(calibration.matrix).sum(axis=1) * 32768 / 1e6
+    assert [channel.upper for channel in device.channels] == pytest.approx(tops.tolist())
     assert fake.server.registers(0, 12) == calibration.gains + calibration.offsets
     values, _ = gathered(device, 1)
     assert len(values) == 7 * 50 - 1  # the newest waits for its successor

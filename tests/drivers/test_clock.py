@@ -6,10 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.clock import ClockError, ClockFit, arrival_fit
-from drivers.teensy.driver import TeensyLogger
-from drivers.teensy.fake import PythonBoard
-from drivers.teensy.fake_device import HandMovedBench
-from drivers.transport.simulated import SimulatedTransport
 
 WRAP = 2**32
 
@@ -122,20 +118,3 @@ def test_too_little_makes_no_line():
         arrival_fit(np.arange(5), np.ones(5), 10.0)
     with pytest.raises(ClockError, match="question"):
         ClockFit().add(1.0, 0.5, 0)
-
-
-def test_the_loggers_exchanges_make_a_line():
-    transport = SimulatedTransport(PythonBoard(HandMovedBench(), start_tick_us=WRAP - 10**6))
-    logger = TeensyLogger(transport)
-    logger.start()
-    fit = ClockFit()
-    for _ in range(40):
-        logger.heartbeat()
-        batch = logger.read(0.1)
-        exchange = logger.last_exchange
-        fit.add(exchange.sent_s, exchange.received_s, exchange.tick_us)
-    assert 1e6 * (fit.line.rate - 1) == pytest.approx(0, abs=1e-6)
-    assert fit.line.residual_s < 1e-9
-    newest_s = float(fit.line.to_host(batch.tick_us[-1:] * 1e-6)[0])
-    assert newest_s == pytest.approx(transport.now_s, abs=0.051)
-    logger.close()

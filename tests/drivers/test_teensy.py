@@ -109,6 +109,9 @@ def test_samples_are_numbered_and_the_clock_is_unwrapped(make_board):
     ticks = np.concatenate([batch.tick_us for batch in batches])
     assert np.array_equal(numbers, np.arange(len(numbers)))
     assert np.array_equal(ticks, start_us + 1000 * np.arange(len(ticks)))
+    looked = logger.last_exchange
+    assert looked.sent_s <= looked.received_s
+    assert looked.tick_us % 2**32 in ticks % 2**32
     assert ticks.dtype == np.int64
     assert batches[-1].lost == 0
     logger.start()
