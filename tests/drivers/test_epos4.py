@@ -1,5 +1,6 @@
 """An EPOS4 in virtual time and on a virtual bus: set-up, torque, faults, and a safe end."""
 
+import socket
 from collections.abc import Callable
 
 import numpy as np
@@ -25,6 +26,8 @@ from drivers.errors import (
     ProtocolMismatchError,
 )
 from drivers.transport.can_bus import CanFrame
+from drivers.transport.live_can import LiveCanBus
+from drivers.transport.python_can import open_can
 from drivers.transport.simulated_can import SimulatedCanBus
 
 RATINGS = Ratings(12.46e-3, 17.8e-3, 1.4)
@@ -331,6 +334,40 @@ def test_an_absent_object_is_refused_with_its_code():
     assert CanFrame(0x581, bytes.fromhex("8072600000000206")) in answers
     with pytest.raises(DriverError, match="0x6072:0 is not in the dictionary"):
         link.read(0x6072)
+
+
+@pytest.mark.integration
+def test_it_runs_in_real_time_over_multicast_and_a_drive_that_dies_is_reported():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        link.bind(("", 0))
+        url = f"can:udp_multicast:239.74.163.9?port={link.getsockname()[1]}"
+    node = Epos4Fake()
+    try:
+        bus = LiveCanBus(open_can(url), open_can(url), [node])
+    except LinkError as error:
+        pytest.skip(f"no multicast here: {error}")
+    device = Epos4(bus, rate_hz=100.0, host_timeout_ms=10_000)
+
+    def run(samples: int) -> None:
+        while samples > 0:
+            samples -= len(device.read(0.5))
+
+    device.start()
+    device.arm()
+    device.set_torque(2e-3)
+    run(30)
+    node.fail(0x8130)
+    with pytest.raises(DriveFaultError, match="0x8130"):
+        run(10_000)
+    assert device.clear_fault() == 0x8130
+    device.arm()
+    run(30)
+    assert device.last_error == 0
+    node.transmit = list
+    with pytest.raises(LinkTimeoutError, match="fallen silent"):
+        run(10_000)
+    with pytest.raises(DisarmUnconfirmedError):
+        device.close()
 
 
 @pytest.mark.parametrize("options", [{"node_id": 0}, {"node_id": 127}, {"rate_hz": 0.0}])
