@@ -12,6 +12,7 @@ from drivers.amt21.driver import Amt21, open_amt21, turns_at
 from drivers.amt21.fake import Amt21Fake
 from drivers.errors import FrameError, LinkError
 from drivers.transport.simulated import SimulatedTransport
+from tests.drivers.taps import started
 
 VECTORS = {0: 0xC000, 1: 0x8001, 0x1234: 0x9234, 0x2000: 0x6000, 0x21AB: 0x61AB, 0x3FFF: 0x3FFF}
 
@@ -62,8 +63,7 @@ class Turning(Amt21Fake):
 @pytest.mark.parametrize("counts_a_tick", [400, -400, 1000])
 def test_turns_are_signed_and_go_with_the_angle_however_the_shaft_turns(counts_a_tick):
     fake = Turning(counts_a_tick=counts_a_tick, multi_turn=True)
-    device = Amt21(SimulatedTransport(fake), multi_turn=True, rate_hz=200.0)
-    device.start()
+    device = started(Amt21, fake, multi_turn=True, rate_hz=200.0)
     batches = [device.read(0.1) for _ in range(4000)]
     angle = np.concatenate([batch.columns["angle_rad"] for batch in batches])
     turns = np.concatenate([batch.columns["turns"] for batch in batches])
@@ -113,8 +113,7 @@ def test_an_answer_out_of_reach_is_believed_only_where_a_second_one_confirms_it(
 
 
 def test_an_echoing_adapter_is_dealt_with_and_seen():
-    device = Amt21(SimulatedTransport(Amt21Fake(echo=True)))
-    device.start()
+    device = started(Amt21, Amt21Fake(echo=True))
     assert device.read(0.1).columns["angle_rad"].tolist() == [0.0]
     assert device.counters["discarded_bytes"] == 1
     assert device.counters["crc_errors"] == 0

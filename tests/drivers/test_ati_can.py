@@ -56,6 +56,12 @@ def scripted(script: list[Exchange]) -> Iterator[SimulatedCanBus]:
     assert bus.read(0.0) is None, "never read"
 
 
+def start(node: AtiCanFake, **options: int) -> AtiCan:
+    device = AtiCan(SimulatedCanBus([node]), **options)
+    device.start()
+    return device
+
+
 def set_up(base: int = 0x200) -> list[Exchange]:
     """What `identify` says and hears: firmware 3.8.17, unit matrix, 1000 and 2000 counts a unit."""
     rows: list[Exchange] = []
@@ -145,8 +151,7 @@ def test_half_an_answer_is_asked_for_again_and_none_is_a_gap():
 def test_a_saturated_gauge_makes_the_whole_wrench_invalid(gauge, end):
     load = np.zeros(6, np.int64)
     load[gauge] = end
-    device = AtiCan(SimulatedCanBus([AtiCanFake(load=lambda _: load)]))
-    device.start()
+    device = start(AtiCanFake(load=lambda _: load))
     assert device.read(0.1).flags[0] == SampleFlag.SATURATED | SampleFlag.SUSPECT
     with pytest.raises(DriverError, match="saturated"):
         device.set_bias()
@@ -156,8 +161,7 @@ def test_a_saturated_gauge_makes_the_whole_wrench_invalid(gauge, end):
 
 def test_the_status_is_reported_in_words_and_flags_what_cannot_be_used():
     node = AtiCanFake()
-    device = AtiCan(SimulatedCanBus([node]))
-    device.start()
+    device = start(node)
     node.status = 1 << 15 | 1 << 5 | 1 << 6
     assert device.read(0.1).flags[0] == SampleFlag.SUSPECT
     assert protocol.status_words(device.status) == ["supply too low", "active calibration is bad"]
@@ -184,21 +188,18 @@ def test_a_status_bit_is_that_of_the_manual(row):
 
 def test_the_bias_is_taken_off():
     load = np.array([5, -4, 3, -2, 1, 700])
-    device = AtiCan(SimulatedCanBus([AtiCanFake(load=lambda _: load)]))
-    device.start()
+    device = start(AtiCanFake(load=lambda _: load))
     before = device.read(0.1)
     expected = MATRIX @ load / 1e6
     assert [before.columns[name][0] for name in AXES] == pytest.approx(expected.tolist())
     device.set_bias()
     after = device.read(0.1)
     assert [after.columns[name][0] for name in AXES] == pytest.approx([0.0] * 6)
-    device.close()
 
 
 def test_another_calibration_is_used_or_its_absence_reported():
     load = np.array([1000, 0, 0, 0, 0, 0])
-    device = AtiCan(SimulatedCanBus([AtiCanFake(load=lambda _: load)]), calibration=1)
-    device.start()
+    device = start(AtiCanFake(load=lambda _: load), calibration=1)
     assert device.read(0.1).columns["force_z_n"][0] == pytest.approx(2 * 1.51)
     missing = AtiCan(SimulatedCanBus([AtiCanFake()]), calibration=7)
     with pytest.raises(FrameError, match="calibration 7"):
@@ -236,8 +237,7 @@ def test_a_sensor_that_restarts_and_loses_its_calibration_is_noticed(silent_s, s
 
 def test_a_sensor_on_the_calibration_of_a_restart_is_not_asked_for_it():
     node = AtiCanFake()
-    device = AtiCan(SimulatedCanBus([node]))
-    device.start()
+    device = start(node)
     node.restart()
     for _ in range(500):
         assert len(device.read(0.1)) == 1
