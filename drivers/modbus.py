@@ -4,7 +4,7 @@ Source: Modbus application protocol 1.1b3 and serial line guide 1.02.
 """
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drivers.counters import silent
 from drivers.device import AXES, Channel, wrench_channels
 from drivers.errors import DriverError, FrameError
-from drivers.streaming import Check, SlidingFrames, StreamedDevice
+from drivers.streaming import Check, Samples, SlidingFrames, StreamedDevice
 from drivers.transport.transport import Transport, arriving
 
 READ, WRITE = 0x03, 0x10
@@ -119,9 +119,7 @@ class StreamedSensor(StreamedDevice):
             raise self.refused(*answer)
         self._early = came[size:]
 
-    def receive(
-        self, timeout_s: float
-    ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
+    def receive(self, timeout_s: float) -> Samples:
         """Return the values and flags of the frames that have come."""
         frames = self._frames.read(self._transport, timeout_s, self._early)
         self._early = b""

@@ -15,6 +15,8 @@ LONGEST_SILENCE_S = 0.1
 QUIET_S = 0.05
 """A stopped stream has ended when nothing arrives for this long, s."""
 ENDS_S = 1.0
+Samples = tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]
+"""Values by channel and the `SampleFlag` bits of samples, each of shape (n,)."""
 Check = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
 """Returns for each row of candidates, shape (m, size), whether its checksum is right."""
 
@@ -145,10 +147,8 @@ class StreamedDevice(LinkedDevice):
         """Let the stream begin."""
         raise NotImplementedError
 
-    def receive(
-        self, timeout_s: float
-    ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
-        """Return the values by channel and the `SampleFlag` bits of the samples that have come."""
+    def receive(self, timeout_s: float) -> Samples:
+        """Return the samples that have come."""
         raise NotImplementedError
 
     def start(self) -> None:

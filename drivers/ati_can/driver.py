@@ -1,6 +1,7 @@
 """The driver of a NETCANOEM: it is polled for every sample, at a steady rate."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import numpy as np
@@ -71,9 +72,7 @@ class AtiCan(PolledDevice):
     @property
     def counters(self) -> dict[str, int]:
         """Counters of this sensor's frames, and of the bus."""
-        bus = self._bus.counters
-        trouble = {"error_frames": bus.error_frames, "overruns": bus.overruns}
-        return super().counters | trouble
+        return super().counters | asdict(self._bus.counters)
 
     def identify(self) -> DeviceIdentity:
         """Ask for serial number and firmware, and read the calibration.

@@ -1,6 +1,6 @@
 """The driver of a Net F/T: calibration by TCP, then a stream of records by UDP."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated
 
@@ -13,7 +13,7 @@ from drivers.ati_net.stream import RecordSequence, StreamWatch
 from drivers.device import AXES, Batch, Channel, DeviceIdentity, flags_of, wrench_channels
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.registry import Driver
-from drivers.streaming import StreamedDevice
+from drivers.streaming import Samples, StreamedDevice
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport
 from drivers.transport.udp import split_address
@@ -110,9 +110,7 @@ class AtiNet(StreamedDevice):
         batch = super().read(timeout_s)
         return replace(batch, sequence=self._numbers, lost=self._sequence.lost)
 
-    def receive(
-        self, timeout_s: float
-    ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
+    def receive(self, timeout_s: float) -> Samples:
         """Return the values and flags of the records that are new and in order."""
         records = self._records(timeout_s)
         if self._streams:

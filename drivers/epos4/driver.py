@@ -6,6 +6,7 @@ drive notices and takes its power stage out of force by itself.
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -92,8 +93,7 @@ class Epos4(PolledDrive):
     @property
     def counters(self) -> dict[str, int]:
         """What happened to this drive's frames, and to the bus itself."""
-        bus = self._bus.counters
-        return super().counters | {"error_frames": bus.error_frames, "overruns": bus.overruns}
+        return super().counters | asdict(self._bus.counters)
 
     @property
     def last_error(self) -> int:

@@ -1,6 +1,5 @@
 """The driver of a QIA128: its calibration is read from it, then it streams."""
 
-from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import numpy as np
@@ -12,7 +11,7 @@ from drivers.device import Channel, DeviceIdentity, flags_of
 from drivers.errors import DriverError
 from drivers.qia128 import protocol
 from drivers.registry import BaudOption, Driver, RateOption
-from drivers.streaming import SlidingFrames, StreamedDevice
+from drivers.streaming import Samples, SlidingFrames, StreamedDevice
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport, arriving
 
@@ -90,9 +89,7 @@ class Qia128(StreamedDevice):
         self._frames.restart()
         self._transport.write(protocol.set_stream(True))
 
-    def receive(
-        self, timeout_s: float
-    ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
+    def receive(self, timeout_s: float) -> Samples:
         """Return the loads that have come; a reading at an end of the range is saturated."""
         raw = protocol.readings(self._frames.read(self._transport, timeout_s))
         flags = flags_of((raw == 0) | (raw == protocol.TOP))

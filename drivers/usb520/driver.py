@@ -1,16 +1,14 @@
 """The driver of a USB520 in its text mode: it streams and accepts no commands."""
 
-from collections.abc import Mapping
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.device import Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.registry import BaudOption, Driver
-from drivers.streaming import StreamedDevice
+from drivers.streaming import Samples, StreamedDevice
 from drivers.transport.serial_port import open_line
 from drivers.transport.transport import Transport
 from drivers.usb520 import protocol
@@ -68,9 +66,7 @@ class Usb520(StreamedDevice):
         self._held = b""
         self._in_step = False
 
-    def receive(
-        self, timeout_s: float
-    ) -> tuple[Mapping[str, NDArray[np.float64]], NDArray[np.uint8]]:
+    def receive(self, timeout_s: float) -> Samples:
         """Return the readings of the whole lines that have come."""
         assert self._unit is not None  # noqa: S101 - read by `identify`
         give_up_s = self._transport.now_s + timeout_s
