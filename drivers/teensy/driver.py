@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import CommandRefusedError, DisarmUnconfirmedError, DriverError, FrameError
-from drivers.link import FramedLink
+from drivers.link import Continuity, FramedLink
 from drivers.teensy import protocol
-from drivers.teensy.continuity import Continuity
 from drivers.teensy.profile import ArmLimits, Profile
 from drivers.teensy.protocol import Ack, Identity, Kind, Result, TripReport
 from drivers.teensy.reference import REFERENCE

@@ -7,8 +7,8 @@ import numpy as np
 
 from calibration.linear import CalibrationSet
 from drivers.errors import DriverError
+from drivers.link import wrapped_steps
 from drivers.teensy import protocol
-from drivers.teensy.continuity import wrapped_steps
 from drivers.teensy.core import CoreGuard, firmware_library
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.profile import ArmLimits

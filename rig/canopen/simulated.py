@@ -9,9 +9,8 @@ import os
 from drivers.epos4.driver import Epos4
 from drivers.epos4.fake import Epos4Fake
 from drivers.transport.can_bus import CanBus
-from drivers.transport.live_can import LiveCanBus
 from drivers.transport.python_can import open_can
-from drivers.transport.simulated_can import SimulatedCanBus
+from drivers.transport.simulated_can import LiveCanBus, SimulatedCanBus
 from rig.configuration.config import Config
 from rig.logic.link import LogicLink
 from rig.simulation.bench import SimulatedBench

@@ -26,9 +26,8 @@ from drivers.errors import (
     ProtocolMismatchError,
 )
 from drivers.transport.can_bus import CanFrame
-from drivers.transport.live_can import LiveCanBus
 from drivers.transport.python_can import open_can
-from drivers.transport.simulated_can import SimulatedCanBus
+from drivers.transport.simulated_can import LiveCanBus, SimulatedCanBus
 
 RATINGS = Ratings(12.46e-3, 17.8e-3, 1.4)
 
