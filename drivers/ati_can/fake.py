@@ -87,11 +87,11 @@ class AtiCanFake:
         if operation == protocol.SERIAL and not data:
             return [self._reply(operation, b"FT012345")]
         if operation == protocol.FIRMWARE and not data:
-            return [self._reply(operation, protocol.encode_firmware(*self._firmware))]
+            return [self._reply(operation, protocol.VERSION_REPLY.pack(*self._firmware))]
         if self._firmware[:2] < protocol.TELLS_UNITS or data:
             return []
         if operation == protocol.COUNTS_PER_UNIT:
-            counts = protocol.encode_counts_per_unit(1_000_000, 1_000_000)
+            counts = protocol.COUNTS_REPLY.pack(1_000_000, 1_000_000)
             return [self._reply(operation, counts)]
         if operation == protocol.UNIT_CODES:
             return [self._reply(operation, bytes([2, 3]))]

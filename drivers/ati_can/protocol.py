@@ -47,8 +47,8 @@ UNUSABLE = sum(1 << bit for bit in (1, 2, 3, 4, 5, 6, 7, 11, 12))
 _FIRST = struct.Struct(">H3h")
 _SECOND = struct.Struct(">3h")
 _PAIR = struct.Struct(">2f")
-_FIRMWARE = struct.Struct(">BBH")
-_COUNTS = struct.Struct(">II")
+VERSION_REPLY = struct.Struct(">BBH")
+COUNTS_REPLY = struct.Struct(">II")
 
 
 def identifier(base: int, operation: int) -> int:
@@ -104,26 +104,16 @@ def decode_matrix_row(replies: list[bytes]) -> NDArray[np.float64]:
 
 def decode_counts_per_unit(reply: bytes) -> tuple[int, int]:
     """Return counts per unit of force and of torque; `FrameError` for a wrong size or a 0."""
-    force, torque = _COUNTS.unpack(_sized(reply, _COUNTS.size, "counts frame"))
+    force, torque = COUNTS_REPLY.unpack(_sized(reply, COUNTS_REPLY.size, "counts frame"))
     if not (force and torque):
         raise FrameError("The sensor has no counts per unit.")
     return force, torque
 
 
-def encode_counts_per_unit(force: int, torque: int) -> bytes:
-    """Return the reply with the counts per unit."""
-    return _COUNTS.pack(force, torque)
-
-
 def decode_firmware(reply: bytes) -> tuple[int, int, int]:
     """Return major and minor version and build; `FrameError` for a wrong size."""
-    major, minor, build = _FIRMWARE.unpack(_sized(reply, _FIRMWARE.size, "firmware frame"))
+    major, minor, build = VERSION_REPLY.unpack(_sized(reply, VERSION_REPLY.size, "firmware frame"))
     return major, minor, build
-
-
-def encode_firmware(major: int, minor: int, build: int) -> bytes:
-    """Return the reply with the firmware's version."""
-    return _FIRMWARE.pack(major, minor, build)
 
 
 def decode_serial(reply: bytes) -> str:
