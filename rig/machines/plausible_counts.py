@@ -27,7 +27,7 @@ def loop_limits(
         tick_s: Period of a tick.
 
     Returns:
-        `drivers.teensy.limits.LOOP_LIMIT_NAMES` but the motor's jump; what the rig has no channel
+        `drivers.teensy.profile.LOOP_LIMIT_NAMES` but the motor's jump; what the rig has no channel
         for is not limited.
     """
     lines = {role: calibrations.channels.get(name) for role, name in channels.items()}
