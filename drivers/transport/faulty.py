@@ -5,7 +5,7 @@ Time is the inner link's own, so that a fault that lasts takes no real time on a
 
 import random
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import StrEnum
 from typing import Generic, TypeVar
 
@@ -42,10 +42,12 @@ class Faults:
 
     Args:
         seed: Seed of the places and values of damage.
+        rates: Probability that a fault strikes a chunk by itself, by fault; for long tests.
     """
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, seed: int = 0, rates: Mapping[Fault, float] | None = None) -> None:
         self._random = random.Random(seed)
+        self._rates = dict(rates or {})
         self._waiting: deque[tuple[Fault, float]] = deque()
         self._stall_s: float | None = None
         self._stalled_until_s = float("-inf")
@@ -77,14 +79,18 @@ class Faults:
         due_s = max(now_s, self.stalled_until_s(now_s))
         pieces = [chunk]
         overtaken = False
-        if self._waiting:
-            fault, duration_s = self._waiting.popleft()
+        for fault, duration_s in self._striking():
             self.struck[fault] += 1
             if fault is Fault.DELAY:
                 due_s = max(due_s, now_s + duration_s)
                 overtaken = whole
+            elif fault is Fault.STALL:
+                self._stall_s = duration_s
+                due_s = max(due_s, self.stalled_until_s(now_s))
+            elif fault is Fault.DISCONNECT:
+                self.disconnected = True
             else:
-                pieces = self._damage(fault, chunk, whole)
+                pieces = [part for piece in pieces for part in self._damage(fault, piece, whole)]
         if not overtaken:
             due_s = self._held_until_s = max(due_s, self._held_until_s)
         return [(due_s, piece) for piece in pieces if piece]
@@ -96,6 +102,13 @@ class Faults:
             self._stall_s = None
             self.struck[Fault.STALL] += 1
         return self._stalled_until_s
+
+    def _striking(self) -> list[tuple[Fault, float]]:
+        striking = [self._waiting.popleft()] if self._waiting else []
+        for fault, rate in self._rates.items():
+            if self._random.random() < rate:
+                striking.append((fault, 0.3))
+        return striking
 
     def _damage(self, fault: Fault, data: Chunk, whole: bool) -> list[Chunk]:
         if whole or isinstance(data, CanFrame):

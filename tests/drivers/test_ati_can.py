@@ -20,7 +20,6 @@ from drivers.transport.simulated_can import SimulatedCanBus
 
 Exchange = tuple[CanFrame, list[CanFrame]]
 """A frame the driver must send, and the frames that answer it."""
-counts = st.integers(-(2**15), 2**15 - 1)
 
 
 def frame(can_id: int, data: str = "") -> CanFrame:

@@ -2,6 +2,7 @@
 
 import errno
 from collections.abc import Iterator
+from unittest.mock import Mock
 
 import can
 import pytest
@@ -72,34 +73,23 @@ def test_an_interface_that_echoes_is_freed_of_it(other):
     bus.close()
 
 
-class BrokenBus(can.BusABC):
-    """An interface that raises a given error."""
-
-    def __init__(self, error: Exception) -> None:
-        super().__init__(channel=None)
-        self.error = error
-
-    def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        raise self.error
-
-    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        raise self.error
+def broken(error: Exception) -> PythonCanBus:
+    """A bus over an interface that raises an error at every call."""
+    inner = Mock(**{"send.side_effect": error, "recv.side_effect": error})
+    return PythonCanBus("can:x:y", inner)
 
 
 def test_what_an_interface_raises_becomes_ours_and_stays_the_cause():
     gone = can.CanOperationError("device vanished")
-    bus = PythonCanBus("can:x:y", BrokenBus(gone))
+    bus = broken(gone)
     with pytest.raises(LinkLostError, match="vanished") as lost:
         bus.read(0.1)
     assert lost.value.__cause__ is gone
     with pytest.raises(LinkLostError, match="vanished"):
         bus.send(CanFrame(1))
-    bus.close()
     for error in (can.CanTimeoutError("full"), can.CanOperationError("full", errno.ENOBUFS)):
-        bus = PythonCanBus("can:x:y", BrokenBus(error))
         with pytest.raises(LinkTimeoutError, match="acknowledges"):
-            bus.send(CanFrame(1))
-        bus.close()
+            broken(error).send(CanFrame(1))
 
 
 @pytest.mark.parametrize(

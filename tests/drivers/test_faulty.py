@@ -9,31 +9,19 @@ from drivers.transport.simulated import SimulatedTransport
 
 
 class Counting:
-    """A board that sends its tick, two bytes a millisecond."""
+    """A board that sends its tick, two bytes a millisecond: all that wait, or one packet each."""
 
-    def __init__(self) -> None:
-        self.tick = 0
-        self.got = b""
-        self._out: list[bytes] = []
-
-    def receive(self, data: bytes) -> None:
-        self.got += data
+    def __init__(self, packets: bool = False) -> None:
+        self._packets = packets
+        self._tick = self._sent = 0
 
     def advance(self, ticks: int) -> None:
-        for _ in range(ticks):
-            self._out.append(self.tick.to_bytes(2, "big"))
-            self.tick += 1
+        self._tick += ticks
 
     def transmit(self) -> bytes:
-        out, self._out = b"".join(self._out), []
-        return out
-
-
-class Packets(Counting):
-    """The same, one packet at a time."""
-
-    def transmit(self) -> bytes:
-        return self._out.pop(0) if self._out else b""
+        first = self._sent
+        self._sent = min(first + 1, self._tick) if self._packets else self._tick
+        return expected(self._sent)[2 * first :]
 
 
 def expected(ticks: int) -> bytes:
@@ -90,7 +78,9 @@ def test_a_late_stream_loses_nothing_and_keeps_its_order(fault):
 
 def test_packets_are_lost_repeated_and_overtaken_whole():
     faults = Faults()
-    cable = FaultyTransport(SimulatedTransport(Packets(), step_s=0.001), faults, packets=True)
+    cable = FaultyTransport(
+        SimulatedTransport(Counting(packets=True), step_s=0.001), faults, packets=True
+    )
     for fault in (Fault.DROP, Fault.CORRUPT, Fault.DUPLICATE, Fault.DELAY):
         faults.inject(fault, duration_s=0.0035)
     numbers = [int.from_bytes(packet, "big") for packet in read_all(cable, 0.01)]

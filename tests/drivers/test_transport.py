@@ -7,6 +7,7 @@ import termios
 import tty
 from collections.abc import Iterator
 from types import SimpleNamespace
+from unittest.mock import Mock, PropertyMock
 
 import pytest
 import serial
@@ -79,23 +80,14 @@ def test_a_line_has_its_own_speed_and_parity(pty):
     open_transport(pty.path).close()
 
 
-class RefusingPort:
-    """A port whose driver does not have the speed asked for."""
-
-    closed = False
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise termios.error(errno.EINVAL, "Invalid argument")
-
-    def close(self) -> None:
-        type(self).closed = True
-
-
 def test_a_speed_the_adapter_does_not_have_is_reported():
-    register_scheme("refusing", lambda url: SerialTransport(url, RefusingPort()))
+    port = Mock()
+    refused = PropertyMock(side_effect=termios.error(errno.EINVAL, "Invalid argument"))
+    type(port).baudrate = refused
+    register_scheme("refusing", lambda url: SerialTransport(url, port))
     with pytest.raises(LinkError, match="cannot be set to 1250000 bit/s"):
         open_line("refusing:", 1_250_000, "E")
-    assert RefusingPort.closed
+    port.close.assert_called()
 
 
 def test_a_port_is_opened_by_one_program_only(pty):
