@@ -123,7 +123,7 @@ class PolledDrive(PolledDevice):
     """A motor controller that is commanded and asked in one cycle.
 
     A driver gives `energise` and `release` besides what every polled device gives, and keeps its
-    command in `_goal`.
+    command in `_goal`, or gives `zero`.
 
     Args:
         rate_hz: Polling rate.
@@ -148,6 +148,10 @@ class PolledDrive(PolledDevice):
         """Take the motor out of force, and return when the drive has confirmed it."""
         raise NotImplementedError
 
+    def zero(self) -> None:
+        """Forget the command; a driver that keeps it elsewhere than in `_goal` forgets it there."""
+        self._goal = 0.0
+
     def arm(self) -> None:
         """Energise the motor, its command 0, watched by the drive itself.
 
@@ -162,7 +166,7 @@ class PolledDrive(PolledDevice):
     def put_in_force(self) -> None:
         """Energise the motor of a healthy drive; errors as `arm`."""
         self._may_be_armed = True
-        self._goal = 0.0
+        self.zero()
         self.energise()
         self._armed = True
 
@@ -173,7 +177,7 @@ class PolledDrive(PolledDevice):
             DisarmUnconfirmedError: It has not confirmed it; its state is unknown.
         """
         self._armed = False
-        self._goal = 0.0
+        self.zero()
         try:
             self.release()
         except DriverError as error:
