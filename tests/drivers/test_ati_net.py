@@ -109,7 +109,7 @@ def test_a_status_is_reported_in_words_and_flags_its_samples():
     device.reset_latch()
     device.read(0.1)
     assert device.status == 0
-    fake.status = 1 << 31 | protocol.SATURATED | protocol.LATCHED
+    fake.status = 1 << 31 | 1 << 17 | 1 << 16
     assert set(device.read(0.1).flags) == {9}
     assert device.counters["device_errors"] == 50
 
