@@ -116,8 +116,8 @@ def test_it_is_documented(name):
     for heading in ("## Wiring", "## Limits", "## Source"):
         assert heading in readme
     limits = readme.split("## Limits")[1].split("\n## ")[0]
-    said = SAID.get(name, dict.fromkeys(set(Fault) - {Fault.DISCONNECT}, set()))
-    assert set(said) == set(Fault) - {Fault.DISCONNECT}
+    said = SAID.get(name, {})  # of a driver of another package no words are declared
+    assert set(said) in (set(), set(Fault) - {Fault.DISCONNECT})
     for counter in set().union(*said.values()):
         assert f"`{counter}`" in limits, f"{name}'s README does not say what {counter} means"
 
