@@ -10,9 +10,10 @@ import os
 import struct
 import zlib
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import zstandard
@@ -23,7 +24,7 @@ from rig.log.scan import ChunkRef, Damage
 from rig.log.schema import CDR_HEADER, MESSAGE_HEAD_BYTES, MESSAGE_OPCODE, Stream
 
 BATCH_BYTES = 1 << 19
-"""Unpacked bytes a thread takes at a time: it fits in a core's cache, and hides the hand-over."""
+"""Unpacked bytes a thread takes at a time: they fit in a core's cache."""
 
 MAX_CHUNK_BYTES = 1 << 30
 """A chunk that states more than this is taken for damaged, not unpacked."""
@@ -53,19 +54,10 @@ class Found:
     salvaged: dict[int, int] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """A chunk, the one channel in it (`MIXED` if others may be), and where its bytes go."""
-
-    chunk: ChunkRef
-    channel: int
-    start: int
-
-
 def read_chunks(
     buffer: memoryview, chunks: Sequence[ChunkRef], streams: dict[int, Stream], wanted: set[int]
 ) -> Found:
-    """Unpack chunks and gather the messages of the wanted channels.
+    """Unpack the chunks of a file and gather the messages of the wanted channels.
 
     Args:
         buffer: The bytes of the file.
@@ -73,38 +65,24 @@ def read_chunks(
         streams: Stream of each channel of fixed size.
         wanted: Channels to read, keys of `streams`.
     """
-    if not wanted:
-        return Found()
-    parts, sizes = _parts(chunks, streams, wanted)
-    whole = {channel: np.empty(size, np.uint8) for channel, size in sizes.items()}
-    batches = list(_batches(parts))
+    batches: dict[int, list[ChunkRef]] = defaultdict(list)
+    before = 0
+    for chunk in chunks if wanted else ():
+        if _owner(chunk, streams) in (MIXED, *wanted):
+            batches[before // BATCH_BYTES].append(chunk)
+            before += chunk.unpacked_bytes
     threads = max(1, min(len(batches), os.cpu_count() or 1))
     with ThreadPoolExecutor(threads) as pool:
-        done = list(pool.map(lambda batch: _read_batch(buffer, batch, streams, whole), batches))
+        work = partial(_read_batch, buffer, streams=streams, wanted=wanted)
+        done = list(pool.map(work, batches.values()))
     found = Found()
-    for channel, target in whole.items():
+    for channel in wanted:
         pieces = [read.data[channel] for read in done if channel in read.data]
-        in_place = sum(map(len, pieces)) == len(target) and all(p.base is target for p in pieces)
-        found.data[channel] = target if in_place else np.concatenate([target[:0], *pieces])
+        found.data[channel] = np.concatenate([np.empty(0, np.uint8), *pieces])
     for read in done:
         found.damage += read.damage
         found.salvaged |= read.salvaged
     return found
-
-
-def _parts(
-    chunks: Sequence[ChunkRef], streams: dict[int, Stream], wanted: set[int]
-) -> tuple[list[_Part], dict[int, int]]:
-    """Return the chunks to read, and the bytes of each channel that have a place."""
-    parts, sizes = [], dict.fromkeys(wanted, 0)
-    for chunk in chunks:
-        channel = _owner(chunk, streams)
-        if channel == MIXED:
-            parts.append(_Part(chunk, MIXED, 0))
-        elif channel in wanted:
-            parts.append(_Part(chunk, channel, sizes[channel]))
-            sizes[channel] += chunk.unpacked_bytes
-    return parts, sizes
 
 
 def _owner(chunk: ChunkRef, streams: dict[int, Stream]) -> int:
@@ -118,49 +96,31 @@ def _owner(chunk: ChunkRef, streams: dict[int, Stream]) -> int:
     return channel if count * size == chunk.unpacked_bytes else MIXED
 
 
-def _batches(parts: Sequence[_Part]) -> Iterator[list[_Part]]:
-    """Yield neighbouring chunks; one in which several channels may be stands alone."""
-    batch: list[_Part] = []
-    size = 0
-    for part in parts:
-        if batch and (size > BATCH_BYTES or MIXED in (part.channel, batch[-1].channel)):
-            yield batch
-            batch, size = [], 0
-        batch.append(part)
-        size += part.chunk.unpacked_bytes
-    if batch:
-        yield batch
-
-
 def _read_batch(
-    buffer: memoryview, batch: list[_Part], streams: dict[int, Stream], whole: dict[int, Bytes]
+    buffer: memoryview, batch: list[ChunkRef], streams: dict[int, Stream], wanted: set[int]
 ) -> Found:
-    if batch[0].channel != MIXED:
-        try:
-            return Found(_read_arrays(buffer, batch, streams, whole))
-        except (DataError, zstandard.ZstdError):
-            pass  # one of the chunks does not match its index: take them one at a time
-    return _read_singly(buffer, [part.chunk for part in batch], streams, set(whole))
+    try:
+        return Found(_read_arrays(buffer, batch, streams))
+    except (DataError, zstandard.ZstdError):  # a chunk does not match its index: one at a time
+        return _read_singly(buffer, batch, streams, wanted)
 
 
 def _read_arrays(
-    buffer: memoryview, batch: list[_Part], streams: dict[int, Stream], whole: dict[int, Bytes]
+    buffer: memoryview, batch: list[ChunkRef], streams: dict[int, Stream]
 ) -> dict[int, Bytes]:
-    """Read chunks that hold messages of one channel each into their places.
+    """Read chunks that hold messages of one channel each.
 
     Raises:
         DataError: A chunk is damaged, or holds something else.
         zstandard.ZstdError: A chunk cannot be unpacked.
     """
+    parts: dict[int, list[bytes]] = defaultdict(list)
     decompressor = zstandard.ZstdDecompressor()
-    spans: dict[int, slice] = {}
-    for part in batch:
-        data = _unpack(buffer, part.chunk, decompressor)
-        stop = part.start + len(data)
-        whole[part.channel][part.start : stop] = np.frombuffer(data, np.uint8)
-        first = spans.get(part.channel, slice(part.start, 0)).start
-        spans[part.channel] = slice(first, stop)
-    read = {channel: whole[channel][span] for channel, span in spans.items()}
+    for chunk in batch:
+        if (channel := _owner(chunk, streams)) == MIXED:
+            raise DataError("A chunk may hold several channels.")
+        parts[channel].append(_unpack(buffer, chunk, decompressor))
+    read = {channel: np.frombuffer(b"".join(data), np.uint8) for channel, data in parts.items()}
     for channel, content in read.items():
         records = content.view(streams[channel].record_dtype)
         if not (
@@ -179,6 +139,7 @@ def _read_singly(
     """Read chunks record by record, leaving out the damaged ones."""
     read = Found()
     decompressor = zstandard.ZstdDecompressor()
+    parts: dict[int, list[bytes]] = defaultdict(list)
     for chunk in chunks:
         try:
             data = _unpack(buffer, chunk, decompressor)
@@ -186,15 +147,14 @@ def _read_singly(
             what = f"a chunk cannot be unpacked: {error}"
             read.damage.append(Damage(chunk.offset, len(chunk.data), what))
             continue
-        records, problem = _walk(data, streams, wanted)
-        for channel, content in records.items():
-            before = read.data.get(channel, np.empty(0, np.uint8))
-            read.data[channel] = np.concatenate([before, np.frombuffer(content, np.uint8)])
+        records, problem = _walk(data, streams)
+        for channel in records.keys() & wanted:
+            parts[channel] += records[channel]
             if chunk.torn:
-                size = streams[channel].record_dtype.itemsize
-                read.salvaged[channel] = len(content) // size
+                read.salvaged[channel] = len(records[channel])
         if problem and not chunk.torn:
             read.damage.append(Damage(chunk.offset, len(chunk.data), problem))
+    read.data = {n: np.frombuffer(b"".join(data), np.uint8) for n, data in parts.items()}
     return read
 
 
@@ -225,9 +185,7 @@ def _unpack(buffer: memoryview, chunk: ChunkRef, decompressor: zstandard.ZstdDec
     return data
 
 
-def _walk(
-    data: bytes, streams: dict[int, Stream], wanted: set[int]
-) -> tuple[dict[int, bytes], str | None]:
+def _walk(data: bytes, streams: dict[int, Stream]) -> tuple[dict[int, list[bytes]], str | None]:
     """Read a chunk record by record; stop with the reason where that is not possible."""
     found: dict[int, list[bytes]] = defaultdict(list)
     position, problem = 0, None
@@ -237,16 +195,14 @@ def _walk(
             opcode, length, channel = _MESSAGE.unpack_from(data, position)
             stop = position + 9 + length
         if stop > len(data):
-            problem = "a chunk ends inside a record"
-            break
+            return found, "a chunk ends inside a record"
         if opcode == MESSAGE_OPCODE and channel in streams:
+            topic, record = streams[channel].topic, data[position:stop]
             if length != streams[channel].record_length:
-                problem = f"a message of {streams[channel].topic} has a wrong length"
-                break
-            record = data[position:stop]
+                return found, f"a message of {topic} has a wrong length"
             if record.startswith(_CDR, 9 + MESSAGE_HEAD_BYTES):
                 found[channel].append(record)
             else:
-                problem = f"a message of {streams[channel].topic} is not little-endian CDR"
+                problem = f"a message of {topic} is not little-endian CDR"
         position = stop
-    return {channel: b"".join(found[channel]) for channel in found.keys() & wanted}, problem
+    return found, problem
