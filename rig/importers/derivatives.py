@@ -68,11 +68,6 @@ class Relation:
     lag_is_shift: bool
     correlation: float
 
-    @property
-    def ratio_is_wrong(self) -> bool:
-        """Whether no share of noise in either channel makes the ratio's size 1."""
-        return not self.allows(1.0)
-
     def allows(self, ratio: float) -> bool:
         """Return whether the true ratio's size may be this one, by the noise in either channel."""
         size = abs(self.ratio) / ratio
@@ -107,7 +102,7 @@ def fault(recording: Recording, name: str, slope_name: str) -> str:
         return f"{slope_name} comes {abs(1000 * found.lag_s):.0f} ms {way} the motion of {name}"
     if found.ratio < 0:
         return f"{slope_name} has the opposite sign of the motion of {name}"
-    if found.ratio_is_wrong:
+    if not found.allows(1.0):
         units = "".join(f"{unit}, or " for unit in _units(found, name, slope_name))
         return (
             f"{name} changes {found.ratio:.3g} times as fast as {slope_name} states; {units}a"
@@ -154,13 +149,7 @@ def _stem(name: str) -> tuple[str, str]:
 def relation(recording: Recording, name: str, slope_name: str) -> Relation | None:
     """Compare a channel's slope with its stated derivative on the longest unbroken part.
 
-    Args:
-        recording: The run.
-        name: A channel.
-        slope_name: Its derivative.
-
-    Returns:
-        The relation, or None where noise hides it or the run is too short.
+    Returns None where noise hides the relation or the run is too short.
     """
     if len(recording) < 2:
         return None

@@ -51,49 +51,27 @@ class JawStep:
     step_rad: float
 
 
-@dataclass(frozen=True)
-class JawZeros:
-    """The jaw's zero in every run of a campaign.
+def with_one_zero(campaign: Campaign, target: str) -> tuple[Campaign, tuple[JawStep, ...]]:
+    """Return a campaign to estimate the jaw's angle on, with its zero where the last run has it.
 
-    Attributes:
-        runs: Names of the runs.
-        zero_rad: Zero of each run's segment, counted from that of the last run, shape (runs,).
-    """
-
-    runs: tuple[str, ...]
-    zero_rad: FloatArray
-
-    @property
-    def steps(self) -> tuple[JawStep, ...]:
-        """The steps, in order."""
-        changes = np.diff(self.zero_rad)
-        return tuple(JawStep(self.runs[k + 1], float(changes[k])) for k in np.flatnonzero(changes))
-
-    def taken_off(self, campaign: Campaign) -> Campaign:
-        """Return the campaign with every jaw angle counted from the last run's zero."""
-        zeros = dict(zip(self.runs, self.zero_rad, strict=True))
-        runs = [
-            replace(run, load=partial(_shifted, run, float(zeros[run.name])))
-            if zeros.get(run.name)
-            else run
-            for run in campaign.runs
-        ]
-        return Campaign(tuple(runs))
-
-
-def jaw_zeros(campaign: Campaign) -> JawZeros:
-    """Find the jaw's zero in every run by comparing runs that share conditions.
-
-    The load stretches the cable and so moves the jaw by degrees; the share of each load, wrist,
-    trajectory and instrument is fitted with the zeros. Flagged samples are left out. One run is
-    held at a time. A campaign with as many levels as runs shows no step.
+    Zeros are found by comparing runs that share conditions: the load stretches the cable and so
+    moves the jaw by degrees; the share of each load, wrist, trajectory and instrument is fitted
+    with the zeros. Flagged samples are left out. One run is held at a time. A campaign with as many
+    levels as runs shows no step.
 
     Args:
-        campaign: Runs with `jaw_angle_rad`, in the order they were taken.
+        campaign: The runs, in the order they were taken.
+        target: Channel that is estimated; of any but `jaw_angle_rad` the campaign is returned as it
+            is.
+
+    Returns:
+        The campaign, and the steps that were taken off.
 
     Raises:
         MissingChannelError: A run has no `jaw_angle_rad`.
     """
+    if target != JAW:
+        return campaign, ()
     names, means, levels = [], [], []
     for recording in campaign.evidence:
         if recording.valid.any():
@@ -101,25 +79,18 @@ def jaw_zeros(campaign: Campaign) -> JawZeros:
             means.append(float(recording[JAW][recording.valid].mean()))
             levels.append(_levels(recording))
     if not names:
-        return JawZeros((), np.zeros(0))
-    zeros = _segmented(np.array(means), _shares(levels))
-    return JawZeros(tuple(names), zeros - zeros[-1])
-
-
-def with_one_zero(campaign: Campaign, target: str) -> tuple[Campaign, tuple[JawStep, ...]]:
-    """Return a campaign to estimate the jaw's angle on, with its zero where the last run has it.
-
-    Args:
-        campaign: The runs, in the order they were taken.
-        target: Channel that is estimated; of any other the campaign is returned as it is.
-
-    Returns:
-        The campaign, and the steps that were taken off.
-    """
-    if target != JAW:
         return campaign, ()
-    zeros = jaw_zeros(campaign)
-    return zeros.taken_off(campaign), zeros.steps
+    zero_rad = _segmented(np.array(means), _shares(levels))
+    changes = np.diff(zero_rad)
+    steps = tuple(JawStep(names[k + 1], float(changes[k])) for k in np.flatnonzero(changes))
+    from_last_rad = dict(zip(names, (zero_rad - zero_rad[-1]).tolist(), strict=True))
+    runs = [
+        replace(run, load=partial(_shifted, run, from_last_rad[run.name]))
+        if from_last_rad.get(run.name)
+        else run
+        for run in campaign.runs
+    ]
+    return Campaign(tuple(runs)), steps
 
 
 def sentence(steps: Sequence[JawStep]) -> list[str]:
@@ -134,12 +105,7 @@ def sentence(steps: Sequence[JawStep]) -> list[str]:
 
 
 def _segmented(means: FloatArray, shares: FloatArray) -> FloatArray:
-    """Return the zero of each run's segment, shape (runs,).
-
-    Args:
-        means: Mean angle of each run, shape (runs,).
-        shares: Columns of the conditions' levels, shape (runs, columns).
-    """
+    """Return the zero of each run's segment from the means of the runs, shape (runs,) both."""
     basis = orth(shares)
     count, free = basis.shape
     after = np.tri(count, count - 1, -1)  # column k: the runs after a cut before run k + 1

@@ -8,7 +8,7 @@ other kinds (sparse matrices, objects, function handles) are named, not read.
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -53,15 +53,11 @@ Value: TypeAlias = "NDArray[np.generic] | str | dict[str, Value] | Unread"
 
 
 def read_mat5(content: bytes) -> dict[str, Value]:
-    """Return the variables of a file by name.
+    """Return the variables of a file, given its bytes, by name.
 
-    Args:
-        content: The file's bytes.
-
-    Returns:
-        Numeric arrays without their axes of length one, text as str, scalar structs as
-        dictionaries, arrays of structs and cells as dictionaries by their number, from "1";
-        anything else as `Unread`.
+    Numeric arrays are without their axes of length one, text is a str, scalar structs are
+    dictionaries, arrays of structs and cells dictionaries by their number, from "1"; anything else
+    is `Unread`.
 
     Raises:
         Mat5Error: The bytes are damaged or truncated, or of another version.
@@ -137,7 +133,7 @@ def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Value]:
         raise Mat5Error(f"an array of shape {shape}")
     name = _expect(elements, "name", lambda kind, _: kind in NAMES)[1].decode("latin-1")
     if array_class == CELL:
-        return name, _cells(elements, math.prod(shape), order, depth)
+        return name, _members(elements, map(str, range(1, math.prod(shape) + 1)), order, depth)
     if array_class == STRUCT:
         return name, _struct(elements, shape, order, depth)
     if array_class == CHAR:
@@ -198,27 +194,18 @@ def _struct(
         names[start : start + length].split(b"\0", 1)[0].decode("latin-1")
         for start in range(0, len(names), length)
     ]
-    count = math.prod(shape)
-    if count == 1:
-        return _fields(elements, fields, order, depth)
-    return {str(k + 1): _fields(elements, fields, order, depth) for k in range(count)}
+    structs = [_members(elements, fields, order, depth) for _ in range(math.prod(shape))]
+    if len(structs) == 1:
+        return structs[0]
+    return {str(number): one for number, one in enumerate(structs, 1)}
 
 
-def _fields(
-    elements: Iterator[tuple[int, bytes]], names: list[str], order: str, depth: int
+def _members(
+    elements: Iterator[tuple[int, bytes]], names: Iterable[str], order: str, depth: int
 ) -> dict[str, Value]:
-    fields: dict[str, Value] = {}
+    """Return the next values of a struct or a cell array, by their names."""
+    members: dict[str, Value] = {}
     for name in names:
-        data = _expect(elements, f"field {name!r}", lambda kind, _: kind == MATRIX)[1]
-        fields[name] = _matrix(data, order, depth + 1)[1]
-    return fields
-
-
-def _cells(
-    elements: Iterator[tuple[int, bytes]], count: int, order: str, depth: int
-) -> dict[str, Value]:
-    cells: dict[str, Value] = {}
-    for number in range(1, count + 1):
-        data = _expect(elements, f"cell {number}", lambda kind, _: kind == MATRIX)[1]
-        cells[str(number)] = _matrix(data, order, depth + 1)[1]
-    return cells
+        data = _expect(elements, f"member {name!r}", lambda kind, _: kind == MATRIX)[1]
+        members[name] = _matrix(data, order, depth + 1)[1]
+    return members

@@ -75,12 +75,7 @@ IMPORTER = MatlabImporter()
 
 
 def load_run(path: Path, name: str, part: str = "") -> Recording:
-    """Read one run.
-
-    Args:
-        path: The file.
-        name: Name of the run.
-        part: Name of the struct that holds the run, or "" for the file's own variables.
+    """Read one run: that of the struct `part`, or "" for the file's own variables.
 
     Raises:
         DataError: The file is damaged or its names do not follow the rules of this module.

@@ -4,7 +4,6 @@ A path may be one `.TXT` log, a folder of logs, a folder of such folders, or a t
 these. Runs load when asked. What the columns become is described in `mrdlab_run`.
 """
 
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -13,10 +12,9 @@ from rig.errors import DataError
 from rig.importers.archive import first_texts, is_archive, unpack_text
 from rig.importers.mrdlab_run import load_run
 from rig.importers.mrdlab_text import looks_like_log
+from rig.importers.registry import files_below
 
 FIRST_BYTES = 4096
-MAX_DEPTH = 3
-"""Folders below the one given that are looked into."""
 
 
 class MrdlabImporter:
@@ -69,34 +67,22 @@ def _campaign(path: Path, root: Path, logs: list[Path]) -> Campaign:
         name = f"{log.parent.name}/{log.stem}" if several else log.stem
         # inside an archive, name the archive, which is the user's file
         source = f"{path}:{log.relative_to(root).as_posix()}" if inside else str(log)
-        runs.append(
-            Run(
-                name,
-                partial(load_run, log, name, source, companions[log.parent]),
-                path if inside else log,
-            )
-        )
+        load = partial(load_run, log, name, source, companions[log.parent])
+        runs.append(Run(name, load, path if inside else log))
     return Campaign(tuple(runs))
 
 
 def _logs(root: Path) -> list[Path]:
     """Return the logs under a folder in file order.
 
-    A log starts with `%`. A file named by digits alone is meant to be one, so it is listed even
-    when it does not, and reading it reports the fault; other text (read-me, serial log) is not a
-    run.
+    A file named by digits alone is meant to be one, so it is listed even when it does not start
+    with `%`, and reading it reports the fault.
     """
     return [file for file in _texts(root) if file.stem.isdigit() or _first_bytes(file)[:1] == b"%"]
 
 
-def _texts(root: Path, depth: int = MAX_DEPTH) -> Iterator[Path]:
-    """Walk the text files of a folder, then those of the folders in it, each sorted by name."""
-    entries = sorted(entry for entry in root.iterdir() if not entry.name.startswith("."))
-    yield from (entry for entry in entries if _is_text(entry))
-    if depth:
-        for entry in entries:
-            if entry.is_dir() and not entry.is_symlink():
-                yield from _texts(entry, depth - 1)
+def _texts(root: Path) -> list[Path]:
+    return [file for file in files_below(root) if _is_text(file)]
 
 
 def _is_text(path: Path) -> bool:

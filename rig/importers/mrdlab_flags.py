@@ -36,12 +36,8 @@ def bad_stretches(
 ) -> list[Stretch]:
     """Return the stretches in which something is missing, saturated or runs away, by their start.
 
-    Args:
-        recording: The run.
-        intended_angle_rad: Target of the spindle, shape (n,); None where it is not known, and then
-            runaways are not looked for.
-        step_s: Sample period, s.
-        gear_ratio: Motor turns a spindle turn.
+    Runaways are looked for where the intended angle of the spindle, shape (n,), is known. The gear
+    ratio is motor turns a spindle turn.
     """
     found = [*_missing(recording.time_s, step_s), *_saturated(recording)]
     if intended_angle_rad is not None:
@@ -50,7 +46,6 @@ def bad_stretches(
 
 
 def _saturated(recording: Recording) -> Iterator[Stretch]:
-    """Flag clipped current and a command beyond full scale."""
     time_s = recording.time_s
     for channel, (limit, reason) in SATURATED.items():
         size = np.abs(recording[channel])
@@ -61,12 +56,10 @@ def _saturated(recording: Recording) -> Iterator[Stretch]:
 
 
 def _missing(time_s: FloatArray, step_s: float) -> Iterator[Stretch]:
-    """Flag the sample after each gap in time."""
     steps = np.diff(time_s)
     for place in np.flatnonzero(steps > 1.5 * step_s):
         at_s, lost = float(time_s[place + 1]), round(steps[place] / step_s) - 1
-        why = f"{lost} samples are missing before this one"
-        yield Stretch(at_s, at_s, Flag.MISSING, why)
+        yield Stretch(at_s, at_s, Flag.MISSING, f"{lost} samples are missing before this one")
 
 
 def _runaways(

@@ -80,8 +80,7 @@ def identify(path: Path, header: str, columns: FloatArray) -> Identity:
     """Combine the folder's name, the file's stem, the header text and the signs of the columns.
 
     Args:
-        path: The log, in a folder named such as `Tool_4_Maryland_L_Roll_1`; of a stem of three
-            digits, the first is the jaw stop.
+        path: The log; of a stem of three digits, the first is the jaw stop.
         header: The `%` lines.
         columns: Raw values in the file's column order, shape (10, n).
 
@@ -91,7 +90,10 @@ def identify(path: Path, header: str, columns: FloatArray) -> Identity:
     """
     folder = path.parent.name
     named, in_header = FOLDER.search(folder), HEADER_TOOL.search(header)
-    side, of_side = _side(path, SIDES[named["side"]] if named else None, header, columns)
+    spindle = HEADER_SIDE.search(header)
+    in_folder = SIDES[named["side"]] if named else None
+    side, of_side = _side(path, in_folder, spindle[1].lower() if spindle else None, _shown(columns))
+    _check_driven(path, columns, side)
     conditions: dict[str, float | str] = {}
     remarks: list[str] = []
     if re.fullmatch(r"\d{3}", path.stem):
@@ -134,18 +136,9 @@ def _wrist(joint: str, step: int, conditions: dict[str, float | str]) -> list[st
 
 
 def _side(
-    path: Path, in_folder: str | None, header: str, columns: FloatArray
-) -> tuple[str, list[str]]:
-    """Return the side of a log from its names and its signs, and how it was found."""
-    found = HEADER_SIDE.search(header)
-    side, remarks = _decided(path, in_folder, found[1].lower() if found else None, _shown(columns))
-    _check_driven(path, columns, side)
-    return side, remarks
-
-
-def _decided(
     path: Path, in_folder: str | None, in_header: str | None, shown: str | None
 ) -> tuple[str, list[str]]:
+    """Return the side of a log from its names and its signs, and how it was found."""
     stated = {side for side in (in_folder, in_header) if side is not None}
     named = f"folder {in_folder or 'states no side'}, header {in_header or 'states no side'}"
     if shown is None:

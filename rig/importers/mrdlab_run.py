@@ -9,15 +9,16 @@ taken from a whole run carries that run's mean load into every sample:
   stretches the cable, so it falls with the load; compare runs of equal load (`jaw_steps`).
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import leastsq
 
 from estimation.recording import FloatArray, Recording, read_only
 from rig.importers import mrdlab_text as raw
 from rig.importers.mrdlab_flags import bad_stretches
 from rig.importers.mrdlab_identity import follows, identify
-from rig.importers.sine_fit import Sine, fit_sine
 
 SPINDLE_RAD = 2 * np.pi / 8192
 MOTOR_RAD = 2 * np.pi / 4096
@@ -32,6 +33,8 @@ All of them turn on a right jaw (`mrdlab_identity`)."""
 
 TARGET_UNITS = {"counts": SPINDLE_RAD, "rad": 1.0}
 TARGET_TOLERANCE_RATIO = 2.0
+FIT_PERIOD_S = 0.04
+"""Samples are thinned to this spacing for the fit: hand and rig trajectories stay below 5 Hz."""
 SINE_SHARE_RATIO = 0.97
 """A trajectory is one sine where the fit explains this share of its variance."""
 QUANTA_RATIO = (1.0, 0.1, 0.01, 0.001, 1e-4)
@@ -42,14 +45,32 @@ THINNING = 10
 """Zeros and slopes are fitted to every tenth sample; short dot products stay off BLAS threads."""
 
 
+@dataclass(frozen=True, slots=True)
+class Sine:
+    """A fitted trajectory centre + amplitude sin(2 pi f t + phase).
+
+    Attributes:
+        frequency_hz: Frequency f, Hz.
+        centre_rad: Mean of the sine, rad.
+        amplitude_rad: Amplitude, rad, not negative.
+        phase_rad: Phase at time zero, rad.
+    """
+
+    frequency_hz: float
+    centre_rad: float
+    amplitude_rad: float
+    phase_rad: float
+
+    def angle_rad(self, time_s: FloatArray) -> FloatArray:
+        """Return the sine at these times, shape of `time_s`."""
+        phase = 2 * np.pi * self.frequency_hz * time_s + self.phase_rad
+        return np.asarray(self.centre_rad + self.amplitude_rad * np.sin(phase))
+
+
 def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
     """Read one log as a recording.
 
-    Args:
-        path: The log.
-        name: Name of the run.
-        source: What to state as the recording's source.
-        companions: Text of the folder's read-me, becomes part of the notes.
+    `companions` is the text of the folder's read-me and becomes part of the notes.
 
     Returns:
         Channels `spindle_angle_rad`, `motor_angle_rad` (motor side, before the gear),
@@ -71,9 +92,7 @@ def load_run(path: Path, name: str, source: str, companions: str) -> Recording:
     target = _target(text.columns, remarks)
     if target is not None:
         columns["target_angle_rad"] = target
-    sine = fit_sine(time_s, columns["spindle_angle_rad"] if target is None else target)
-    if sine is not None and sine.explained_ratio < SINE_SHARE_RATIO:
-        sine = None
+    sine = _sine(time_s, columns["spindle_angle_rad"] if target is None else target)
     if sine is None:
         remarks.append(
             "The trajectory is not one sine: no frequency is stated, runaways are not looked for."
@@ -151,6 +170,32 @@ def _target(columns: FloatArray, remarks: list[str]) -> FloatArray | None:
         f"({SPINDLE_RAD:.3g}); the channel is left out."
     )
     return None
+
+
+def _sine(time_s: FloatArray, angle_rad: FloatArray) -> Sine | None:
+    """Fit one sine to an evenly sampled trajectory, started at the largest line of the spectrum.
+
+    The frequency is that of the trajectory, never of a file name. None where there is no sine: a
+    constant trajectory, fewer than 16 thinned samples, less than 0.9 of a period, or another form.
+    """
+    period_s = (time_s[-1] - time_s[0]) / (time_s.size - 1)
+    step = max(1, round(FIT_PERIOD_S / period_s))
+    t, y = time_s[::step] - time_s[0], angle_rad[::step]
+    variance = float(np.var(y))
+    if t.size < 16 or variance == 0.0:
+        return None
+    padded = 8 * t.size
+    spectrum = np.fft.rfft(y - y.mean(), padded)
+    line = int(np.argmax(np.abs(spectrum[1:]))) + 1
+    phase = float(np.angle(spectrum[line])) + np.pi / 2
+    start = (line / (padded * period_s * step), y.mean(), np.sqrt(2 * variance), phase)
+    found, *_ = leastsq(lambda values: Sine(*values).angle_rad(t) - y, start, full_output=True)
+    frequency, centre, amplitude, phase = map(float, found)
+    rest = y - Sine(frequency, centre, amplitude, phase).angle_rad(t)
+    if frequency * t[-1] < 0.9 or 1.0 - float(np.var(rest)) / variance < SINE_SHARE_RATIO:
+        return None
+    phase += (amplitude < 0) * np.pi - 2 * np.pi * frequency * float(time_s[0])
+    return Sine(frequency, centre, abs(amplitude), phase)
 
 
 def _conditions(

@@ -48,12 +48,10 @@ class Text:
     Attributes:
         header: The `%` lines, without the signs.
         columns: Raw values in the file's column order, shape (10, n); time in seconds.
-        header_lines: Number of header lines.
     """
 
     header: str
     columns: FloatArray
-    header_lines: int
 
 
 def looks_like_log(first_bytes: bytes) -> bool:
@@ -81,7 +79,7 @@ def read_text(path: Path) -> Text:
     columns = _parse(path, content, start, len(lines))
     _check_range(path, columns, len(lines))
     columns[TIME] = _seconds(path, columns[TIME], len(lines))
-    return Text("\n".join(lines), columns, len(lines))
+    return Text("\n".join(lines), columns)
 
 
 def _header(path: Path, content: bytes) -> tuple[list[str], int]:
@@ -122,11 +120,8 @@ def _parse(path: Path, content: bytes, start: int, header_lines: int) -> FloatAr
             f"{len(COLUMNS)} decimal numbers and a line end; the file is truncated",
         )
     text = np.frombuffer(content, np.uint8, offset=start)
-    columns = np.empty((len(COLUMNS), _likely_rows(content, start)))
+    columns = np.empty((len(COLUMNS), content.count(b"\n", start)))
     row, position = parse_decimals(text, columns)
-    if position < text.size and row == columns.shape[1]:
-        columns = np.empty((len(COLUMNS), content.count(b"\n", start)))
-        row, position = parse_decimals(text, columns)
     if position < text.size:
         line = content[start + position : content.index(b"\n", start + position)]
         raise _line_fault(path, header_lines + row + 1, line)
@@ -135,12 +130,6 @@ def _parse(path: Path, content: bytes, start: int, header_lines: int) -> FloatAr
             path, header_lines + row + 1, f"the log holds {row} samples", "at least two samples"
         )
     return columns[:, :row]
-
-
-def _likely_rows(content: bytes, start: int) -> int:
-    """Return a little more than the number of lines, judged by the first ones: no second pass."""
-    sample = content[start : start + 4096]
-    return 16 + sample.count(b"\n") * (len(content) - start) * 11 // (10 * max(len(sample), 1))
 
 
 def _line_fault(path: Path, number: int, line: bytes) -> DataError:

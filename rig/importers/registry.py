@@ -162,13 +162,9 @@ def _content(path: Path) -> str:
 
 
 def left_out(path: Path, campaign: Campaign) -> list[str]:
-    """Return the exclusions of an open campaign, one line per reason; empty if there are none.
+    """Return the exclusions of the campaign that a path was opened as, one line per reason.
 
     Files that no importer recognises as recordings (notes, pictures) are not listed.
-
-    Args:
-        path: What was opened.
-        campaign: What it was opened as.
     """
     lines = [f"Run {r.name} does not count: {r.excluded}" for r in campaign.runs if r.excluded]
     if not path.is_dir():
@@ -178,7 +174,7 @@ def left_out(path: Path, campaign: Campaign) -> list[str]:
         return lines
     formats = {_format_of(source) for source in taken if source is not None}
     reasons: dict[str, list[str]] = {}
-    for file in _files(path):
+    for file in files_below(path):
         if file in taken or (name := _format_of(file)) is None:
             continue
         reason = (
@@ -197,14 +193,14 @@ def _format_of(file: Path) -> str | None:
     return next((name for name, one in importers().items() if one.recognises(file)), None)
 
 
-def _files(folder: Path, depth: int = MAX_DEPTH) -> Iterator[Path]:
-    for entry in sorted(folder.iterdir()):
-        if entry.name.startswith("."):
-            continue
-        if entry.is_file():
-            yield entry
-        elif depth and entry.is_dir() and not entry.is_symlink():
-            yield from _files(entry, depth - 1)
+def files_below(folder: Path, depth: int = MAX_DEPTH) -> Iterator[Path]:
+    """Walk the files of a folder, then those of the folders in it, each sorted by name."""
+    entries = sorted(entry for entry in folder.iterdir() if not entry.name.startswith("."))
+    yield from (entry for entry in entries if entry.is_file())
+    if depth:
+        for entry in entries:
+            if entry.is_dir() and not entry.is_symlink():
+                yield from files_below(entry, depth - 1)
 
 
 def _named(files: list[str]) -> str:

@@ -5,7 +5,7 @@ import pytest
 
 from estimation.recording import Flag
 from rig.importers.dvrk_psm import IMPORTER as PSM
-from rig.importers.jaw_steps import jaw_zeros
+from rig.importers.jaw_steps import JAW, with_one_zero
 from rig.importers.mrdlab import IMPORTER
 
 pytestmark = [pytest.mark.long, pytest.mark.measured]
@@ -84,7 +84,7 @@ def test_only_the_runaway_and_a_start_transient_are_flagged(reference):
 
 
 def test_the_jaws_zero_steps_before_run_39_and_back_before_run_43(reference):
-    first, second = jaw_zeros(reference).steps
+    _, (first, second) = with_one_zero(reference, JAW)
     assert (first.run, second.run) == ("39", "43")
     assert np.rad2deg(first.step_rad) == pytest.approx(0.54, abs=0.1)
     assert np.rad2deg(second.step_rad) == pytest.approx(-0.56, abs=0.1)

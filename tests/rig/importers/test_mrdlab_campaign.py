@@ -11,7 +11,7 @@ import pytest
 from rig.cli.main import main
 from rig.errors import DataError
 from rig.importers import archive
-from rig.importers.jaw_steps import jaw_zeros
+from rig.importers.jaw_steps import JAW, with_one_zero
 from rig.importers.mrdlab import IMPORTER
 
 FOLDERS = ("Tool_4_Maryland_L_Pitch_1", "Tool_4_Maryland_L_Roll_1")
@@ -166,11 +166,10 @@ def slipped(tmp_path, make_log):
 
 def test_a_jaw_step_is_found_between_runs_of_the_same_load_and_taken_off(slipped):
     campaign = IMPORTER.open(slipped)
-    zeros = jaw_zeros(campaign)
-    (step,) = zeros.steps
+    one_zero, (step,) = with_one_zero(campaign, JAW)
     assert step.run == "06"
     assert np.rad2deg(step.step_rad) == pytest.approx(0.54, abs=0.15)
-    whole = list(zeros.taken_off(campaign))
+    whole = list(one_zero)
     mean = np.array([np.rad2deg(r["jaw_angle_rad"].mean()) for r in whole])
     assert np.ptp(mean[::2]) < 0.4
     assert np.ptp(mean[1::2]) < 0.4
