@@ -9,6 +9,7 @@ taken from a whole run carries that run's mean load into every sample:
   stretches the cable, so it falls with the load; compare runs of equal load (`jaw_steps`).
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -188,8 +189,9 @@ def _sine(time_s: FloatArray, angle_rad: FloatArray) -> Sine | None:
     spectrum = np.fft.rfft(y - y.mean(), padded)
     line = int(np.argmax(np.abs(spectrum[1:]))) + 1
     phase = float(np.angle(spectrum[line])) + np.pi / 2
-    start = (line / (padded * period_s * step), y.mean(), np.sqrt(2 * variance), phase)
-    found, *_ = leastsq(lambda values: Sine(*values).angle_rad(t) - y, start, full_output=True)
+    frequency = line / (padded * period_s * step)
+    start = [frequency, float(y.mean()), math.sqrt(2 * variance), phase]
+    found, *_ = leastsq(lambda p: Sine(*p).angle_rad(t) - y, start, full_output=True)
     frequency, centre, amplitude, phase = map(float, found)
     rest = y - Sine(frequency, centre, amplitude, phase).angle_rad(t)
     if frequency * t[-1] < 0.9 or 1.0 - float(np.var(rest)) / variance < SINE_SHARE_RATIO:

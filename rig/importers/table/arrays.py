@@ -103,11 +103,8 @@ def read_mat(path: Path, layout: Layout) -> Raw:
 def _of_trials(path: Path, values: Mapping[str, Any], pattern: str) -> Raw:
     """Put the columns of all trials one after the other, with their number in the column `trial`.
 
-    Args:
-        path: The file.
-        values: Arrays by name.
-        pattern: Of the names that hold one trial each, such as `test*` or `trial.*`; empty for a
-            file that is one table.
+    The pattern, such as `test*` or `trial.*`, is that of the names that hold one trial each; it is
+    empty for a file that is one table.
 
     Raises:
         DataError: No name fits the pattern, or no column is in all trials.

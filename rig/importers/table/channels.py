@@ -65,12 +65,13 @@ def to_samples(raw: Raw, mapping: Mapping) -> Samples:
     data = mapping.data
     sources = data.columns or _by_name(raw, mapping)
     channels = {
-        name: _channel(raw, mapping, ("columns", name), name, source)
+        name: _channel(raw, mapping, ("columns", name), source)
         for name, source in sources.items()
         if not (name == TIME and source.unit == DATE)
     }
     conditions = {
-        name: _condition(raw, mapping, name, source) for name, source in data.conditions.items()
+        name: _condition(raw, mapping, ("conditions", name), source)
+        for name, source in data.conditions.items()
     }
     started_at_ns = None
     if TIME in sources and sources[TIME].unit == DATE:
@@ -135,9 +136,7 @@ def _by_name(raw: Raw, mapping: Mapping) -> dict[str, Source]:
     return found
 
 
-def _channel(
-    raw: Raw, mapping: Mapping, path: tuple[str, str], name: str, source: Source
-) -> FloatArray:
+def _channel(raw: Raw, mapping: Mapping, path: tuple[str, str], source: Source) -> FloatArray:
     found = find(raw, mapping, path, source.column)
     if not isinstance(found, np.ndarray):
         found = np.full(len(raw), found)
@@ -145,11 +144,11 @@ def _channel(
         raise DataError(
             f"{mapping.where(*path)}: column {source.column!r} of {raw.path.name} is not numbers:"
             f" {bad_cell(raw, source.column) if source.column in raw.columns else found[0]}.",
-            fix=f"Write {name} = '{source.column}:{DATE}'."
-            if name == TIME and _date(str(found[0])) is not None
+            fix=f"Write {TIME} = '{source.column}:{DATE}'."
+            if path[1] == TIME and _date(str(found[0])) is not None
             else "Correct the file, or map another column.",
         )
-    values = _in_si(raw, mapping, path, name, source, found.astype(np.float64))
+    values = _in_si(raw, mapping, path, source, found.astype(np.float64))
     if not np.isfinite(values).any():
         raise DataError(
             f"{mapping.where(*path)}: column {source.column!r} of {raw.path.name} is empty.",
@@ -159,12 +158,7 @@ def _channel(
 
 
 def _in_si(
-    raw: Raw,
-    mapping: Mapping,
-    path: tuple[str, str],
-    name: str,
-    source: Source,
-    values: FloatArray,
+    raw: Raw, mapping: Mapping, path: tuple[str, str], source: Source, values: FloatArray
 ) -> FloatArray:
     gain = source.gain
     if isinstance(gain, str):
@@ -180,16 +174,17 @@ def _in_si(
         values = np.unwrap(values, period=source.wraps_at)
     if source.sign_bit is not None:
         values = np.where(values >= source.sign_bit, source.sign_bit - values, values)
-    unit = conversion(source.unit, name) if source.unit else None
+    unit = conversion(source.unit, path[1]) if source.unit else None
     if unit is None and gain == 1.0:
-        _check_name(mapping, path, name, source.column)
+        _check_name(mapping, path, source.column)
     if unit is None:
         return np.asarray(gain * (values - source.zero))
     return np.asarray(unit.factor * gain * (values - source.zero) + unit.shift)
 
 
-def _check_name(mapping: Mapping, path: tuple[str, str], name: str, column: str) -> None:
+def _check_name(mapping: Mapping, path: tuple[str, str], column: str) -> None:
     """Refuse a column whose name states another unit than the channel's, where none is stated."""
+    name = path[1]
     stated = stated_in_name(column, name)
     if not stated:
         return
@@ -204,24 +199,25 @@ def _check_name(mapping: Mapping, path: tuple[str, str], name: str, column: str)
     )
 
 
-def _condition(raw: Raw, mapping: Mapping, name: str, source: Source) -> float | str | Values:
+def _condition(
+    raw: Raw, mapping: Mapping, path: tuple[str, str], source: Source
+) -> float | str | Values:
     if source.value is not None:
         return source.value
-    path = ("conditions", name)
     found = find(raw, mapping, path, source.column)
     many = found if isinstance(found, np.ndarray) else np.array([found])
-    if many.dtype.kind in "US" and unit_or_none(name):
+    if many.dtype.kind in "US" and unit_or_none(path[1]):
         try:
             many = many.astype(np.float64)
         except ValueError as error:
             raise DataError(
                 f"{mapping.where(*path)}: {source.column!r} of {raw.path.name} is not a number:"
                 f" {str(many[0])!r}.",
-                f"{name} ends in a unit, so it is one.",
+                f"{path[1]} ends in a unit, so it is one.",
                 "Rename the condition without a unit, or map something else.",
             ) from error
     if many.dtype.kind in "fiub":
-        many = _in_si(raw, mapping, path, name, source, many.astype(np.float64))
+        many = _in_si(raw, mapping, path, source, many.astype(np.float64))
     if isinstance(found, np.ndarray):
         return many
     return str(many[0]) if many.dtype.kind in "US" else float(many[0])
@@ -269,14 +265,9 @@ def _in_order(mapping: Mapping) -> list[tuple[str, str]]:
             )
         ordered += [(name, left.pop(name)) for name in ready]
     for name, _ in ordered:
-        _check_unit(mapping, name)
+        try:
+            unit_of(name)
+        except UnknownUnitError as error:
+            where = mapping.where("formulas", name)
+            raise DataError(f"{where}: {error.what}", error.why, error.fix) from error
     return ordered
-
-
-def _check_unit(mapping: Mapping, name: str) -> None:
-    try:
-        unit_of(name)
-    except UnknownUnitError as error:
-        raise DataError(
-            f"{mapping.where('formulas', name)}: {error.what}", error.why, error.fix
-        ) from error

@@ -14,6 +14,7 @@
 Every other table of that file is of the machine itself and is not read here.
 """
 
+from contextlib import suppress
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat
@@ -40,17 +41,10 @@ def _short(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     name, colon, unit = value.rpartition(":")
-    if colon and (unit == DATE or _is_unit(unit)):
-        return {"column": name, "unit": unit}
+    with suppress(NotAUnitError):
+        if colon and (unit == DATE or read_unit(unit)):
+            return {"column": name, "unit": unit}
     return {"column": value}
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        read_unit(text)
-    except NotAUnitError:
-        return False
-    return True
 
 
 class Source(Section):

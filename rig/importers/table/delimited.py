@@ -3,13 +3,14 @@
 import csv
 import gzip
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
 from rig.errors import DataError
 from rig.importers.table.data import Layout
-from rig.importers.table.raw import Raw, numbers_or_text, to_number
+from rig.importers.table.raw import Raw, is_number, numbers_or_text
 
 COMPRESSED = b"\x1f\x8b"
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
@@ -27,9 +28,7 @@ TRUTHS = {"true": "1", "false": "0"}
 def read_delimited(path: Path, layout: Layout) -> Raw:
     """Read a text table.
 
-    Args:
-        path: The file.
-        layout: What is stated about it; the rest follows from its first line and is remarked on.
+    What the layout does not state follows from the file's first lines and is remarked on.
 
     Raises:
         DataError: It is not text, is empty, or a line has another number of fields than the first.
@@ -92,17 +91,14 @@ def _text(path: Path) -> str:
         content = _inflated(path)
     if not content.strip():
         raise DataError(f"{path} is empty.", fix="Name a file with a head and samples.")
-    try:
-        if content.startswith(UTF_16):
+    if content.startswith(UTF_16):
+        with suppress(ValueError):
             return content.decode("utf-16")
-        if b"\0" in content[:4096]:
-            raise ValueError
-        return content.decode("utf-8-sig")
-    except ValueError:
-        pass
-    if b"\0" not in content[:4096]:  # older spreadsheets write accented letters so
-        text = content.decode("latin-1")
-        if sum(c < " " and c not in "\t\r\n\f" for c in text[:4096]) == 0:
+    if b"\0" not in content[:4096]:
+        with suppress(ValueError):
+            return content.decode("utf-8-sig")
+        text = content.decode("latin-1")  # older spreadsheets write accented letters so
+        if not any(c < " " and c not in "\t\r\n\f" for c in text[:4096]):
             return text
     raise DataError(
         f"{path} is not a text table.",
@@ -220,11 +216,7 @@ def _cells(
 
 
 def _is_number(cell: str, decimal: str) -> bool:
-    try:
-        to_number(cell.replace(decimal, "."))
-    except ValueError:
-        return False
-    return True
+    return is_number(cell.replace(decimal, "."))
 
 
 def _decimal(rows: list[tuple[int, list[str]]], separator: str) -> str:
@@ -264,10 +256,8 @@ def _check_widths(path: Path, body: list[tuple[int, list[str]]], width: int) -> 
 
 def bad_cell(raw: Raw, name: str) -> str:
     """Return where a text column's first cell that is not a number stands, and what it holds."""
-    for index, cell in enumerate(raw.columns[name]):
-        try:
-            to_number(str(cell))
-        except ValueError:
-            if str(cell).strip():
-                return f"{raw.row(index)} holds {str(cell)[:30]!r}"
-    return f"{raw.row(int(np.argmin([bool(str(c)) for c in raw.columns[name]])))} is empty"
+    cells = [str(cell) for cell in raw.columns[name]]
+    for index, cell in enumerate(cells):
+        if cell.strip() and not is_number(cell):
+            return f"{raw.row(index)} holds {cell[:30]!r}"
+    return f"{raw.row(int(np.argmin([bool(cell) for cell in cells])))} is empty"

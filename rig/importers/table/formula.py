@@ -62,14 +62,9 @@ def names_in(text: str) -> list[str]:
 
 
 def evaluate(text: str, values: Mapping[str, Any]) -> Any:
-    """Evaluate a formula.
+    """Evaluate a formula, such as `clip(gain_ratio * (target_rad - motor_rad), -1, 1)`.
 
-    Args:
-        text: The formula, such as `clip(gain_ratio * (target_angle_rad - motor_angle_rad), -1, 1)`.
-        values: Name to array or number.
-
-    Returns:
-        An array or a number.
+    `values` holds an array or a number by name; the result is an array or a number.
 
     Raises:
         FormulaError: The formula cannot be read, or reads a name that is not there.

@@ -125,15 +125,13 @@ def _wrong(error: ValidationError, file: Path | None, text: str) -> UsageError:
 
 def _check(mapping: Mapping) -> None:
     data = mapping.data
-    if data.columns and (TIME in data.columns) == (data.sample_rate_hz is not None):
-        both = TIME in data.columns
+    if TIME in data.columns and data.sample_rate_hz is not None:
+        what = "Time is stated twice: by a column for time_s and by a sample rate."
+        raise UsageError(what, fix="Keep one of them.")
+    if data.columns and TIME not in data.columns and data.sample_rate_hz is None:
         raise UsageError(
-            "Time is stated twice: by a column for time_s and by a sample rate."
-            if both
-            else f"{mapping.where('columns')}: nothing states the time of the samples.",
-            fix="Keep one of them."
-            if both
-            else 'Map a column, time_s = "COLUMN:ms", or state sample_rate_hz (--rate).',
+            f"{mapping.where('columns')}: nothing states the time of the samples.",
+            fix='Map a column, time_s = "COLUMN:ms", or state sample_rate_hz (--rate).',
         )
     for part in ("columns", "conditions"):
         for name, source in getattr(data, part).items():

@@ -15,7 +15,7 @@ from rig.importers.table.data import Layout
 from rig.importers.table.delimited import read_delimited
 from rig.importers.table.json_rows import read_json
 from rig.importers.table.mapping import Mapping as ColumnMapping
-from rig.importers.table.raw import Raw, Remark, to_number
+from rig.importers.table.raw import Raw, Remark, is_number
 from rig.importers.table.raw import checked as with_samples
 from rig.importers.table.runs import recordings
 from rig.log.order import by_number
@@ -39,11 +39,7 @@ READERS: Mapping[str, Callable[[Path, Layout], Raw]] = {
 
 
 def open_table(path: Path, mapping: ColumnMapping) -> Campaign:
-    """Read the runs of a table into a campaign.
-
-    Args:
-        path: A file, or a folder of files.
-        mapping: Which column is which channel, and where runs begin.
+    """Read the runs of a table, a file or a folder of files, into a campaign.
 
     Raises:
         UsageError: The path does not exist.
@@ -57,11 +53,7 @@ def read_runs(path: Path, mapping: ColumnMapping, remarks: list[Remark]) -> Iter
     """Yield the runs of a table, one file in memory at a time, without the check of derivatives.
 
     Of files in several folders, the name of a run begins with those of its file: `monday-run1`.
-
-    Args:
-        path: A file, or a folder of files.
-        mapping: The mapping.
-        remarks: Gets a sentence on everything that was assumed, left out or filled in.
+    `remarks` gets a sentence on everything that was assumed, left out or filled in.
     """
     taken: set[str] = set()
     files = files_at(path, mapping)
@@ -88,22 +80,18 @@ def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:
         raise UsageError(f"There is no file or folder {path}.", fix="Check the path.")
     if path.is_file():
         return [path]
-    pattern = mapping.data.files
-    if pattern:
+    if pattern := mapping.data.files:
         found = [file for file in path.glob(pattern) if file.is_file()]
+        why = f"The pattern is files, {mapping.where('files')}."
     else:
-        side = mapping.data.side_file
-        found = [
-            file
-            for file in path.iterdir()
-            if file.suffix.lower() in READERS and file.name != Path(side).name
-        ]
+        side = Path(mapping.data.side_file).name
+        known = [file for file in path.iterdir() if file.suffix.lower() in READERS]
+        found = [file for file in known if file.name != side]
+        why = f"Known kinds are {', '.join(READERS)}."
     if not found:
         raise UsageError(
             f"{path} has no file {pattern or 'of a known kind'}.",
-            f"Known kinds are {', '.join(READERS)}."
-            if not pattern
-            else f"The pattern is files, {mapping.where('files')}.",
+            why,
             'Name a file, or state files in [data]; of files in folders, files = "*/*.csv".',
         )
     return sorted(found, key=lambda file: by_number(str(file.relative_to(path))))
@@ -140,7 +128,11 @@ def _named_in(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
             f"{where}: the name {file.name!r} does not match {pattern!r}.",
             fix="Correct file_name, or choose files with files = PATTERN.",
         )
-    return {name: _number(text) for name, text in found.groupdict().items() if text is not None}
+    return {
+        name: float(text) if is_number(text) else text
+        for name, text in found.groupdict().items()
+        if text is not None
+    }
 
 
 def _beside(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
@@ -167,10 +159,3 @@ def _beside(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
         )
     values = {key: column[lines[0]] for key, column in side.columns.items() if key != "file"}
     return {k: float(v) if v.dtype.kind in "fiu" else str(v) for k, v in values.items()}
-
-
-def _number(text: str) -> float | str:
-    try:
-        return to_number(text)
-    except ValueError:
-        return text

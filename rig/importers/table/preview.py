@@ -120,21 +120,17 @@ class Preview:
 
 
 def preview(recordings: Sequence[Recording], remarks: Sequence[Remark], rows: int = 5) -> Preview:
-    """Return a look at the runs of a table.
+    """Return a look at the runs of a table, at least one, and at the first rows of the first run.
 
-    Args:
-        recordings: The runs, at least one, not yet checked against their derivatives.
-        remarks: What reading them remarked.
-        rows: Samples shown of the first run.
+    The runs are not yet checked against their derivatives; `remarks` is what reading them remarked.
     """
-    names = list(dict.fromkeys(name for r in recordings for name in r.columns))
-    views = []
-    for name in names:
-        parts = [r[name] for r in recordings if name in r]
-        views.append(_channel(name, parts))
+    names = dict.fromkeys(name for r in recordings for name in r.columns)
+    views = [_channel(name, [r[name] for r in recordings if name in r]) for name in names]
     first = recordings[0]
     shown = {n: np.asarray(first[n])[:rows].tolist() for n in ("time_s", *first.columns)}
-    together = [(r.name, text) for r in recordings for text in _contradictions(r)]
+    together = [
+        (r.name, wrong) for r in recordings for pair in pairs(r) if (wrong := fault(r, *pair))
+    ]
     return Preview(
         tuple(_run(recording) for recording in recordings),
         tuple(views),
@@ -160,10 +156,6 @@ def _grouped(remarks: Sequence[Remark], noun: str) -> Iterator[str]:
             yield f"{text} ({len(same)} {noun})"
         else:
             yield f"{place}: {text} ({counted(len(same) - 1, 'other')} alike)"
-
-
-def _contradictions(recording: Recording) -> Iterator[str]:
-    return filter(None, (fault(recording, name, slope) for name, slope in pairs(recording)))
 
 
 def _run(recording: Recording) -> RunView:

@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -87,20 +88,18 @@ def nested(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, An
             yield f"{above}{name}", value
 
 
-def to_number(text: str) -> float:
-    """Return a cell as a number; unlike `float`, an underscore is not part of one.
-
-    Raises:
-        ValueError: It is not a number.
-    """
-    if "_" in text:
-        raise ValueError(text)
-    return float(text)
+def is_number(text: str) -> bool:
+    """Whether a cell is a number; unlike in `float`, an underscore is not part of one."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return "_" not in text
 
 
 def numbers_or_text(cells: list[str]) -> Values:
     """Return cells as float64; an empty one is not a number; text if any is neither."""
-    try:
-        return np.array([to_number(cell) if cell.strip() else np.nan for cell in cells])
-    except ValueError:
-        return np.array([cell.strip() for cell in cells])
+    with suppress(ValueError):
+        if not any("_" in cell for cell in cells):
+            return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+    return np.array([cell.strip() for cell in cells])

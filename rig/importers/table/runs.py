@@ -26,10 +26,7 @@ KEPT_OF_A_LAP = 0.5
 def recordings(samples: Samples, mapping: Mapping, remarks: list[Remark]) -> Iterator[Recording]:
     """Yield the runs of a file, each on a clock that begins at 0.
 
-    Args:
-        samples: The file in SI units.
-        mapping: The mapping.
-        remarks: Gets a sentence on everything that is left out or filled in.
+    `remarks` gets a sentence on everything that is left out or filled in.
 
     Raises:
         DataError: Time goes back inside a run, or a condition changes inside one.

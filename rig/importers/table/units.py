@@ -146,12 +146,7 @@ def _word(word: str, text: str) -> tuple[float, dict[str, int], int]:
 def conversion(unit: str, name: str) -> Unit | None:
     """Return how values in a unit become the SI unit that a channel's name ends in.
 
-    Args:
-        unit: Unit of the values; `count` fits only a ratio.
-        name: Name of the channel, such as `motor_angle_rad`.
-
-    Returns:
-        The conversion, or None where the unit has another dimension than the channel.
+    None where the unit has another dimension than the channel. `count` fits only a ratio.
 
     Raises:
         NotAUnitError: The unit cannot be read.
@@ -166,13 +161,8 @@ def conversion(unit: str, name: str) -> Unit | None:
 def stated_in_name(column: str, name: str) -> str:
     """Return the unit at the end of a column's name, where it is not the unit of its channel.
 
-    Args:
-        column: Name of the column, such as `angle_deg`, `I/mA` or `speed (rpm)`.
-        name: Name of the channel, such as `motor_angle_rad`.
-
-    Returns:
-        The unit; nothing where the name ends in none, in that of the channel, or in one of another
-        dimension that may be a word.
+    Such as of `angle_deg`, `I/mA` or `speed (rpm)`; nothing where the name ends in none, in that of
+    the channel, or in one of another dimension that may be a word.
     """
     for stated in _candidates(column):
         with suppress(NotAUnitError, UnknownUnitError):
