@@ -191,10 +191,13 @@ def _sine(time_s: FloatArray, angle_rad: FloatArray) -> Sine | None:
     phase = float(np.angle(spectrum[line])) + np.pi / 2
     frequency = line / (padded * period_s * step)
     start = [frequency, float(y.mean()), math.sqrt(2 * variance), phase]
-    found, *_ = leastsq(lambda p: Sine(*p).angle_rad(t) - y, start, full_output=True)
+
+    def off(values: FloatArray) -> FloatArray:
+        return Sine(*values).angle_rad(t) - y
+
+    found, *_ = leastsq(off, start, full_output=True)
     frequency, centre, amplitude, phase = map(float, found)
-    rest = y - Sine(frequency, centre, amplitude, phase).angle_rad(t)
-    if frequency * t[-1] < 0.9 or 1.0 - float(np.var(rest)) / variance < SINE_SHARE_RATIO:
+    if frequency * t[-1] < 0.9 or 1.0 - float(np.var(off(found))) / variance < SINE_SHARE_RATIO:
         return None
     phase += (amplitude < 0) * np.pi - 2 * np.pi * frequency * float(time_s[0])
     return Sine(frequency, centre, abs(amplitude), phase)

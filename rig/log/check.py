@@ -141,7 +141,7 @@ def logs_in(path: Path) -> list[Path]:
 
 
 def looks_like_log(path: Path) -> bool:
-    """Say from name and first bytes whether a file is a log."""
+    """Whether a file is a log, by its name and first bytes."""
     if not path.name.endswith((".mcap", f".mcap{PART_SUFFIX}")) or not path.is_file():
         return False
     with path.open("rb") as file:

@@ -15,16 +15,18 @@ from rig.log.run import CONFIG, SIMULATED, RunEnd, RunInfo
 from rig.log.streams import SAMPLE, sample_stream
 from rig.log.writer import LogWriter
 
+SHARED = (
+    *("name", "rig", "instrument", "conditions", "notes", "started_at_ns", "calibrations"),
+    *("source", "excluded"),
+)
+"""What a recording and the metadata of a log hold under the same names."""
+
 
 def log_times_ns(time_s: FloatArray, started_at_ns: int | None) -> NDArray[np.uint64]:
     """Return the log time of each sample: the start of the run plus the device's time.
 
     A run whose start is not known counts from its own zero, or from its first sample if that lies
-    before it: MCAP has no times before the epoch.
-
-    Args:
-        time_s: Device time, s, shape (n,).
-        started_at_ns: Start of the run, ns since the Unix epoch, or None.
+    before it: MCAP has no times before the epoch. Both times are of shape (n,).
 
     Raises:
         DataError: A time lies before the epoch or too far from it.
@@ -46,18 +48,8 @@ def log_times_ns(time_s: FloatArray, started_at_ns: int | None) -> NDArray[np.ui
 
 def run_info(recording: Recording) -> RunInfo:
     """Return the metadata of a recording about its run."""
-    return RunInfo(
-        name=recording.name,
-        rig=recording.rig,
-        instrument=recording.instrument,
-        conditions=recording.conditions,
-        notes=recording.notes,
-        started_at_ns=recording.started_at_ns,
-        calibrations=recording.calibrations,
-        source=recording.source,
-        excluded=recording.excluded,
-        details={SIMULATED: True} if recording.is_simulated else {},
-    )
+    shared = {name: getattr(recording, name) for name in SHARED}
+    return RunInfo(**shared, details={SIMULATED: True} if recording.is_simulated else {})
 
 
 def write_recording(path: Path, recording: Recording) -> Path:
@@ -71,11 +63,10 @@ def write_recording(path: Path, recording: Recording) -> Path:
     rate_hz = recording.sample_rate_hz if len(recording) > 1 else None
     stream = sample_stream(tuple(recording.columns), rate_hz)
     log_time_ns = log_times_ns(recording.time_s, recording.started_at_ns)
-    sequence = np.arange(len(recording), dtype=np.uint32)
     rows: dict[str, NDArray[np.generic]] = {
         "time_s": recording.time_s,
         **recording.columns,
-        "sequence": sequence,
+        "sequence": np.arange(len(recording), dtype=np.uint32),
         "flags": recording.flags,
     }
     writer = LogWriter(path, run_info(recording), [stream])
@@ -94,10 +85,7 @@ def recording_from_log(log: LogFile) -> Recording:
     A device's sample that is flagged flags the run's samples at its time.
 
     A run that did not end as planned has a remark in its notes. One whose log was not closed, or is
-    damaged, is excluded from evidence, with the reason.
-
-    Args:
-        log: A log with the topic `/rig/sample`; read tolerantly if it is damaged.
+    damaged and was read tolerantly, is excluded from evidence, with the reason.
 
     Raises:
         DataError: The log has no samples in SI units, what is known about its run is lost, or it
@@ -120,23 +108,20 @@ def recording_from_log(log: LogFile) -> Recording:
         )
     channels = [f.name for f in topic.stream.fields if f.dtype == "float64" and f.name != "time_s"]
     run = log.run
+    shared = {name: getattr(run, name) for name in SHARED} | {
+        "notes": _notes(log, run),
+        "source": run.source or str(log.path),
+        "excluded": exclusion(log),
+    }
     further, further_flags = device_columns(log)
     return Recording(
-        name=run.name,
         time_s=topic.rows["time_s"],
         columns={**further, **{name: topic.rows[name] for name in channels}},
         flags=topic.rows["flags"].astype(np.uint8) | further_flags,
-        conditions=run.conditions,
-        rig=run.rig,
-        instrument=run.instrument,
-        notes=_notes(log, run),
         marks=log.marks,
         stretches=log.stretches,
-        started_at_ns=run.started_at_ns,
-        calibrations=run.calibrations,
-        source=run.source or str(log.path),
-        excluded=exclusion(log),
         is_simulated=bool(run.details.get(SIMULATED)) or _has_simulated_logger(log),
+        **shared,
     )
 
 

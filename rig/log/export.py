@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +49,7 @@ def export_log(
     force: bool = False,
     calibrations: CalibrationSet | None = None,
 ) -> list[Path]:
-    """Export a log, one file for each topic.
+    """Export a log, one file for each topic, and return the files.
 
     Every file has the column `log_time_ns` (ns since the Unix epoch, or since the run's start when
     that is not known) and one column for each field, named with its unit.
@@ -62,9 +61,6 @@ def export_log(
         topic: The one topic to export; all when None.
         force: Overwrite files that are there.
         calibrations: Make the SI samples again from the raw counts with these; as recorded if None.
-
-    Returns:
-        The files written.
 
     Raises:
         ExportExistsError: A file is there already and `force` is False; nothing is written then.
@@ -130,24 +126,6 @@ def _columns(topic: Topic) -> Columns:
     return {"log_time_ns": topic.log_time_ns, **fields}
 
 
-def _table(topic: Topic) -> Any:
-    """Return the topic as an Arrow table whose fields carry unit and description."""
-    try:
-        import pyarrow as pa
-    except ImportError as error:
-        raise MissingExtraError(
-            "Parquet needs pyarrow, which is not installed.", "CSV and NPZ do not.", "parquet"
-        ) from error
-
-    columns = {name: pa.array(values) for name, values in _columns(topic).items()}
-    notes = {
-        "log_time_ns": {"unit": "ns", "description": "log time"},
-        **{f.name: {"unit": f.unit, "description": f.description} for f in topic.stream.fields},
-    }
-    schema = [pa.field(name, values.type, metadata=notes[name]) for name, values in columns.items()]
-    return pa.table(list(columns.values()), schema=pa.schema(schema))
-
-
 def _write_csv(path: Path, topic: Topic) -> None:
     columns = _columns(topic)
     with path.open("w", encoding="ascii", newline="\n") as file:
@@ -158,9 +136,21 @@ def _write_csv(path: Path, topic: Topic) -> None:
 
 
 def _write_parquet(path: Path, topic: Topic) -> None:
-    table = _table(topic)
-    from pyarrow import parquet
-
+    """Write an Arrow table whose fields carry unit and description."""
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        raise MissingExtraError(
+            "Parquet needs pyarrow, which is not installed.", "CSV and NPZ do not.", "parquet"
+        ) from error
+    notes = {
+        "log_time_ns": {"unit": "ns", "description": "log time"},
+        **{f.name: {"unit": f.unit, "description": f.description} for f in topic.stream.fields},
+    }
+    columns = {name: pa.array(values) for name, values in _columns(topic).items()}
+    schema = [pa.field(name, values.type, metadata=notes[name]) for name, values in columns.items()]
+    table = pa.table(list(columns.values()), schema=pa.schema(schema))
     parquet.write_table(table, path, compression="zstd")
 
 

@@ -65,7 +65,6 @@ def _refuse_out_of_range(stream: Stream, name: str, column: NDArray[np.generic])
 
 
 def _refuse_unflagged(stream: Stream, payload: NDArray[np.void]) -> None:
-    """Refuse a message with a value that is not finite and has no flag."""
     names = [field.name for field in stream.fields]
     bad = np.zeros(payload.size, bool)
     for field in stream.fields:

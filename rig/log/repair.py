@@ -58,9 +58,7 @@ def repair_log(path: Path, out: Path | None = None) -> RepairReport:
 
     A log that is not damaged is left alone; samples that were never recorded cannot be repaired.
 
-    Args:
-        path: The damaged log.
-        out: The new file; `repaired_path` when None.
+    The new file is `out`, or `repaired_path` when that is None.
 
     Raises:
         RepairError: Nothing is readable, or the log is not one of ours.

@@ -7,7 +7,7 @@ the walk looks for the next place where it succeeds, so one damaged length does 
 import io
 import struct
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -104,12 +104,9 @@ class Skeleton:
 
 
 def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
-    """Walk all records of a file.
+    """Walk all records of a file, given as its bytes; the path is for the error.
 
-    Args:
-        buffer: The bytes of the file.
-        path: Its path, for the error.
-        checksums: Check the CRC of the data section, which reads the whole file.
+    With `checksums` the CRC of the data section is checked, which reads the whole file.
 
     Raises:
         NotALogError: It contains no MCAP record.
@@ -211,7 +208,7 @@ def _torn_chunk(buffer: memoryview, start: int) -> ChunkRef | None:
     if chunk is None or chunk.data.start >= len(buffer):
         return None
     data = range(chunk.data.start, min(chunk.data.stop, len(buffer)))
-    return ChunkRef(start, data, chunk.compression, chunk.unpacked_bytes, chunk.crc, torn=True)
+    return replace(chunk, data=data, torn=True)
 
 
 def _next_record(buffer: memoryview, start: int) -> int:

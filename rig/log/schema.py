@@ -168,13 +168,9 @@ class Stream:
     def from_definition(
         cls, topic: str, message_type: str, text: str, rate_hz: float | None = None
     ) -> "Stream":
-        """Return the stream a ROS 2 definition describes.
+        """Return the stream that a ROS 2 definition, as `schema_text` writes it, describes.
 
-        Args:
-            topic: Topic of the channel.
-            message_type: ROS 2 type name.
-            text: Definition, as `schema_text` writes it; comments may be missing.
-            rate_hz: Expected rate, Hz.
+        Its comments may be missing.
 
         Raises:
             LayoutError: The definition is not of fixed size, or needs padding.
@@ -183,9 +179,8 @@ class Stream:
         for line in text.splitlines():
             if not line.strip() or line.lstrip().startswith("#"):
                 continue
-            match = _LINE.fullmatch(line.strip())
-            if match is None:
-                match = _LINE.fullmatch(line.partition("#")[0].strip())
+            bare = line.partition("#")[0]
+            match = _LINE.fullmatch(line.strip()) or _LINE.fullmatch(bare.strip())
             if match is None:
                 raise LayoutError(f"{topic}: {line.strip()!r} is not a field of fixed size.")
             fields.append(

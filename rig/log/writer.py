@@ -2,9 +2,7 @@
 
 While it is recorded a log is called `NAME.mcap.part`; a clean close renames it to `NAME.mcap`. So a
 file called `.mcap` is always whole, and the `.part` file of a killed recorder can be examined by
-`rig log check` and recovered by `rig log repair`. Recording to a temporary folder
-would lose the file from sight, and recording to the final name would let a torn file pass for a
-whole one.
+`rig log check` and recovered by `rig log repair`.
 
 What was written is held in memory until it has waited `FLUSH_AFTER_S` or spans that much data time,
 then it goes to the operating system as one chunk for each stream. What the operating system has,
@@ -55,7 +53,8 @@ class LogWriter:
 
     Use it as a context manager. Leaving the block closes the log as clean; leaving it by an
     exception closes it too, with the exception as the reason why the run is not clean. `close` and
-    `discard` do it by hand.
+    `discard` do it by hand. Each call raises LogWriteError where the operating system refuses the
+    data.
 
     Args:
         path: Path of the log, ending in `.mcap`.
@@ -68,7 +67,6 @@ class LogWriter:
         LogExistsError: There is a log or a part of one at the path.
         UsageError: The path does not end in `.mcap`, or two streams share a topic.
         DataError: The run's metadata cannot be written.
-        LogWriteError: The file cannot be made.
     """
 
     def __init__(
@@ -123,10 +121,8 @@ class LogWriter:
     def __exit__(self, kind: type[BaseException] | None, error: object, _: object) -> None:
         if self._closed:
             return
-        if kind is not None:
-            self.close(RunEnd(clean=False, reason=f"{kind.__name__}: {error}".strip(": ")))
-        else:
-            self.close()
+        reason = "" if kind is None else f"{kind.__name__}: {error}".strip(": ")
+        self.close(RunEnd(clean=kind is None, reason=reason))
 
     def write(self, topic: str, rows: Rows, log_time_ns: ArrayLike) -> None:
         """Take a block of messages; it is in the operating system within `MAX_LOSS_S`.
@@ -143,7 +139,6 @@ class LogWriter:
             UnflaggedSampleError: A value is not finite and the message's flags are 0.
             DataError: Fields are missing, unknown, of different lengths or out of range.
             UsageError: The log has no such topic.
-            LogWriteError: The operating system refused the data.
         """
         if topic not in self._streams:
             raise UsageError(
@@ -175,11 +170,7 @@ class LogWriter:
         return True
 
     def flush(self) -> None:
-        """Hand everything written so far to the operating system.
-
-        Raises:
-            LogWriteError: It refused the data.
-        """
+        """Hand everything written so far to the operating system."""
         pending, self._pending = self._pending, {}
         with self._giving_to_system():
             for topic, blocks in pending.items():
@@ -196,23 +187,13 @@ class LogWriter:
             self.add_metadata(*to_metadata(record))
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
-        """Write a metadata record of any name at once.
-
-        Raises:
-            LogWriteError: The operating system refused the data.
-        """
+        """Write a metadata record of any name at once."""
         with self._giving_to_system():
             self._container.add_metadata(name, data)
             self._file.flush()
 
     def close(self, end: RunEnd | None = None) -> Path:
-        """Write what is known at the end, finish the file, and give it its name.
-
-        Args:
-            end: Metadata of the end; a clean end when None.
-
-        Returns:
-            Path of the log.
+        """Write what is known at the end, a clean one when None, and give the file its name.
 
         Raises:
             LogWriteError: The operating system refused the data; what it took is in the `.part`.
