@@ -30,15 +30,11 @@ class IndexedRun:
 
     Attributes:
         file: Name of the log.
-        name: Name of the run.
-        rig: Name of the rig.
         instrument: Identity of the instrument in words.
         date: When it was started, ISO 8601, UTC; empty if not recorded.
         protocol: Name of the protocol, or the calibration whose raw log it is.
         conditions: Name with unit to value.
-        notes: Operator's notes.
         state: `complete`, or what is wrong with the log.
-        samples: Samples in the log.
         lost: Samples expected and not in the log.
         duration_s: Planned duration, s, or None.
         excluded: Why the run does not count as evidence; empty if it does.
@@ -64,7 +60,6 @@ class IndexedCampaign:
     """A folder of logs.
 
     Attributes:
-        folder: The folder.
         runs: Its runs; of several attempts at a run the one that counts.
         diagnosis: Its latest diagnosis, an object of `rig.diagnosis/1`, or None.
     """
@@ -93,14 +88,9 @@ def campaigns(
     rebuild: bool = False,
     on_folder: Callable[[Path], None] = lambda _: None,
 ) -> list[IndexedCampaign]:
-    """Bring the index up to date and return its campaigns, the newest first.
+    """Bring the index up to date and return the campaigns below a folder, the newest first.
 
-    Args:
-        root: Folder of the campaigns, searched at any depth.
-        index: File of the index.
-        rebuild: Read every log again.
-        on_folder: Called with each folder that is read.
-
+    With `rebuild` every log is read again; `on_folder` is called with each folder that is read.
     Where the index cannot be written, it is made for this call alone.
     """
     known = {} if rebuild else _read(index)

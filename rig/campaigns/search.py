@@ -33,20 +33,14 @@ Comparison = tuple[str, str, str]
 def search(campaigns: Sequence[IndexedCampaign], terms: Sequence[str]) -> list[IndexedCampaign]:
     """Return the campaigns with a run that meets every term, with these runs only.
 
-    Args:
-        campaigns: All campaigns.
-        terms: `NAME=VALUE` and the like compare a field or a condition of a run; other words are
-            looked for in the campaign's folder, fields, notes and findings.
+    `NAME=VALUE` and the like compare a field or a condition of a run; other words are looked for in
+    the campaign's folder, fields, notes and findings.
 
     Raises:
         UsageError: A name that no run has.
     """
-    words, comparisons = [], []
-    for term in terms:
-        if parsed := TERM.fullmatch(term):
-            comparisons.append((parsed[1], parsed[2], parsed[3]))
-        else:
-            words.append(term.lower())
+    comparisons = [(p[1], p[2], p[3]) for term in terms if (p := TERM.fullmatch(term))]
+    words = [term.lower() for term in terms if not TERM.fullmatch(term)]
     _check_names(campaigns, [name for name, _, _ in comparisons])
     found = []
     for campaign in campaigns:
@@ -81,13 +75,8 @@ def _text(run: IndexedRun) -> str:
 
 def _meets(run: IndexedRun, campaign: IndexedCampaign, one: Comparison) -> bool:
     name, sign, text = one
-    value: Any
-    if name == VERDICT:
-        value = verdict(campaign)
-    elif name in FIELDS:
-        value = getattr(run, name)
-    else:
-        value = run.conditions.get(name)
+    known = {**run.conditions, **{field: getattr(run, field) for field in FIELDS}}
+    value: Any = verdict(campaign) if name == VERDICT else known.get(name)
     if value is None:
         return False
     if isinstance(value, str):
@@ -101,9 +90,8 @@ def _meets(run: IndexedRun, campaign: IndexedCampaign, one: Comparison) -> bool:
 
 
 def _check_names(campaigns: Sequence[IndexedCampaign], asked: Sequence[str]) -> None:
-    known = {*FIELDS, VERDICT}
-    for run in (run for campaign in campaigns for run in campaign.runs):
-        known.update(run.conditions)
+    runs = [run for campaign in campaigns for run in campaign.runs]
+    known = {*FIELDS, VERDICT}.union(*(run.conditions for run in runs))
     for name in asked:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)

@@ -27,14 +27,7 @@ def write_tidy(campaign: Campaign, path: Path, format_: ExportFormat, force: boo
     each run's rig, instrument, conditions, calibrations, notes and start in the table's metadata
     under `rig.runs`, as JSON. Beside a CSV both stand in `NAME.csv.json`.
 
-    Args:
-        campaign: The runs; excluded ones are left out.
-        path: File to write.
-        format_: CSV or Parquet.
-        force: Replace a file that is there.
-
-    Returns:
-        The file.
+    Excluded runs are left out. With `force` a file that is there is replaced.
 
     Raises:
         DataError: No run counts, or one is damaged.
@@ -108,23 +101,20 @@ def _tables(campaign: Campaign, schema: Any) -> Iterator[Any]:
 
     for recording in campaign:
         count = len(recording)
-        values: list[Any] = []
+        columns = {
+            RUN: [recording.name] * count,
+            TIME: recording.time_s,
+            FLAGS: recording.flags.astype(np.uint8),
+            **recording.columns,
+        }
         for field in schema:
-            name = field.name
-            if name == RUN:
-                values.append(pa.array([recording.name] * count, pa.string()))
-            elif name == TIME:
-                values.append(pa.array(recording.time_s))
-            elif name == FLAGS:
-                values.append(pa.array(recording.flags.astype(np.uint8)))
-            elif name.startswith(CONDITION):
-                value = recording.conditions.get(name.removeprefix(CONDITION))
-                shown = str(value) if value is not None and field.type == pa.string() else value
-                values.append(pa.array([shown] * count, field.type))
-            else:
-                lacking = np.full(count, np.nan)
-                values.append(pa.array(recording.columns.get(name, lacking)))
-        yield pa.table(values, schema=schema)
+            if field.name.startswith(CONDITION):
+                value = recording.conditions.get(field.name.removeprefix(CONDITION))
+                as_text = value is not None and field.type == pa.string()
+                columns[field.name] = [str(value) if as_text else value] * count
+            elif field.name not in columns:
+                columns[field.name] = np.full(count, np.nan)
+        yield pa.table({name: columns[name] for name in schema.names}, schema=schema)
 
 
 def _writer(path: Path, schema: Any, format_: ExportFormat) -> Any:

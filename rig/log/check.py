@@ -61,13 +61,11 @@ class TopicReport:
     """Result of a check of one stream.
 
     Attributes:
-        topic: Its topic.
         received: Samples in the file.
         expected: Samples that should be there: the largest of the three below and of `received`.
         expected_by_sequence: From the first sequence number to the last; None without them.
         expected_by_plan: From the planned duration and rate; None without a plan.
         expected_by_recorder: What the recorder had counted at the end; None if not recorded.
-        gaps: Missing stretches.
         repeats: Samples whose sequence number does not come after the one before.
         time_steps_back: Samples whose time does not come after the one before.
         not_finite: Samples with a value that is not finite, all of them.
@@ -102,13 +100,9 @@ class LogReport:
     """Result of a check.
 
     Attributes:
-        path: The log.
         run: Name of the run; None when that is lost.
-        verdict: Whether the log is complete, incomplete or damaged.
         closed: Whether the recorder closed the log.
         problems: Faults in words; empty when the log is complete.
-        topics: Findings by stream.
-        damage: Damaged places of the file.
         unchecked_chunks: Chunks that carry no checksum.
     """
 
@@ -161,13 +155,11 @@ def report_on(log: LogFile) -> LogReport:
             damage.append("the recorder did not close the log")
     if log.end is not None and not log.end.clean:
         incomplete.append(f"the run did not end as planned: {log.end.reason or 'no reason given'}")
-    verdict = Verdict.INCOMPLETE if incomplete else Verdict.COMPLETE
-    if damage:
-        verdict = Verdict.DAMAGED
+    sound = Verdict.INCOMPLETE if incomplete else Verdict.COMPLETE
     return LogReport(
         path=log.path,
         run=log.run.name if log.run else None,
-        verdict=verdict,
+        verdict=Verdict.DAMAGED if damage else sound,
         closed=log.end is not None,
         problems=(*damage, *incomplete),
         topics=topics,

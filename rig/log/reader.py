@@ -62,12 +62,9 @@ class LogFile:
     """A log that was read.
 
     Attributes:
-        path: File it was read from.
         library: Program that wrote it.
         run: Metadata of the start, or None when that record is missing.
         end: Metadata of the end, or None when the log was not closed.
-        marks: Operator's marks.
-        stretches: Flagged stretches.
         topics: Topic name to messages; streams without messages are there too.
         attachments: Files carried in the log.
         metadata: Metadata records of other names.

@@ -28,10 +28,7 @@ class RunInfo:
 
     Attributes:
         name: Name of the run, unique in its campaign.
-        rig: Name of the rig.
-        instrument: Identity of the instrument.
         conditions: Constant conditions, SI numbers with the unit in the name, or words.
-        notes: Operator's notes.
         started_at_ns: Start of the run, ns since the Unix epoch, or None when not known.
         duration_s: Planned duration, s, or None when open-ended.
         calibrations: Calibration name to content hash.

@@ -17,18 +17,10 @@ def loop_limits(
     current_limit_a: float,
     tick_s: float,
 ) -> dict[str, Any]:
-    """Return the limits of one motor's position loop.
+    """Return the limits of one motor's position loop: `drivers.teensy.profile.LOOP_LIMIT_NAMES`.
 
-    Args:
-        believed: The configured windows.
-        calibrations: Counts to SI.
-        channels: Names of the channels `motor`, `followed`, `current` and `command`.
-        current_limit_a: Largest measured current.
-        tick_s: Period of a tick.
-
-    Returns:
-        `drivers.teensy.profile.LOOP_LIMIT_NAMES` but the motor's jump; what the rig has no channel
-        for is not limited.
+    The motor's jump is not among them. What the rig has no channel for is not limited. `channels`
+    are the names of the channels `motor`, `followed`, `current` and `command`.
     """
     lines = {role: calibrations.channels.get(name) for role, name in channels.items()}
     motor, followed = lines["motor"], lines["followed"]

@@ -68,18 +68,12 @@ def has_status(status: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
 
 
 def reading_of(
-    batch: SampleBatch,
-    calibrations: CalibrationSet,
-    zeros: Mapping[str, float],
-    first_tick_us: int,
+    batch: SampleBatch, calibrations: CalibrationSet, zeros: Mapping[str, float], first_tick_us: int
 ) -> Reading:
-    """Convert a batch of samples to SI units, with the board's complaints as flags.
+    """Convert a batch of samples, at least one, to SI units, with the board's complaints as flags.
 
-    Args:
-        batch: One or more samples.
-        calibrations: Counts to SI.
-        zeros: Channel to measured zero, counts.
-        first_tick_us: Device clock at the session's first sample, us.
+    `zeros` holds the measured zero of a channel, counts; `first_tick_us` is the device clock at the
+    session's first sample, us.
     """
     status = batch.samples["status"]
     tripped = has_status(status, STATUS_WATCHDOG_TRIPPED | STATUS_LIMIT_TRIPPED)

@@ -51,12 +51,7 @@ def open_recordings(
 
 
 def with_positions(campaign: Campaign, plant: Plant) -> Campaign:
-    """Return a campaign with the position of each axis whose speed alone is read, 0 at the start.
-
-    Args:
-        campaign: The runs.
-        plant: The machine they were recorded on.
-    """
+    """Return a campaign with the position of an axis whose speed alone is read, 0 at the start."""
     if not plant.integrals:
         return campaign
     return Campaign(
@@ -83,9 +78,7 @@ def has_data(file: Path) -> bool:
 def with_motion(campaign: Campaign, models: Sequence[Model]) -> Campaign:
     """Return a campaign with the runs excluded that have too few samples in motion.
 
-    Args:
-        campaign: The runs.
-        models: Declared equations; one whose channels were not recorded decides nothing.
+    A declared equation whose channels were not recorded decides nothing.
     """
     return Campaign.of([_checked(run.recording(), models) for run in campaign.runs])
 

@@ -23,11 +23,7 @@ JUMP_SPEEDS = 4
 
 @dataclass(frozen=True)
 class InCounts:
-    """Limits as the board holds them: in counts of a channel; one the rig has not is not limited.
-
-    Attributes:
-        calibrations: Counts to SI.
-    """
+    """Limits as the board holds them, in counts; a channel that the rig has not is not limited."""
 
     calibrations: CalibrationSet
 
@@ -56,13 +52,8 @@ class InCounts:
 def board_limits(config: Config, calibrations: CalibrationSet, period_s: float = TICK_S) -> Limits:
     """Return the limits the board holds against every sample itself, in its own counts.
 
-    A channel that the rig does not have is not limited.
-
-    Args:
-        config: The configuration.
-        calibrations: Counts to SI.
-        period_s: Time between two samples. The core judges a motion by the ticks that passed, and
-            counts samples.
+    A channel that the rig does not have is not limited. `period_s` is the time between two samples:
+    the core judges a motion by the ticks that passed, and counts samples.
     """
     limits, safety = config.reference_limits, config.safety
     counts = InCounts(calibrations)
@@ -119,12 +110,8 @@ def motor_limits(
 ) -> dict[str, Any]:
     """Return the limits of one motor and of its position loop.
 
-    Args:
-        config: The configuration.
-        calibrations: Counts to SI.
-        channels: Names of the channels `motor`, `followed`, `current` and `command`.
-        max_current_a: Largest measured current.
-        ticks_s: Period of a tick of the core, and of a sample.
+    `channels` are the names of the channels `motor`, `followed`, `current` and `command`; `ticks_s`
+    is the period of a tick of the core, and of a sample.
     """
     safety, counts = config.safety, InCounts(calibrations)
     motor, current = channels["motor"], channels["current"]

@@ -8,11 +8,7 @@ from rig.machines.machine import Machine
 
 
 class SensorMachine(Machine):
-    """A machine without motors.
-
-    Args:
-        rate_hz: Samples a second.
-    """
+    """A machine without motors."""
 
     def __init__(self, rate_hz: float) -> None:
         self.profile = sampled_at(rate_hz)

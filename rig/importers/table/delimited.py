@@ -160,31 +160,32 @@ def _above_samples(
     separator = _separator(path, last, layout)[0]
     decimal = layout.decimal or _decimal([(0, [""]), *_cells([last], 0, separator, "")], separator)
 
-    def cells_of(k: int) -> list[str]:
-        return _cells([lines[k]], 0, separator, "")[0][1]
-
-    width = len(cells_of(own[-2]))
-    held = [c for c, x in enumerate(cells_of(own[-2])) if _is_number(x, decimal)]
-    if width < 2 or not held or len(cells_of(own[0])) == width:
+    cells = _cells([last], 0, separator, "")[0][1]
+    held = [c for c, cell in enumerate(cells) if _is_number(cell, decimal)]
+    width = len(cells)
+    if width < 2 or not held or len(_cells([lines[own[0]]], 0, separator, "")[0][1]) == width:
         return start, []
 
-    def has_names(k: int, in_all: bool) -> bool:
-        cells = cells_of(k)
-        named = [bool(cells[c].strip()) for c in held if len(cells) == width]
-        numbers = any(_is_number(cells[c], decimal) for c in held if len(cells) == width)
-        return any(named) and not numbers and (all(named) or not in_all)
-
-    def is_sample(k: int) -> bool:
-        cells = cells_of(k)
-        read = [_is_number(cells[c], decimal) for c in held if len(cells) == width]
-        return any(read) and all(x or not cells[c].strip() for x, c in zip(read, held, strict=True))
+    def holds(k: int) -> set[str]:
+        """What a line has where the samples have numbers; nothing if it has another width."""
+        cells = _cells([lines[own[k]]], 0, separator, "")[0][1]
+        return {
+            "number" if _is_number(cells[c], decimal) else "text" if cells[c].strip() else "nothing"
+            for c in held
+            if len(cells) == width
+        }
 
     head = min(len(own) - 2, MOST_NOTES)
-    while head and is_sample(own[head - 1]):
+    while head and holds(head - 1) in ({"number"}, {"number", "nothing"}):
         head -= 1
-    has_units = head > 1 and has_names(own[head - 1], False) and has_names(own[head - 2], True)
-    if has_units or (head and has_names(own[head - 1], True)):
-        head -= 2 if has_units else 1
+    if (
+        head > 1
+        and holds(head - 2) == {"text"}
+        and holds(head - 1) in ({"text"}, {"text", "nothing"})
+    ):
+        head -= 2  # names, and below them units
+    elif head and holds(head - 1) == {"text"}:
+        head -= 1
     return own[head], [f"the {own[head] - start} lines above line {own[head] + 1} are left out"]
 
 

@@ -60,13 +60,7 @@ CLIPPED = 0.005
 class ChannelView:
     """One channel over all runs.
 
-    Attributes:
-        name: The channel.
-        unit: Its SI unit.
-        least: Least value.
-        greatest: Greatest value.
-        mean: Mean.
-        wrong: What may be wrong with it, in words.
+    `wrong` is what may be wrong with it, in words.
     """
 
     name: str
@@ -98,8 +92,6 @@ class Preview:
     """A look at a table.
 
     Attributes:
-        runs: Every run.
-        channels: Every channel.
         first: Channel and time to the values of the first samples.
         wrong: What may be wrong with channels together, in words.
         remarks: What was assumed, left out or filled in, in words.
