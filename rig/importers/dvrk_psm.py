@@ -30,6 +30,8 @@ RATES_HZ = (50.0, 100.0, 125.0, 200.0, 250.0, 500.0, 1000.0)
 JOINTS = 7
 COLUMNS = 3 * JOINTS
 PRISMATIC_JOINT = 3
+ANGULAR = ("angle_rad", "velocity_rad_s", "torque_n_m")
+LINEAR = ("position_m", "velocity_m_s", "force_n")
 WRIST = slice(4, 7)
 MOTOR_TO_JOINT: FloatArray = np.array(PSM.wrist_coupling)
 """M of q_dvrk[5:7] = M q_motor[5:7]."""
@@ -86,11 +88,7 @@ def load_run(path: Path) -> Recording:
     torque[WRIST] = np.linalg.solve(MOTOR_TO_JOINT.T, torque[WRIST])
     columns = {}
     for joint in range(1, JOINTS + 1):
-        units = (
-            ("position_m", "velocity_m_s", "force_n")
-            if joint == PRISMATIC_JOINT
-            else ("angle_rad", "velocity_rad_s", "torque_n_m")
-        )
+        units = LINEAR if joint == PRISMATIC_JOINT else ANGULAR
         for unit, block in zip(units, (position, velocity, torque), strict=True):
             columns[f"joint_{joint}_{unit}"] = block[joint - 1]
     return Recording(
@@ -112,10 +110,9 @@ def _sample_rate(path: Path, values: FloatArray) -> tuple[float, str]:
     """
     time_s = np.arange(values.shape[1]) / USUAL_RATE_HZ
     found: dict[int, Relation] = {}
-    for joint, (position, velocity) in enumerate(
-        zip(values[:JOINTS], values[JOINTS : 2 * JOINTS], strict=True), 1
-    ):
-        pair = Recording("pair", time_s, {"angle_rad": position, "velocity_rad_s": velocity})
+    for joint in range(1, JOINTS + 1):
+        motion = {"angle_rad": values[joint - 1], "velocity_rad_s": values[JOINTS + joint - 1]}
+        pair = Recording("pair", time_s, motion)
         one = relation(pair, "angle_rad", "velocity_rad_s")
         if one is not None:
             found[joint] = one
@@ -171,21 +168,16 @@ def _numbers(path: Path, text: str) -> FloatArray:
     for number, line in enumerate(lines, 1):
         fields = line.split(",")
         if len(fields) != COLUMNS:
-            raise _fault(
-                path,
-                number,
-                f"the line has {len(fields)} columns",
-                f"{COLUMNS} (position, velocity and torque of {JOINTS} joints)",
-            )
+            expected = f"{COLUMNS} (position, velocity and torque of {JOINTS} joints)"
+            raise _fault(path, number, f"the line has {len(fields)} columns", expected)
         try:
             rows[number - 1] = [float(field) for field in fields]
         except ValueError as error:
             raise _fault(path, number, str(error), "a number in each column") from None
     bad = ~(np.abs(rows) <= LARGEST).all(axis=1)  # true for NaN and infinity too
     if bad.any():
-        raise _fault(
-            path, int(np.argmax(bad)) + 1, "a value is not finite or absurd", f"|x| <= {LARGEST:g}"
-        )
+        row = int(np.argmax(bad)) + 1
+        raise _fault(path, row, "a value is not finite or absurd", f"|x| <= {LARGEST:g}")
     return np.ascontiguousarray(rows.T)
 
 

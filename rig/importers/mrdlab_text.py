@@ -59,6 +59,13 @@ def looks_like_log(first_bytes: bytes) -> bool:
     return first_bytes[:1] == b"%" and b"Back-end" in first_bytes
 
 
+class _Fault(Exception):  # noqa: N818  an error is made of it where the path is known
+    """What is wrong in a line, and what was expected there."""
+
+    def __init__(self, line: int, what: str, expected: str = "a whole MRDLab log") -> None:
+        super().__init__(line, what, expected)
+
+
 def read_text(path: Path) -> Text:
     """Read and check one log.
 
@@ -75,123 +82,100 @@ def read_text(path: Path) -> Text:
         content = path.read_bytes()
     except OSError as error:
         raise DataError(f"{path} cannot be read: {error.strerror}.") from error
-    lines, start = _header(path, content)
-    columns = _parse(path, content, start, len(lines))
-    _check_range(path, columns, len(lines))
-    columns[TIME] = _seconds(path, columns[TIME], len(lines))
+    try:
+        lines, start = _header(content)
+        columns = _parse(content, start, len(lines))
+        _check_range(columns, len(lines))
+        columns[TIME] = _seconds(columns[TIME], len(lines))
+    except _Fault as fault:
+        line, what, expected = fault.args
+        raise DataError(
+            f"{path}, line {line}: {what}.",
+            f"Expected {expected}. Nothing of the file was imported.",
+            "Restore the file from its source, omit it (fit, diagnose, view: --skip-bad), or name"
+            " the format with --format if it is another one.",
+        ) from None
     return Text("\n".join(lines), columns)
 
 
-def _header(path: Path, content: bytes) -> tuple[list[str], int]:
+def _header(content: bytes) -> tuple[list[str], int]:
     """Return the header lines and the position of the first sample; count, never assume."""
     lines: list[str] = []
     position = 0
     while content[position : position + 1] == b"%":
         end = content.find(b"\n", position)
         if end < 0:
-            raise _fault(path, len(lines) + 1, "the file ends inside its header")
+            raise _Fault(len(lines) + 1, "the file ends inside its header")
         lines.append(content[position + 1 : end].decode("latin-1").strip())
         position = end + 1
     if not lines:
-        raise _fault(path, 1, "there is no header", "header lines that start with %")
+        raise _Fault(1, "there is no header", "header lines that start with %")
     named = lines[-1].split(",")
     if len(named) != len(COLUMNS):
-        raise _fault(
-            path,
-            len(lines),
-            f"the last header line names {len(named)} columns",
-            f"{len(COLUMNS)} columns: {', '.join(name for name, _, _ in COLUMNS)}",
-        )
+        expected = f"{len(COLUMNS)} columns: {', '.join(name for name, _, _ in COLUMNS)}"
+        what = f"the last header line names {len(named)} columns"
+        raise _Fault(len(lines), what, expected)
     for number, (text, (name, word, _)) in enumerate(zip(named, COLUMNS, strict=True), 1):
         if word not in text.lower():
-            raise _fault(
-                path, len(lines), f"column {number} is named {text.strip()!r}", f"{name!r}"
-            )
+            raise _Fault(len(lines), f"column {number} is named {text.strip()!r}", f"{name!r}")
     return lines, position
 
 
-def _parse(path: Path, content: bytes, start: int, header_lines: int) -> FloatArray:
+def _parse(content: bytes, start: int, header_lines: int) -> FloatArray:
     if not content.endswith(b"\n"):
         last = content.rsplit(b"\n", 1)[-1][:40].decode("latin-1")
-        raise _fault(
-            path,
-            content.count(b"\n") + 1,
-            f"the file ends inside the line: {last!r}",
-            f"{len(COLUMNS)} decimal numbers and a line end; the file is truncated",
-        )
+        expected = f"{len(COLUMNS)} decimal numbers and a line end; the file is truncated"
+        what = f"the file ends inside the line: {last!r}"
+        raise _Fault(content.count(b"\n") + 1, what, expected)
     text = np.frombuffer(content, np.uint8, offset=start)
     columns = np.empty((len(COLUMNS), content.count(b"\n", start)))
     row, position = parse_decimals(text, columns)
     if position < text.size:
         line = content[start + position : content.index(b"\n", start + position)]
-        raise _line_fault(path, header_lines + row + 1, line)
+        raise _Fault(header_lines + row + 1, *_wrong_in(line))
     if row < 2:
-        raise _fault(
-            path, header_lines + row + 1, f"the log holds {row} samples", "at least two samples"
-        )
+        raise _Fault(header_lines + row + 1, f"the log holds {row} samples", "at least two samples")
     return columns[:, :row]
 
 
-def _line_fault(path: Path, number: int, line: bytes) -> DataError:
-    """Return the error that names what is wrong in a line that was not parsed."""
+def _wrong_in(line: bytes) -> tuple[str, str]:
+    """Return what is wrong in a line that was not parsed, and what was expected."""
     fields = line.removesuffix(b"\r").split(b",")
     for column, (field, (name, _, _)) in enumerate(zip(fields, COLUMNS, strict=False), 1):
         what = f"column {column} is {field[:40].decode('latin-1')!r}"
         if DECIMAL.fullmatch(field) is None:
-            return _fault(path, number, what, f"a decimal number, {name}")
+            return what, f"a decimal number, {name}"
         if sum(map(field.count, DIGITS)) > MAX_DIGITS:
-            return _fault(path, number, what, f"{name} of at most {MAX_DIGITS} digits")
+            return what, f"{name} of at most {MAX_DIGITS} digits"
     width = len(COLUMNS)
     has = f"{len(fields)}" if len(fields) < width else f"more than {width}"
-    expected = f"{width} decimal numbers with commas between them"
-    return _fault(path, number, f"the line has {has} columns", expected)
+    return f"the line has {has} columns", f"{width} decimal numbers with commas between them"
 
 
-def _check_range(path: Path, columns: FloatArray, header_lines: int) -> None:
+def _check_range(columns: FloatArray, header_lines: int) -> None:
     highest, lowest = columns.max(axis=1), columns.min(axis=1)
     for values, high, low, (name, _, largest) in zip(
         columns, highest, lowest, COLUMNS, strict=True
     ):
         if high > largest or low < -largest:
             row = int(np.argmax(np.abs(values) > largest))
-            raise _fault(
-                path,
-                header_lines + row + 1,
-                f"{name} is {values[row]:g}",
-                f"a value between -{largest:g} and {largest:g}",
-            )
+            expected = f"a value between -{largest:g} and {largest:g}"
+            raise _Fault(header_lines + row + 1, f"{name} is {values[row]:g}", expected)
 
 
-def _seconds(path: Path, time: FloatArray, header_lines: int) -> FloatArray:
+def _seconds(time: FloatArray, header_lines: int) -> FloatArray:
     """Return time in seconds: the header has ms, the values step by 0.001; use the step."""
     steps: NDArray[np.float64] = np.diff(time)
     if steps.min() <= 0:
         row = int(np.argmax(steps <= 0)) + 1
-        raise _fault(
-            path,
-            header_lines + row + 1,
-            f"time goes from {time[row - 1]:g} to {time[row]:g}",
-            "a time that increases at every line",
-        )
+        what = f"time goes from {time[row - 1]:g} to {time[row]:g}"
+        raise _Fault(header_lines + row + 1, what, "a time that increases at every line")
     step = float(np.median(steps[:1001]))
     for unit_s in (1.0, 1e-3):
         if abs(step * unit_s / STEP_S - 1) < STEP_TOLERANCE_RATIO:
             return time if unit_s == 1.0 else time * unit_s
-    raise _fault(
-        path,
-        header_lines + 2,
-        f"time steps by {step:g}",
-        "steps of 1 ms, written as 0.001 (s) or as 1 (ms)",
-    )
-
-
-def _fault(path: Path, line: int, what: str, expected: str = "a whole MRDLab log") -> DataError:
-    return DataError(
-        f"{path}, line {line}: {what}.",
-        f"Expected {expected}. Nothing of the file was imported.",
-        "Restore the file from its source, omit it (fit, diagnose, view: --skip-bad), or name the"
-        " format with --format if it is another one.",
-    )
+    expected = "steps of 1 ms, written as 0.001 (s) or as 1 (ms)"
+    raise _Fault(header_lines + 2, f"time steps by {step:g}", expected)
 
 
 _POWERS = 10.0 ** np.arange(MAX_DIGITS + 1)
