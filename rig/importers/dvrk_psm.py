@@ -73,9 +73,8 @@ IMPORTER = PsmImporter()
 def load_run(path: Path) -> Recording:
     """Read one file as a recording.
 
-    Returns:
-        Channels `joint_<i>_angle_rad`, `joint_<i>_velocity_rad_s` and `joint_<i>_torque_n_m` of the
-        joints 1 to 7; joint 3 has `joint_3_position_m`, `joint_3_velocity_m_s`, `joint_3_force_n`.
+    Its channels are `joint_<i>_angle_rad`, `joint_<i>_velocity_rad_s` and `joint_<i>_torque_n_m` of
+    joints 1 to 7; joint 3 has `joint_3_position_m`, `joint_3_velocity_m_s`, `joint_3_force_n`.
 
     Raises:
         DataError: The file is damaged; names the file, the line and what was expected.
@@ -137,7 +136,6 @@ def _sample_rate(path: Path, values: FloatArray) -> tuple[float, str]:
 
 
 def _opened(path: Path) -> BinaryIO:
-    """Open a file for reading, unpacked."""
     return cast(BinaryIO, lzma.open(path)) if path.suffix.lower() == ".xz" else path.open("rb")
 
 

@@ -113,7 +113,6 @@ def _inflate(data: bytes) -> bytes:
 
 
 def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Value]:
-    """Return name and value of one array."""
     if not data:
         return "", np.empty(0)  # MATLAB writes an empty field so
     if depth > MAX_DEPTH:

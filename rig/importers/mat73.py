@@ -42,7 +42,6 @@ def read_mat73(path: Path) -> dict[str, Value]:
 
 
 def _fields(group: Any, depth: int = 0) -> dict[str, Value]:
-    """Return the members of a group by name."""
     if depth > MAX_DEPTH:
         raise ValueError(f"structs are nested more than {MAX_DEPTH} deep")
     return {name: _value(group[name], depth) for name in group if not name.startswith("#")}

@@ -95,7 +95,6 @@ def _first_bytes(path: Path) -> bytes:
 
 
 def _companions(folder: Path) -> str:
-    """Return the text of the folder's read-me files, for the notes."""
     texts = [
         file.read_text("latin-1").strip()
         for file in sorted(folder.iterdir())

@@ -4,12 +4,12 @@ Header text about the tool can be left over from an earlier session, so the fold
 lot is believed only where the header's tool number agrees with the folder's.
 
 The side of the jaw decides which way closes it. A right jaw turns the other way: every measured and
-commanded column but the load's command has the opposite sign. Two sources state the side. The
-names do: the folder (`..._L_...`, `..._R_...`) and the header ("left spindle", "right spindle").
-The signs do as well: at a positive command the load motor pulls the jaw open, so torque at the jaw
-keeps one sign for the whole run, negative as logged on a left jaw. On the public runs of left jaws
-its mean is 2.8 to 21 times its standard deviation. A negative command shows no side: some right
-jaws were logged with one, and on a left jaw it pushes the jaw shut.
+commanded column but the load's command has the opposite sign. The names state the side, in the
+folder (`..._L_...`) and the header ("left spindle"), and so do the signs: at a positive command the
+load motor pulls the jaw open, so torque at the jaw keeps one sign for the whole run, negative as
+logged on a left jaw. On the public runs of left jaws its mean is 2.8 to 21 times its standard
+deviation. A negative command shows no side: some right jaws were logged with one, and on a left jaw
+it pushes the jaw shut.
 
 Signs that contradict the names are refused, since a wrong side exchanges opening and closing. The
 header's sentence is left over from earlier sessions in some folders, and then it names the left
@@ -58,13 +58,7 @@ DRIVEN = {
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What is known of a run from its names and signs.
-
-    Attributes:
-        instrument: Identity of the instrument, with its side.
-        conditions: `wrist_roll_rad`, `wrist_pitch_rad` and `jaw_stop_index` where available.
-        remarks: How the identity was found, one sentence each.
-    """
+    """What is known of a run from its names and signs, and how that was found, in sentences."""
 
     instrument: Instrument
     conditions: dict[str, float | str]

@@ -1,10 +1,8 @@
 """Open recordings of any known format: a file, a folder or an archive becomes a campaign.
 
-An importer is an object in the entry point group `rig.importers`. It recognises the format of a
-path without reading the samples, and opens it as a campaign of run handles. Whatever the
-format, a run that is read is checked for channels that contradict their derivatives, and the runs
-are of one rig and one instrument: the first run that is read sets them, the first that differs is
-refused.
+An importer is an object in the entry point group `rig.importers`. Whatever the format, a run that
+is read is checked for channels that contradict their derivatives, and the runs are of one rig and
+one instrument: the first run that is read sets them, the first that differs is refused.
 """
 
 from collections import Counter
@@ -34,13 +32,15 @@ class MixedRunsError(DataError):
 
 @runtime_checkable
 class Importer(Protocol):
-    """Interface of a format's importer."""
+    """Interface of a format's importer.
+
+    Attributes:
+        name: Short name of the format, as typed on the command line.
+        description: One line on the format.
+    """
 
     name: str
-    """Short name of the format, as typed on the command line."""
-
     description: str
-    """One line on the format."""
 
     def recognises(self, path: Path) -> bool:
         """Whether the path looks like this format, from names and first lines only."""
@@ -83,9 +83,7 @@ def _loaded(entry: EntryPoint) -> Importer:
 
 
 def open_campaign(path: Path, format_name: str | None = None, skip_bad: bool = False) -> Campaign:
-    """Open recordings of any known format.
-
-    The runs are of one rig and one instrument: reading one that is not raises MixedRunsError.
+    """Open a file, folder or archive of any known format.
 
     Args:
         path: File, folder or archive.
@@ -95,7 +93,8 @@ def open_campaign(path: Path, format_name: str | None = None, skip_bad: bool = F
     Raises:
         UsageError: The path does not exist, or the format is not known.
         DataError: No importer recognises the path, or the one that does finds damage. Reading a
-            run raises it where a channel and its derivative differ by a factor, a sign or a shift.
+            run raises it where a channel and its derivative contradict one another, and
+            MixedRunsError where it is of another rig or instrument.
     """
     campaign = _importer(path, format_name).open(path)
     first: dict[str, tuple[str, str]] = {}
@@ -152,7 +151,6 @@ def _importer(path: Path, format_name: str | None) -> Importer:
 
 
 def _content(path: Path) -> str:
-    """Describe the files at a path."""
     if not path.is_dir():
         return ""
     endings = Counter(file.suffix or "no ending" for file in path.iterdir() if file.is_file())
@@ -189,7 +187,6 @@ def left_out(path: Path, campaign: Campaign) -> list[str]:
 
 
 def _format_of(file: Path) -> str | None:
-    """Return the name of the importer that recognises a file."""
     return next((name for name, one in importers().items() if one.recognises(file)), None)
 
 

@@ -96,7 +96,6 @@ def _about(recording: Recording) -> dict[str, Any]:
 
 
 def _tables(campaign: Campaign, schema: Any) -> Iterator[Any]:
-    """Yield each run as a table of the schema."""
     import pyarrow as pa
 
     for recording in campaign:

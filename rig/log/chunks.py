@@ -108,12 +108,7 @@ def _read_batch(
 def _read_arrays(
     buffer: memoryview, batch: list[ChunkRef], streams: dict[int, Stream]
 ) -> dict[int, Bytes]:
-    """Read chunks that hold messages of one channel each.
-
-    Raises:
-        DataError: A chunk is damaged, or holds something else.
-        zstandard.ZstdError: A chunk cannot be unpacked.
-    """
+    """Read chunks that hold messages of one channel each; an error where one does not."""
     parts: dict[int, list[bytes]] = defaultdict(list)
     decompressor = zstandard.ZstdDecompressor()
     for chunk in batch:
@@ -159,12 +154,7 @@ def _read_singly(
 
 
 def _unpack(buffer: memoryview, chunk: ChunkRef, decompressor: zstandard.ZstdDecompressor) -> bytes:
-    """Return a chunk's bytes, checked; of a torn chunk, those that can be had.
-
-    Raises:
-        DataError: The chunk does not match its checksum or its size.
-        zstandard.ZstdError: It cannot be unpacked.
-    """
+    """Return a chunk's bytes, checked by size and sum; of a torn chunk, those that can be had."""
     packed = buffer[chunk.data.start : chunk.data.stop]
     if chunk.compression == "lz4":
         raise DataError("it is compressed with lz4, which is not supported")

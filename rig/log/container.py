@@ -6,8 +6,7 @@ written by the `mcap` package. Layout of the file:
 
     magic, header, metadata, schemas and channels (outside the chunks, so that no damaged chunk
     takes them along), attachments, chunks of one channel each with their message index, data end
-    with the CRC of everything before it, then the summary (schemas and channels again, statistics,
-    indexes), footer, magic.
+    with the CRC of everything before it, summary, footer, magic.
 
 Source: MCAP format specification, https://mcap.dev/spec.
 """
@@ -52,13 +51,7 @@ _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 @dataclass(frozen=True)
 class Attached:
-    """A file carried in the log.
-
-    Attributes:
-        name: File name.
-        media_type: Media type, such as `application/toml`.
-        data: Its bytes.
-    """
+    """A file carried in the log; its media type is such as `application/toml`."""
 
     name: str
     media_type: str
@@ -90,11 +83,7 @@ def _uninterrupted() -> Iterator[None]:
 class Container:
     """An MCAP file being written to an open binary file.
 
-    Nothing is held back: each call writes its bytes to the file before it returns.
-
-    Args:
-        file: Open binary file, empty, written from its start.
-        library: Name of the writing program.
+    Nothing is held back: each call writes its bytes to the file, empty at first, before it returns.
     """
 
     def __init__(self, file: BinaryIO, library: str) -> None:
@@ -172,12 +161,7 @@ class Container:
         )
 
     def add_chunk(self, channel: int, messages: NDArray[np.void]) -> None:
-        """Write message records of one channel as one compressed chunk and its index.
-
-        Args:
-            channel: Channel number.
-            messages: Records of the stream's `record_dtype`, shape (n,), n >= 1.
-        """
+        """Write records of one stream, shape (n,), n >= 1, as a compressed chunk and its index."""
         unpacked = messages.tobytes()
         packed = self._compressor.compress(unpacked)
         first, last = int(messages["log_time"].min()), int(messages["log_time"].max())
@@ -221,10 +205,21 @@ class Container:
         """Write the data end and the summary; nothing may be added after it."""
         self._put(encode(mcap.DataEnd(data_section_crc=self._crc)))
         start = self._offset
+        statistics = mcap.Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts=dict(self._counts),
+            chunk_count=len(self._chunks),
+            message_count=sum(self._counts.values()),
+            message_end_time=max((c.message_end_time for c in self._chunks), default=0),
+            message_start_time=min((c.message_start_time for c in self._chunks), default=0),
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        )
         groups: list[tuple[Opcode, Any]] = [
             (Opcode.SCHEMA, self._schemas),
             (Opcode.CHANNEL, self._channels),
-            (Opcode.STATISTICS, [self._statistics()]),
+            (Opcode.STATISTICS, [statistics]),
             (Opcode.CHUNK_INDEX, self._chunks),
             (Opcode.ATTACHMENT_INDEX, self._attachments),
             (Opcode.METADATA_INDEX, self._metadata),
@@ -241,16 +236,3 @@ class Container:
         footer = struct.pack("<BQQQ", Opcode.FOOTER, 20, start, offsets_start)
         crc = zlib.crc32(footer, zlib.crc32(summary))
         self._put(summary + encode(mcap.Footer(start, offsets_start, crc)) + MAGIC)
-
-    def _statistics(self) -> mcap.Statistics:
-        return mcap.Statistics(
-            attachment_count=len(self._attachments),
-            channel_count=len(self._channels),
-            channel_message_counts=dict(self._counts),
-            chunk_count=len(self._chunks),
-            message_count=sum(self._counts.values()),
-            message_end_time=max((c.message_end_time for c in self._chunks), default=0),
-            message_start_time=min((c.message_start_time for c in self._chunks), default=0),
-            metadata_count=len(self._metadata),
-            schema_count=len(self._schemas),
-        )

@@ -93,7 +93,6 @@ def export_log(
 def _targets(
     log: LogFile, export_format: ExportFormat, out: Path | None, *, single: bool
 ) -> dict[str, Path]:
-    """Return the file of each topic."""
     if out is not None and single and not out.is_dir():
         return {next(iter(log.topics)): out}
     folder = log.path.parent if out is None else out

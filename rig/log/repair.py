@@ -24,7 +24,6 @@ class RepairReport:
     """Result of a repair.
 
     Attributes:
-        original: The damaged log, unchanged.
         repaired: The new log, read back and equal to what was recovered; None when there was
             nothing to repair.
         recovered: Topic to the samples recovered.
@@ -87,7 +86,6 @@ def repair_log(path: Path, out: Path | None = None) -> RepairReport:
 
 
 def _write(log: LogFile, report: LogReport, target: Path) -> None:
-    """Write everything readable of a log to a new one."""
     name = repaired_path(log.path).name.removesuffix(".repaired.mcap")
     run = log.run or RunInfo(name, notes="What was known about the run is lost.")
     reason = f"repaired: {report.problems[0]}"

@@ -55,7 +55,6 @@ class Damage:
     Attributes:
         offset: Byte it starts at.
         length: Bytes affected; 0 where something is missing.
-        what: The fault there.
     """
 
     offset: int

@@ -27,7 +27,7 @@ def open_recordings(
     format_name: str | None = None,
     skip_bad: bool = False,
 ) -> Campaign:
-    """Open recordings, those of a foreign table by the machine file's `[data]`.
+    """Open recordings as `open_campaign` does, those of a foreign table by the file's `[data]`.
 
     Args:
         path: File, folder or archive.

@@ -66,16 +66,12 @@ def slide(tmp_path):
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))
-def test_shipped_machines_can_be_declared_and_written_again(name):
+def test_a_shipped_machine_can_be_declared_written_again_and_shown_as_json(name, answered):
     plant = read_machine(Path(name))
     assert declared(plant)
     assert parse(to_toml(plant)) == plant
-
-
-@pytest.mark.parametrize("name", sorted(shipped()))
-def test_a_shipped_machine_is_shown_as_json(name, answered):
     shown = answered("machine show", name)
-    assert shown["machine"]["name"] == read_machine(Path(name)).name
+    assert shown["machine"]["name"] == plant.name
     effects = [effect for equation in shown["equations"] for effect in equation["effects"]]
     assert all(effect["id"] and effect["parameters"] for effect in effects)
 

@@ -136,7 +136,6 @@ def _named_in(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
 
 
 def _beside(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
-    """Return the single values that a side file holds for a file."""
     name = mapping.data.side_file
     if not name:
         return {}

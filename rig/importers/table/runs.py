@@ -141,7 +141,6 @@ def _run(
 def _emptiness(
     time_s: FloatArray, channels: dict[str, FloatArray], empty: NDArray[np.bool_], filled: bool
 ) -> str:
-    """Return a remark on the samples with an empty cell."""
     if filled:
         return f"{int(empty.sum())} samples have an empty cell; each channel is interpolated"
     remark = f"{int(empty.sum())} samples with an empty cell flagged"

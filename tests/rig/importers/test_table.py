@@ -77,16 +77,6 @@ def test_every_format_gives_the_same_samples_in_si_units(tmp_path, machine, kind
     assert run.valid.all()
 
 
-def test_the_command_line_maps_what_a_file_would(tmp_path):
-    flags = [
-        (("columns", "time_s"), "t:ms", "--column time_s=t:ms"),
-        (("columns", "motor_angle_rad"), "enc:deg", "--column motor_angle_rad=enc:deg"),
-    ]
-    (run,) = open_table(write(tmp_path, "csv"), read_mapping(None, flags))
-    np.testing.assert_allclose(run["motor_angle_rad"], np.radians(ANGLE_DEG))
-    assert set(run.columns) == {"motor_angle_rad"}
-
-
 def test_a_table_without_a_head_or_a_clock_is_mapped_by_number_and_rate(tmp_path, machine):
     path = tmp_path / "run.csv"
     np.savetxt(path, np.column_stack([ANGLE_DEG, CURRENT_MA]), delimiter=";")
@@ -96,59 +86,130 @@ def test_a_table_without_a_head_or_a_clock_is_mapped_by_number_and_rate(tmp_path
     assert run.sample_rate_hz == pytest.approx(200)
 
 
+SECONDS = '[data.columns]\ntime_s = "t"\n'
+ANGLE = f'{SECONDS}motor_angle_rad = "enc"\n'
+EVEN = f"[data]\neven_rate_hz = 100\n{MAPPED}"
+TEXT = "t,enc,i\n0,0,100\n10,45,200\n20,90,300\n"
+IN_SI = {"time_s": [0.0, 0.01, 0.02], "motor_current_a": [0.1, 0.2, 0.3]}
+
 READ = {
-    "counts": ("t,enc\n0,0\n0.1,1024\n0.2,4096\n", "motor_angle_rad", '"enc:rev/4096"',
-               [0, np.pi / 2, 2 * np.pi]),
-    "a raw converter": ("t,adc\n0,512\n0.1,612\n0.2,412\n", "motor_current_a",
-                        '{ column = "adc", unit = "mA", gain = 4.88, zero = 512 }',
-                        [0, 0.488, -0.488]),
+    "counts": (
+        "t,enc\n0,0\n0.1,1024\n0.2,4096\n",
+        f'{SECONDS}motor_angle_rad = "enc:rev/4096"',
+        {"motor_angle_rad": [0, np.pi / 2, 2 * np.pi]},
+    ),
+    "a raw converter": (
+        "t,adc\n0,512\n0.1,612\n0.2,412\n",
+        SECONDS + 'motor_current_a = { column = "adc", unit = "mA", gain = 4.88, zero = 512 }',
+        {"motor_current_a": [0, 0.488, -0.488]},
+    ),
     "a counter that starts again": (
-        "t,enc\n0,3072\n0.1,4095\n0.2,1024\n", "motor_angle_rad",
-        '{ column = "enc", unit = "rev/4096", wraps_at = 4096 }',
-        np.array([3072, 4095, 5120]) / 2048 * np.pi),
-    "sign and magnitude": ("t,load\n0,30\n0.1,1054\n0.2,0\n0.3,1024\n", "drive_ratio",
-                           '{ column = "load", gain = 0.001, sign_bit = 1024 }',
-                           [0.03, -0.03, 0.0, 0.0]),
-}  # fmt: skip
-"""A table, a channel, its line in the mapping, and the values that are read."""
+        "t,enc\n0,3072\n0.1,4095\n0.2,1024\n",
+        SECONDS + 'motor_angle_rad = { column = "enc", unit = "rev/4096", wraps_at = 4096 }',
+        {"motor_angle_rad": np.array([3072, 4095, 5120]) / 2048 * np.pi},
+    ),
+    "sign and magnitude": (
+        "t,load\n0,30\n0.1,1054\n0.2,0\n0.3,1024\n",
+        SECONDS + 'drive_ratio = { column = "load", gain = 0.001, sign_bit = 1024 }',
+        {"drive_ratio": [0.03, -0.03, 0.0, 0.0]},
+    ),
+    "a decimal comma, lines before the head and names that are channels": (
+        "Recorder 7\n# zeroed\ntime_s;motor_angle_rad;Remark\n0,0;1,5;0\n0,1;2,5;0\n",
+        '[data]\ndecimal = ","\nskip_lines = 1\ncomment = "#"\n',
+        {"motor_angle_rad": [1.5, 2.5]},
+    ),
+    "a line of units and a decimal comma": (
+        "t;enc\n[ms];[rad]\n0,00;1,5\n100,00;2,5\n",
+        ANGLE.replace('"t"', '"t:ms"'),
+        {"time_s": [0.0, 0.1], "motor_angle_rad": [1.5, 2.5]},
+    ),
+    "the force of a cylinder from its pressures": (
+        "t,pa,pb\n0,10,1\n0.1,20,2\n",
+        SECONDS
+        + """
+        cap_pressure_pa = "pa:bar"
+        rod_pressure_pa = "pb:bar"
+        [data.formulas]
+        rod_force_n = "12e-4 * cap_pressure_pa - 9e-4 * rod_pressure_pa"
+        """,
+        {"rod_force_n": [1110.0, 2220.0]},
+    ),
+    "a time of the day that passes midnight": (
+        "t,enc\n23:59:59.500,0\n23:59:59.750,1\n00:00:00.000,2\n",
+        ANGLE.replace('"t"', '"t:iso8601"'),
+        {"time_s": [0.0, 0.25, 0.5]},
+    ),
+    "a sample that is there twice": (
+        "t,enc\n0,1\n0.1,2\n0.1,2\n0.2,3\n",
+        ANGLE,
+        {"motor_angle_rad": [1, 2, 3]},
+        "1 samples that are there twice",
+    ),
+    "repeated times where the clock is made even": (
+        "t,enc,i\n0,0,0\n10,1,1\n10,9,9\n30,3,3\n40,4,4\n",
+        EVEN,
+        {"motor_current_a": [0.0, 0.001, 0.002, 0.003, 0.004]},
+        "1 sample with the time of the one before it left out",
+    ),
+    "rows of one time each with another channel": (
+        "t,enc,i\n0,1,\n0,,5\n10,2,\n10,,6\n20,3,\n20,,7\n",
+        EVEN,
+        {"motor_angle_rad": np.radians([1, 2, 3]), "motor_current_a": [0.005, 0.006, 0.007]},
+    ),
+    "lines above samples without a head": (
+        "Scope\nName,angle,current\nUnit,V,V,,\nRate [ms],10\n0,0,100\n10,,200\n20,90,300\n",
+        '[data.columns]\ntime_s = "1:ms"\nmotor_current_a = "3:mA"\n',
+        IN_SI,
+        "4 lines above line 5",
+    ),
+    "a head whose first name begins with a mark": (
+        TEXT.replace("t,", "%time,"),
+        MAPPED.replace('"t:ms"', '"%time:ms"'),
+        IN_SI,
+    ),
+    "utf-16": (TEXT.encode("utf-16"), MAPPED, IN_SI),
+    "a spreadsheet's sign": ("sep=;\n" + TEXT.replace(",", ";"), MAPPED, IN_SI),
+    "notes": ("# log of a bench\n% 3 samples\n" + TEXT, MAPPED, IN_SI),
+    "notes and a head": ("# log of a bench\n# " + TEXT.replace(",", " "), MAPPED, IN_SI),
+    "an instrument's header": ("Bench;A\nDate;2024-03-01\n\n" + TEXT, MAPPED, IN_SI),
+    "a header as wide as the table": ("Lab\nX,2,3\nEnd,,\n" + TEXT, MAPPED, IN_SI),
+    "a header and a line of units": ("Lab\n\nt,enc,i\nms,deg,mA" + TEXT[7:], MAPPED, IN_SI),
+    "compressed": (gzip.compress(TEXT.encode(), mtime=0), MAPPED, IN_SI),
+}
+"""A table, its mapping, the values that are read, and part of what is remarked."""
 
 
 @pytest.mark.parametrize("case", READ.values(), ids=READ)
-def test_what_a_column_holds_becomes_si(tmp_path, machine, case):
-    text, channel, line, expected = case
-    path = tmp_path / "run.csv"
-    path.write_text(text)
-    (run,) = open_table(path, machine(f'[data.columns]\ntime_s = "t"\n{channel} = {line}\n'))
-    np.testing.assert_allclose(run[channel], expected, atol=1e-12)
+def test_what_a_table_holds_becomes_si(tmp_path, machine, case):
+    content, mapping, expected, *remark = case
+    path, remarks = tmp_path / "run.csv", []
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    (run,) = read_runs(path, machine(mapping), remarks)
+    for name, values in expected.items():
+        np.testing.assert_allclose(run[name], values, atol=1e-12)
+    assert run.valid.all()
+    for part in remark:
+        assert any(part in said for _, said in remarks)
+    assert run.started_at_ns is None
 
 
-def test_a_decimal_comma_lines_before_the_head_and_names_that_are_channels(tmp_path, machine):
+def test_a_column_that_is_not_mapped_is_left_out_and_a_second_value_at_a_time_refused(
+    tmp_path, machine
+):
     path = tmp_path / "run.csv"
-    path.write_text("Recorder 7\n# zeroed\ntime_s;motor_angle_rad;Remark\n0,0;1,5;0\n0,1;2,5;0\n")
-    (run,) = open_table(path, machine('[data]\ndecimal = ","\nskip_lines = 1\ncomment = "#"\n'))
+    path.write_text("time_s,motor_angle_rad,Remark\n0,1,0\n0.1,2,0\n")
+    (run,) = open_table(path, machine("[data]\n"))
     assert set(run.columns) == {"motor_angle_rad"}
-    assert run["motor_angle_rad"].tolist() == [1.5, 2.5]
-
-
-def test_a_line_of_units_and_a_decimal_comma_are_read_and_remarked_on(tmp_path, machine):
-    path = tmp_path / "run.csv"
-    path.write_text("Zeit;Winkel\n[ms];[rad]\n0,00;1,5\n100,00;2,5\n")
-    mapping = machine('[data.columns]\ntime_s = "Zeit:ms"\nmotor_angle_rad = "Winkel"\n')
-    (run,) = open_table(path, mapping)
-    assert run["motor_angle_rad"].tolist() == [1.5, 2.5]
-    assert run.time_s.tolist() == [0.0, 0.1]
-
-
-def test_a_sample_that_is_there_twice_counts_once(tmp_path, machine):
-    path = tmp_path / "run.csv"
-    path.write_text("time_s,motor_angle_rad\n0,1\n0.1,2\n0.1,2\n0.2,3\n")
-    remarks = []
-    (run,) = read_runs(path, machine("[data]\n"), remarks)
-    assert run["motor_angle_rad"].tolist() == [1, 2, 3]
-    assert any("1 samples that are there twice" in remark for _, remark in remarks)
     path.write_text("time_s,motor_angle_rad\n0,1\n0.1,2\n0.1,2.5\n0.2,3\n")
-    with pytest.raises(DataError, match="line 4: time goes from"):
+    with pytest.raises(DataError, match="line 4: time goes from") as error:
         open_table(path, machine("[data]\n"))
+    assert "1 sample has the time of the one before it" in error.value.why
+    assert "even_rate_hz = 10 under [data]" in error.value.fix
+    assert "resets" not in error.value.fix
+    path.write_text("t,enc,i\n23:59:59.500,0,0\n")
+    with pytest.raises(DataError) as error:
+        open_table(path, machine())
+    assert error.value.fix == "Write time_s = 't:iso8601'."
 
 
 def test_samples_that_do_not_count_are_flagged_with_the_reason(tmp_path, machine):
@@ -184,31 +245,22 @@ def test_a_reading_that_is_none_is_bridged_before_a_filter_smears_it(tmp_path, m
     assert np.abs(error[10:-10]).max() < 1e-3
 
 
-def test_a_gain_may_be_a_single_value_of_the_file(tmp_path, machine):
-    path = tmp_path / "run.mat"
-    savemat(path, {"t": TIME_MS / 1000, "vir": CURRENT_MA, "gtau": 35.15})
-    text = """
-        [data.columns]
-        time_s = "t"
-        drive_force_n = { column = "vir", unit = "N", gain = "gtau" }
-        """
-    (run,) = open_table(path, machine(text))
-    np.testing.assert_allclose(run["drive_force_n"], 35.15 * CURRENT_MA)
-
-
-def test_fields_of_a_struct_and_columns_of_a_matrix_have_names(tmp_path, machine):
+def test_names_in_a_mat_file_are_those_of_structs_matrices_and_single_values(tmp_path, machine):
     path = tmp_path / "run.mat"
     joints = np.column_stack([ANGLE_DEG, 2 * ANGLE_DEG])
-    savemat(path, {"log": {"t": TIME_MS, "q": joints, "z": joints * 1j}, "note": "calm"})
+    log = {"t": TIME_MS, "q": joints, "z": joints * 1j, "vir": CURRENT_MA}
+    savemat(path, {"log": log, "note": "calm", "gtau": 35.15})
     text = """
         [data.columns]
         time_s = "log.t:ms"
         joint_2_angle_rad = "log.q.2:deg"
+        drive_force_n = { column = "log.vir", unit = "N", gain = "gtau" }
         [data.conditions]
         note = "note"
         """
     (run,) = open_table(path, machine(text))
     np.testing.assert_allclose(run["joint_2_angle_rad"], 2 * np.radians(ANGLE_DEG))
+    np.testing.assert_allclose(run["drive_force_n"], 35.15 * CURRENT_MA)
     assert run.conditions == {"note": "calm"}
 
 
@@ -224,20 +276,6 @@ def test_a_formula_is_of_channels_and_conditions_in_si(tmp_path, machine):
     assert run.conditions == {"load_mass_kg": 0.25}
     expected = 0.25 * 9.80665 * 0.1 * np.sin(np.radians(ANGLE_DEG))
     np.testing.assert_allclose(run["weight_n_m"], expected)
-
-
-def test_the_force_of_a_cylinder_follows_from_its_pressures(tmp_path, machine):
-    text_table(tmp_path / "run.csv", {"t": [0.0, 0.1], "pa": [10.0, 20.0], "pb": [1.0, 2.0]})
-    text = """
-        [data.columns]
-        time_s = "t"
-        cap_pressure_pa = "pa:bar"
-        rod_pressure_pa = "pb:bar"
-        [data.formulas]
-        rod_force_n = "12e-4 * cap_pressure_pa - 9e-4 * rod_pressure_pa"
-        """
-    (run,) = open_table(tmp_path / "run.csv", machine(text))
-    np.testing.assert_allclose(run["rod_force_n"], [1110.0, 2220.0])
 
 
 def test_dates_are_a_clock_and_the_start_of_the_run(tmp_path, machine):
@@ -337,29 +375,6 @@ def test_channels_of_two_rates_in_one_table_are_each_interpolated(tmp_path, mach
     np.testing.assert_allclose(run["motor_angle_rad"], np.radians(90 * run.time_s), atol=1e-9)
 
 
-def test_repeated_times_are_left_out_where_the_clock_is_made_even(tmp_path, machine):
-    columns = {"t": [0.0, 10.0, 10.0, 30.0, 40.0], "enc": [0.0, 1.0, 9.0, 3.0, 4.0]}
-    text_table(tmp_path / "run.csv", columns)
-    text = '[data]\n{}\n[data.columns]\ntime_s = "t:ms"\nmotor_angle_rad = "enc"\n'
-    with pytest.raises(DataError) as error:
-        open_table(tmp_path / "run.csv", machine(text.format("")))
-    assert "1 sample has the time of the one before it" in error.value.why
-    assert "even_rate_hz = 100 under [data]" in error.value.fix
-    assert "resets" not in error.value.fix
-    remarks = []
-    (run,) = read_runs(tmp_path / "run.csv", machine(text.format("even_rate_hz = 100")), remarks)
-    np.testing.assert_allclose(run["motor_angle_rad"], [0.0, 1.0, 2.0, 3.0, 4.0])
-    assert ("run", "1 sample with the time of the one before it left out") in remarks
-    assert run.valid.all()
-
-
-def test_rows_of_one_time_each_with_another_channel_are_one_sample(tmp_path, machine):
-    (tmp_path / "run.csv").write_text("t,enc,i\n0,1,\n0,,5\n10,2,\n10,,6\n20,3,\n20,,7\n")
-    (run,) = open_table(tmp_path / "run.csv", machine("[data]\neven_rate_hz = 100\n" + MAPPED))
-    np.testing.assert_allclose(run["motor_angle_rad"], np.radians([1.0, 2.0, 3.0]))
-    np.testing.assert_allclose(run["motor_current_a"], [0.005, 0.006, 0.007])
-
-
 def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path, machine):
     path = tmp_path / "run.csv"
     time_s = np.cumsum(np.random.default_rng(0).uniform(0.008, 0.012, 300))
@@ -407,47 +422,6 @@ def test_each_trial_of_a_file_is_a_run(tmp_path, machine, kind):
         assert [run.conditions["load_mass_kg"] for run in runs] == [0.0, 1.0, 2.0]
 
 
-TEXT = "t,enc,i\n0,0,100\n10,45,200\n20,90,300\n"
-
-
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("utf-16", TEXT.encode("utf-16")),
-        ("a spreadsheet's sign", ("sep=;\n" + TEXT.replace(",", ";")).encode()),
-        ("notes", ("# log of a bench\n% 3 samples\n" + TEXT).encode()),
-        ("notes and a head", ("# log of a bench\n# " + TEXT.replace(",", " ")).encode()),
-        ("an instrument's header", ("Bench;A\nDate;2024-03-01\n\n" + TEXT).encode()),
-        ("a header as wide as the table", ("Lab\nX,2,3\nEnd,,\n" + TEXT).encode()),
-        ("a header and a line of units", ("Lab\n\nt,enc,i\nms,deg,mA" + TEXT[7:]).encode()),
-        ("compressed", gzip.compress(TEXT.encode(), mtime=0)),
-    ],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
-def test_a_text_table_of_another_writer_is_read(tmp_path, machine, name, content):
-    path = tmp_path / ("run.csv.gz" if name == "compressed" else "run.csv")
-    path.write_bytes(content)
-    (run,) = open_table(path, machine())
-    np.testing.assert_allclose(run.time_s, [0.0, 0.01, 0.02])
-    np.testing.assert_allclose(run["motor_current_a"], [0.1, 0.2, 0.3])
-
-
-def test_lines_above_samples_without_a_head_are_remarked_on(tmp_path, machine):
-    text = "Name,angle,current\nUnit,V,V,,\nRate [ms],10\n0,0,100\n10,,200\n20,90,300\n"
-    (tmp_path / "run.csv").write_text("Scope\n" + text)
-    remarks = []
-    mapped = '[data.columns]\ntime_s = "1:ms"\nmotor_current_a = "3:mA"\n'
-    (run,) = read_runs(tmp_path / "run.csv", machine(mapped), remarks)
-    np.testing.assert_allclose(run["motor_current_a"], [0.1, 0.2, 0.3])
-    assert any("4 lines above line 5" in text for _, text in remarks)
-
-
-def test_a_head_whose_first_name_begins_with_a_mark_keeps_it(tmp_path, machine):
-    (tmp_path / "run.csv").write_text(TEXT.replace("t,", "%time,"))
-    (run,) = open_table(tmp_path / "run.csv", machine(MAPPED.replace('"t:ms"', '"%time:ms"')))
-    assert len(run.time_s) == 3
-
-
 @pytest.mark.parametrize("kind", ["matrix", "fields"])
 def test_one_array_of_numpy_is_a_table(tmp_path, machine, kind):
     rows = np.column_stack([*COLUMNS.values()])
@@ -460,18 +434,6 @@ def test_one_array_of_numpy_is_a_table(tmp_path, machine, kind):
     np.save(tmp_path / "run.npy", rows)
     (run,) = open_table(tmp_path / "run.npy", machine(text))
     np.testing.assert_allclose(run["motor_current_a"], CURRENT_MA / 1000)
-
-
-def test_a_time_of_the_day_is_a_clock_that_may_pass_midnight(tmp_path, machine):
-    at = "23:59:59.500", "23:59:59.750", "00:00:00.000"
-    rows = "".join(f"{t},{k},{k}\n" for k, t in enumerate(at))
-    (tmp_path / "run.csv").write_text("t,enc,i\n" + rows)
-    (run,) = open_table(tmp_path / "run.csv", machine(MAPPED.replace("t:ms", "t:iso8601")))
-    np.testing.assert_allclose(run.time_s, [0.0, 0.25, 0.5])
-    assert run.started_at_ns is None
-    with pytest.raises(DataError) as error:
-        open_table(tmp_path / "run.csv", machine())
-    assert error.value.fix == "Write time_s = 't:iso8601'."
 
 
 @pytest.mark.parametrize("kind", ["files", "logs", "trials"])

@@ -111,6 +111,7 @@ TABLES = {
     "a picture": (PICTURE, "is not a text table"),
     "half a file": (TABLE[:-4], "line 21", "ends in the middle of this line"),
     "no file": (None, "There is no file"),
+    "compressed and cut": (gzip.compress(TABLE.encode())[:-9], "cannot be decompressed"),
 }
 """What is wrong in a table, and words of the sentence."""
 
@@ -175,16 +176,3 @@ def test_a_unit_of_another_quantity_in_the_name_of_a_column(refused):
     said = refused(TABLE.replace("angle", "angle_rpm"), GOOD.replace("angle:deg", "angle_rpm"))
     assert "the name of the column 'angle_rpm' states rpm" in said
     assert "if they are in SI units, write motor_angle_rad = 'angle_rpm:rad'" in said
-
-
-@pytest.mark.parametrize("column", ["angle (rad)", "angle (raw)", "angle (mm)", "angle (left)"])
-def test_a_name_that_states_no_other_unit_is_read_as_si(tmp_path, column):
-    (tmp_path / "run.csv").write_text(TABLE.replace("angle", column))
-    (tmp_path / "bench.toml").write_text(GOOD.replace("angle:deg", column))
-    (run,) = open_table(tmp_path / "run.csv", read_mapping(tmp_path / "bench.toml", []))
-    assert run["motor_angle_rad"][-1] == 19.0
-
-
-def test_a_compressed_table_that_is_cut_is_refused(refused):
-    cut = gzip.compress(TABLE.encode())[:-9]
-    assert "cannot be decompressed" in refused(cut, name="run.csv.gz")

@@ -31,11 +31,6 @@ def questions(tmp_path, **columns):
     return preview(recordings, remarks).questions
 
 
-def test_a_table_as_it_should_be_raises_no_question(tmp_path):
-    columns = {"motor_angle_rad": WAVE, "motor_velocity_rad_s": 2 * np.cos(2 * TIME)}
-    assert questions(tmp_path, time_s=TIME, **columns) == []
-
-
 @pytest.mark.parametrize(
     ("name", "values", "word"),
     [
@@ -54,34 +49,34 @@ def test_what_looks_wrong_with_a_channel_is_asked(tmp_path, name, values, word):
         assert word in question
 
 
-def test_a_motion_that_comes_to_rest_at_its_end_is_not_clipped(tmp_path):
+def test_a_table_as_it_should_be_raises_no_question(tmp_path):
+    """A velocity that fits, and a motion that comes to rest at its end, which is not clipped."""
     there_and_back = 0.5 - 0.5 * np.cos(np.minimum(TIME, np.pi))
-    assert questions(tmp_path, time_s=TIME, motor_angle_rad=there_and_back) == []
+    columns = {"motor_angle_rad": WAVE, "motor_velocity_rad_s": 2 * np.cos(2 * TIME)}
+    assert questions(tmp_path, time_s=TIME, **columns, jaw_angle_rad=there_and_back) == []
 
 
-def test_a_gap_and_an_uneven_clock_are_asked(tmp_path):
-    gap = np.where(TIME > 4, TIME + 1, TIME)
-    (question,) = questions(tmp_path, time_s=gap, motor_angle_rad=WAVE)
-    assert "1 gap in time" in question
-    uneven = TIME + np.random.default_rng(1).uniform(0, 0.0099, TIME.size)
-    (question,) = questions(tmp_path, time_s=uneven, motor_angle_rad=WAVE)
-    assert "even_rate_hz" in question
+RANDOM = np.random.default_rng(1)
+CLOCKS = {
+    "a gap": (np.where(TIME > 4, TIME + 1, TIME), ["1 gap in time", "gap_s"]),
+    "jitter": (TIME + RANDOM.uniform(0, 0.0099, TIME.size), ["even_rate_hz"]),
+    "lost samples": (
+        TIME[RANDOM.uniform(size=TIME.size) > 0.05],
+        ["short gaps in time", "even_rate_hz = 100 under [data]"],
+    ),
+    "a step that no filter counts": (
+        TIME + 0.006 * (np.arange(TIME.size) == 100),
+        ["steps of time are between 4 and 16 ms, 10 ms is usual", "even_rate_hz = 100"],
+    ),
+}
 
 
-def test_lost_samples_here_and_there_are_not_cut_out(tmp_path):
-    kept = np.random.default_rng(0).uniform(size=TIME.size) > 0.05
-    (question,) = questions(tmp_path, time_s=TIME[kept], motor_angle_rad=WAVE[kept])
-    assert "short gaps in time" in question
-    assert "even_rate_hz = 100 under [data]" in question
-    assert "gap_s" not in question
-
-
-def test_a_step_that_no_filter_counts_is_asked(tmp_path):
-    jitter = TIME.copy()
-    jitter[100] += 0.006
-    (question,) = questions(tmp_path, time_s=jitter, motor_angle_rad=WAVE)
-    assert "steps of time are between 4 and 16 ms, 10 ms is usual" in question
-    assert "even_rate_hz = 100 under [data]" in question
+@pytest.mark.parametrize("case", CLOCKS.values(), ids=CLOCKS)
+def test_what_looks_wrong_with_the_clock_is_asked(tmp_path, case):
+    time_s, words = case
+    (question,) = questions(tmp_path, time_s=time_s, motor_angle_rad=np.sin(2 * time_s))
+    assert all(word in question for word in words)
+    assert ("gap_s" in question) == ("gap_s" in words)
 
 
 def test_the_same_question_about_several_runs_is_asked_once(tmp_path):
