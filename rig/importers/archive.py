@@ -16,6 +16,7 @@ SUFFIXES = (".tar", ".tar.xz", ".txz", ".tar.gz", ".tgz", ".tar.bz2")
 MAX_MEMBER_BYTES = 1 << 30
 MAX_TOTAL_BYTES = 8 << 30
 MAX_MEMBERS = 100_000
+FIRST_MEMBERS = 64
 _DAMAGE = (tarfile.TarError, EOFError, LZMAError, zlib.error, OSError)
 
 
@@ -24,11 +25,11 @@ def is_archive(path: Path) -> bool:
     return path.is_file() and path.name.lower().endswith(SUFFIXES)
 
 
-def first_texts(path: Path, size: int = 4096, members: int = 64) -> Iterator[bytes]:
+def first_texts(path: Path, size: int) -> Iterator[bytes]:
     """Yield the first bytes of each `.txt` file among the first members; damage ends it."""
     try:
         with tarfile.open(path, "r|*") as archive:
-            for _, member in zip(range(members), archive, strict=False):
+            for _, member in zip(range(FIRST_MEMBERS), archive, strict=False):
                 if member.size > MAX_MEMBER_BYTES:
                     return
                 if member.isfile() and member.name.lower().endswith(".txt"):

@@ -139,7 +139,7 @@ def _parse(content: bytes, start: int, header_lines: int) -> FloatArray:
 
 
 def _wrong_in(line: bytes) -> tuple[str, str]:
-    """Return what is wrong in a line that was not parsed, and what was expected."""
+    """Return the fault of a line that was not parsed, and what was expected."""
     fields = line.removesuffix(b"\r").split(b",")
     for column, (field, (name, _, _)) in enumerate(zip(fields, COLUMNS, strict=False), 1):
         what = f"column {column} is {field[:40].decode('latin-1')!r}"

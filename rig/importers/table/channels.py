@@ -42,6 +42,7 @@ class Samples:
 
     Attributes:
         raw: The file.
+        mapping: What its columns were mapped by.
         time_s: Shape (n,), as it is there.
         channels: Name to values, shape (n,) each; not finite where a cell is empty.
         conditions: Name to one value, or to values that must be constant in each run.
@@ -49,6 +50,7 @@ class Samples:
     """
 
     raw: Raw
+    mapping: Mapping
     time_s: FloatArray
     channels: dict[str, FloatArray]
     conditions: dict[str, float | str | Values]
@@ -96,7 +98,7 @@ def to_samples(raw: Raw, mapping: Mapping) -> Samples:
                 f"There are {', '.join(known)}.",
             ) from error
         channels[name] = np.broadcast_to(values, time_s.shape).astype(np.float64)
-    return Samples(raw, time_s, channels, conditions, started_at_ns)
+    return Samples(raw, mapping, time_s, channels, conditions, started_at_ns)
 
 
 def find(raw: Raw, mapping: Mapping, path: Sequence[str], name: str) -> Values | float | str:

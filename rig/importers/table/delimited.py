@@ -133,8 +133,7 @@ def _after_notes(path: Path, lines: list[str], start: int, layout: Layout) -> tu
     last = max(k for k in range(start, below) if lines[k].strip())
     bare = lines[last].lstrip("".join(MARKS)).lstrip()
     as_it_is, without_mark, wanted = (
-        len(_cells([line], 0, separator, "")[0][1]) if line else 0
-        for line in (lines[last], bare, lines[below])
+        len(_split(line, separator)) if line else 0 for line in (lines[last], bare, lines[below])
     )
     left_out = "lines that begin with # or % are left out"
     if as_it_is == wanted:
@@ -158,17 +157,16 @@ def _above_samples(
         return start, []
     last = lines[own[-2]]  # the very last one may be cut off
     separator = _separator(path, last, layout)[0]
-    decimal = layout.decimal or _decimal([(0, [""]), *_cells([last], 0, separator, "")], separator)
-
-    cells = _cells([last], 0, separator, "")[0][1]
+    cells = _split(last, separator)
+    decimal = layout.decimal or _decimal([(0, [""]), (1, cells)], separator)
     held = [c for c, cell in enumerate(cells) if _is_number(cell, decimal)]
     width = len(cells)
-    if width < 2 or not held or len(_cells([lines[own[0]]], 0, separator, "")[0][1]) == width:
+    if width < 2 or not held or len(_split(lines[own[0]], separator)) == width:
         return start, []
 
     def holds(k: int) -> set[str]:
         """What a line has where the samples have numbers; nothing if it has another width."""
-        cells = _cells([lines[own[k]]], 0, separator, "")[0][1]
+        cells = _split(lines[own[k]], separator)
         return {
             "number" if _is_number(cells[c], decimal) else "text" if cells[c].strip() else "nothing"
             for c in held
@@ -214,6 +212,10 @@ def _cells(
         return [(k + 1, lines[k].split()) for k in kept]
     reader = csv.reader((lines[k] for k in kept), delimiter=separator, skipinitialspace=True)
     return [(kept[reader.line_num - 1] + 1, cells) for cells in reader]
+
+
+def _split(line: str, separator: str) -> list[str]:
+    return _cells([line], 0, separator, "")[0][1]
 
 
 def _is_number(cell: str, decimal: str) -> bool:

@@ -62,7 +62,7 @@ def read_runs(path: Path, mapping: ColumnMapping, remarks: list[Remark]) -> Iter
         folders = file.relative_to(path).parts[:-1] if several else ()
         raw = read_raw(file, mapping)
         remarks += [(file.name, remark) for remark in raw.remarks]
-        for run in recordings(to_samples(raw, mapping), mapping, remarks):
+        for run in recordings(to_samples(raw, mapping), remarks):
             name = "-".join([*folders, run.name])
             if name in taken:
                 name += file.suffix.lower()

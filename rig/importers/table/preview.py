@@ -52,6 +52,9 @@ PLATEAU = 3
 NUMBER = re.compile(r"(?<![\w.])\d[\d.]*(e[-+]?\d+)?(?!\w)")
 """A number in a sentence; not one in the name of a channel."""
 
+ROWS = 5
+"""Samples shown of the first run."""
+
 CLIPPED = 0.005
 """Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
 
@@ -111,7 +114,7 @@ class Preview:
         return [*found, *_grouped(of_runs, "runs"), *self.wrong]
 
 
-def preview(recordings: Sequence[Recording], remarks: Sequence[Remark], rows: int = 5) -> Preview:
+def preview(recordings: Sequence[Recording], remarks: Sequence[Remark]) -> Preview:
     """Return a look at the runs of a table, at least one, and at the first rows of the first run.
 
     The runs are not yet checked against their derivatives; `remarks` is what reading them remarked.
@@ -119,7 +122,7 @@ def preview(recordings: Sequence[Recording], remarks: Sequence[Remark], rows: in
     names = dict.fromkeys(name for r in recordings for name in r.columns)
     views = [_channel(name, [r[name] for r in recordings if name in r]) for name in names]
     first = recordings[0]
-    shown = {n: np.asarray(first[n])[:rows].tolist() for n in ("time_s", *first.columns)}
+    shown = {n: np.asarray(first[n])[:ROWS].tolist() for n in ("time_s", *first.columns)}
     together = [
         (r.name, wrong) for r in recordings for pair in pairs(r) if (wrong := fault(r, *pair))
     ]

@@ -13,7 +13,7 @@ from rig.importers.table.arrays import TRIAL
 from rig.importers.table.channels import Samples, find
 from rig.importers.table.formula import FormulaError, evaluate
 from rig.importers.table.mapping import Mapping
-from rig.importers.table.raw import Remark
+from rig.importers.table.raw import Remark, Values
 from rig.output.table import counted
 
 SPARSE = 0.1
@@ -23,7 +23,7 @@ KEPT_OF_A_LAP = 0.5
 """A last lap that is shorter is left out where no shortest run is stated."""
 
 
-def recordings(samples: Samples, mapping: Mapping, remarks: list[Remark]) -> Iterator[Recording]:
+def recordings(samples: Samples, remarks: list[Remark]) -> Iterator[Recording]:
     """Yield the runs of a file, each on a clock that begins at 0.
 
     `remarks` gets a sentence on everything that is left out or filled in.
@@ -31,9 +31,9 @@ def recordings(samples: Samples, mapping: Mapping, remarks: list[Remark]) -> Ite
     Raises:
         DataError: Time goes back inside a run, or a condition changes inside one.
     """
-    edges = _edges(samples, mapping)
+    edges = _edges(samples)
     parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
-    kept = [part for part in parts if _is_long_enough(samples, mapping, part)]
+    kept = [part for part in parts if _is_long_enough(samples, part)]
     stem, short = samples.raw.path.stem.lower(), len(parts) - len(kept)
     if short:
         few = "1 part" if short == 1 else f"{short} parts"
@@ -41,12 +41,13 @@ def recordings(samples: Samples, mapping: Mapping, remarks: list[Remark]) -> Ite
     width = max(2, len(str(len(kept))))
     for number, part in enumerate(kept):
         name = f"{stem}-{number:0{width}d}" if len(kept) > 1 else stem
-        yield _run(samples, mapping, part, name, remarks)
+        yield _run(samples, part, name, remarks)
 
 
-def _edges(samples: Samples, mapping: Mapping) -> list[int]:
+def _edges(samples: Samples) -> list[int]:
     """Return the first sample of each run, and the end of the last one."""
-    rules, time_s = mapping.data.runs, samples.time_s
+    data, time_s = samples.mapping.data, samples.time_s
+    rules = data.runs
     since_s = np.maximum.accumulate(time_s - time_s[0])
     begins = np.zeros(len(time_s), bool)
     steps = np.diff(time_s)
@@ -54,13 +55,13 @@ def _edges(samples: Samples, mapping: Mapping) -> list[int]:
         begins[1:] |= steps > rules.gap_s
     if rules.resets:
         begins[1:] |= steps < 0
-    for name in (*rules.changes, *([TRIAL] if mapping.data.trials else [])):
-        values = _cutting(samples, mapping, "changes", name)
+    for name in (*rules.changes, *([TRIAL] if data.trials else [])):
+        values = _cutting(samples, "changes", name)
         begins[1:] |= values[1:] != values[:-1]
     if rules.falls:
-        begins[1:] |= np.diff(_cutting(samples, mapping, "falls", rules.falls).astype(float)) < 0
+        begins[1:] |= np.diff(_cutting(samples, "falls", rules.falls).astype(float)) < 0
     if rules.mark:
-        marked = _cutting(samples, mapping, "mark", rules.mark) != 0
+        marked = _cutting(samples, "mark", rules.mark) != 0
         begins[1:] |= marked[1:] & ~marked[:-1]
     first = int(np.searchsorted(since_s, rules.start_s)) if rules.start_s > 0 else 0
     end = int(np.searchsorted(since_s, since_s[-1] - rules.tail_s, side="right"))
@@ -73,19 +74,19 @@ def _edges(samples: Samples, mapping: Mapping) -> list[int]:
     return sorted({first, *np.flatnonzero(begins[:end]).tolist(), max(first, end)})
 
 
-def _cutting(samples: Samples, mapping: Mapping, rule: str, name: str) -> NDArray[np.generic]:
-    found = find(samples.raw, mapping, ("runs", rule), name)
+def _cutting(samples: Samples, rule: str, name: str) -> NDArray[np.generic]:
+    found = find(samples.raw, samples.mapping, ("runs", rule), name)
     if not isinstance(found, np.ndarray):
         raise DataError(
-            f"{mapping.where('runs', rule)}: {name!r} of {samples.raw.path.name} is one value, so"
-            " it cuts nothing.",
+            f"{samples.mapping.where('runs', rule)}: {name!r} of {samples.raw.path.name} is one"
+            " value, so it cuts nothing.",
             fix="Name a column.",
         )
     return found
 
 
-def _is_long_enough(samples: Samples, mapping: Mapping, part: slice) -> bool:
-    rules = mapping.data.runs
+def _is_long_enough(samples: Samples, part: slice) -> bool:
+    rules = samples.mapping.data.runs
     least_s = rules.least_s
     if least_s is None:
         least_s = KEPT_OF_A_LAP * rules.lap_s if rules.lap_s else 0.0
@@ -93,9 +94,8 @@ def _is_long_enough(samples: Samples, mapping: Mapping, part: slice) -> bool:
     return len(time_s) > 1 and float(time_s[-1] - time_s[0]) >= least_s
 
 
-def _run(
-    samples: Samples, mapping: Mapping, part: slice, name: str, remarks: list[Remark]
-) -> Recording:
+def _run(samples: Samples, part: slice, name: str, remarks: list[Remark]) -> Recording:
+    mapping = samples.mapping
     time_s = samples.time_s[part]
     channels = {key: values[part] for key, values in samples.channels.items()}
     twice = _is_twice(time_s, channels)
@@ -112,8 +112,7 @@ def _run(
         channels = {key: _first_of_each(values, again) for key, values in channels.items()}
         time_s = time_s[~again]
     conditions = {
-        key: _constant(samples, mapping, key, value, part, name)
-        for key, value in samples.conditions.items()
+        key: _constant(mapping, key, value, part, name) for key, value in samples.conditions.items()
     }
     empty = ~np.all([np.isfinite(values) for values in channels.values()], axis=0)
     start_ns = samples.started_at_ns
@@ -212,10 +211,9 @@ def _check_clock(
 
 
 def _constant(
-    samples: Samples, mapping: Mapping, key: str, value: object, part: slice, run: str
+    mapping: Mapping, key: str, value: float | str | Values, part: slice, run: str
 ) -> float | str:
     if not isinstance(value, np.ndarray):
-        assert isinstance(value, float | str)  # noqa: S101  narrows the type
         return value
     inside = value[part]
     if np.any(inside != inside[0]):
