@@ -1,6 +1,6 @@
 """Opens our own logs: a `.mcap` file, the `.part` of a killed recorder, or a folder of both."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from estimation.campaign import Campaign, Run
@@ -14,7 +14,6 @@ from rig.log.reader import LogFile, damaged, read_log
 from rig.log.streams import SAMPLE
 
 
-@dataclass(frozen=True)
 class LogImporter:
     """Importer of logs written by rig.
 
@@ -22,15 +21,13 @@ class LogImporter:
     named after both, `round-2/003-sine`.
 
     In a folder the runs stand in the order they were started, those without a recorded start by
-    file name before them. A repaired log stands in for the file it was made from, and for no other:
-    the repair record names it. A log whose recorder did not close it is opened too, excluded from
-    evidence with the reason. Where a run was tried again, its earlier attempts are left out: a log
-    that ended as planned stands for all of that run's logs that did not, and where none did, the
-    last one stands. A log that was set aside stands only where no other ended as planned.
+    file name before them; of several attempts at a run, and of a log and its repair, only the one
+    that is `standing`. A log whose recorder did not close it is opened too, excluded from evidence
+    with the reason.
     """
 
-    name: str = "log"
-    description: str = "logs of this rig (MCAP): a file or a folder of them"
+    name = "log"
+    description = "logs of this rig (MCAP): a file or a folder of them"
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is a log or a folder with at least one."""

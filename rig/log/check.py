@@ -1,8 +1,7 @@
 """Is a log whole: samples expected and received, every gap, every damaged place.
 
-What was expected is known three ways: from the sequence numbers between the first and the last
-sample, from the planned duration and rate, and from what the recorder itself had counted when it
-closed the log. The largest of them counts.
+What was expected is known three ways: from the sequence numbers, from the plan, and from what the
+recorder had counted when it closed the log. The largest of them counts.
 """
 
 from dataclasses import dataclass

@@ -60,7 +60,6 @@ class Field:
         name: Name, ending in its unit where it has one: lower case letters, digits, single `_`.
         dtype: ROS 2 type, a key of `NUMPY_TYPES`.
         unit: SI unit symbol; "1" for a ratio, "" for counts and identifiers.
-        description: Description in one line.
     """
 
     name: str
@@ -71,11 +70,9 @@ class Field:
 
 @dataclass(frozen=True)
 class Stream:
-    """One stream of messages of a log.
+    """One stream of messages of a log, such as `rig_msgs/msg/Sample` at `/rig/sample`.
 
     Attributes:
-        topic: Topic, such as `/rig/sample`.
-        message_type: ROS 2 type, such as `rig_msgs/msg/Sample`.
         fields: Fields in the order they are stored, large to small.
         rate_hz: Expected rate, Hz, or None when it has none.
 

@@ -56,12 +56,8 @@ class LogWriter:
     `discard` do it by hand. Each call raises LogWriteError where the operating system refuses the
     data.
 
-    Args:
-        path: Path of the log, ending in `.mcap`.
-        run: Metadata of the run; written immediately.
-        streams: Streams of the log.
-        attachments: Files to carry, such as the configuration and the calibrations.
-        clock: Monotonic clock, s.
+    The metadata of the run and the files to carry are written immediately; the clock is monotonic,
+    s.
 
     Raises:
         LogExistsError: There is a log or a part of one at the path.
@@ -131,9 +127,8 @@ class LogWriter:
 
         Args:
             topic: Topic of a stream of this log.
-            rows: n messages, as a structured array of shape (n,) or one array of shape (n,) for
-                each field of the stream.
-            log_time_ns: When each message was taken, ns since the Unix epoch, shape (n,).
+            rows: Messages, a structured array of shape (n,) or one array for each field.
+            log_time_ns: When each was taken, ns since the Unix epoch, shape (n,).
 
         Raises:
             UnflaggedSampleError: A value is not finite and the message's flags are 0.

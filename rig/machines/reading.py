@@ -97,13 +97,9 @@ def with_setpoints(reading: Reading, played: int, planned: int, before: int | No
     """Number the setpoints played, and flag samples that should have had one and had none.
 
     The logger plays one setpoint a tick and none in a tick in which its queue is dry. Lost samples
-    are taken to have played theirs: the sequence numbers give their count.
-
-    Args:
-        reading: Samples read while playing.
-        played: The first setpoint that is not played yet.
-        planned: Number of setpoints of the whole play.
-        before: Sequence number of the sample before these, None when nothing was played yet.
+    are taken to have played theirs: the sequence numbers give their count. `played` is the first of
+    the `planned` setpoints that is not played yet; `before` is the sequence number of the sample
+    before these, None when nothing was played yet.
     """
     status = reading.counts["status"]
     playing = has_status(status, STATUS_ARMED) & ~has_status(status, STATUS_QUEUE_DRY)

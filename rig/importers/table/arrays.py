@@ -1,4 +1,8 @@
-"""Tables in files of arrays: Parquet, `.mat` of versions 5 to 7, and `.npz`."""
+"""Tables in files of arrays: Parquet, `.mat`, `.npz` and `.npy`.
+
+Every reader raises DataError where a file is damaged or holds objects, and MissingExtraError where
+the library for its format is not installed.
+"""
 
 import fnmatch
 import io
@@ -21,12 +25,7 @@ TRIAL = "trial"
 
 
 def read_parquet(path: Path, layout: Layout) -> Raw:
-    """Read a Parquet file; a column of lists becomes one column an entry.
-
-    Raises:
-        DataError: It is damaged.
-        MissingExtraError: The library that reads it is not installed.
-    """
+    """Read a Parquet file; a column of lists becomes one column an entry."""
     del layout
     try:
         from pyarrow import ArrowException, parquet
@@ -59,11 +58,7 @@ def _arrow_values(column: Any) -> Values:
 
 
 def read_npz(path: Path, layout: Layout) -> Raw:
-    """Read arrays of a NumPy archive, which holds no objects.
-
-    Raises:
-        DataError: It is damaged, or holds objects.
-    """
+    """Read arrays of a NumPy archive, which holds no objects."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as archive:
             values = {name: archive[name] for name in archive.files}
@@ -73,11 +68,7 @@ def read_npz(path: Path, layout: Layout) -> Raw:
 
 
 def read_npy(path: Path, layout: Layout) -> Raw:
-    """Read one array of NumPy, which holds no objects; its columns have numbers, or field names.
-
-    Raises:
-        DataError: It is damaged, or holds objects.
-    """
+    """Read one array of NumPy, which holds no objects; its columns have numbers, or field names."""
     try:
         array = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
@@ -89,12 +80,7 @@ def read_npy(path: Path, layout: Layout) -> Raw:
 
 
 def read_mat(path: Path, layout: Layout) -> Raw:
-    """Read variables of a MATLAB file; a field of a struct is called `struct.field`.
-
-    Raises:
-        DataError: It is damaged.
-        MissingExtraError: It is of version 7.3, and the library h5py is not installed.
-    """
+    """Read variables of a MATLAB file; a field of a struct is called `struct.field`."""
     values = nested(read_variables(path))
     arrays = {n: v for n, v in values if isinstance(v, np.ndarray | str)}
     return _of_trials(path, arrays, layout.trials)
