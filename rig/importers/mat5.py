@@ -19,18 +19,8 @@ HEADER_BYTES = 128
 MAX_INFLATED_BYTES = 1 << 31
 MAX_DEPTH = 16
 INT32, UINT32, MATRIX, COMPRESSED, INT8 = 5, 6, 14, 15, 1
-NUMBERS = {
-    1: "i1",
-    2: "u1",
-    3: "i2",
-    4: "u2",
-    5: "i4",
-    6: "u4",
-    7: "f4",
-    9: "f8",
-    12: "i8",
-    13: "u8",
-}
+INTEGERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 12: "i8", 13: "u8"}
+NUMBERS = {**INTEGERS, 7: "f4", 9: "f8"}
 TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
 NAMES = (1, 2)
 CELL, STRUCT, CHAR, FIRST_NUMERIC, LAST_NUMERIC = 1, 2, 4, 6, 15

@@ -11,18 +11,11 @@ from typing import Any
 import numpy as np
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "sin": np.sin,
-    "cos": np.cos,
-    "tan": np.tan,
-    "sqrt": np.sqrt,
-    "exp": np.exp,
-    "log": np.log,
-    "abs": np.abs,
-    "sign": np.sign,
-    "clip": np.clip,
-    "minimum": np.minimum,
-    "maximum": np.maximum,
-    "where": np.where,
+    name: getattr(np, name)
+    for name in (
+        *("sin", "cos", "tan", "sqrt", "exp", "log"),
+        *("abs", "sign", "clip", "minimum", "maximum", "where"),
+    )
 }
 CONSTANTS = {"pi": np.pi, "g_m_s2": 9.80665}
 OPERATORS: dict[type, Callable[..., Any]] = {

@@ -21,19 +21,12 @@ from rig.importers.table.runs import recordings
 from rig.log.order import by_number
 
 READERS: Mapping[str, Callable[[Path, Layout], Raw]] = {
-    ".csv": read_delimited,
-    ".tsv": read_delimited,
-    ".txt": read_delimited,
-    ".dat": read_delimited,
-    ".gz": read_delimited,
+    **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".lvm", ".gz"), read_delimited),
     ".parquet": read_parquet,
     ".mat": read_mat,
     ".npz": read_npz,
     ".npy": read_npy,
-    ".json": read_json,
-    ".jsonl": read_json,
-    ".ndjson": read_json,
-    ".lvm": read_delimited,
+    **dict.fromkeys((".json", ".jsonl", ".ndjson"), read_json),
 }
 """Ending of a file's name to its reader; any other file is read as a text table."""
 
