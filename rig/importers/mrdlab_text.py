@@ -52,6 +52,7 @@ class Text:
 
     header: str
     columns: FloatArray
+    header_lines: int
 
 
 def looks_like_log(first_bytes: bytes) -> bool:
@@ -95,7 +96,7 @@ def read_text(path: Path) -> Text:
             "Restore the file from its source, omit it (fit, diagnose, view: --skip-bad), or name"
             " the format with --format if it is another one.",
         ) from None
-    return Text("\n".join(lines), columns)
+    return Text("\n".join(lines), columns, len(lines))
 
 
 def _header(content: bytes) -> tuple[list[str], int]:

@@ -18,16 +18,11 @@ import numpy as np
 from rig.errors import UsageError
 
 NUMPY_TYPES: dict[str, str] = {
-    "float64": "<f8",
-    "int64": "<i8",
-    "uint64": "<u8",
-    "float32": "<f4",
-    "int32": "<i4",
-    "uint32": "<u4",
-    "int16": "<i2",
-    "uint16": "<u2",
-    "int8": "<i1",
-    "uint8": "<u1",
+    name: np.dtype(name).newbyteorder("<").str
+    for name in (
+        *("float64", "int64", "uint64", "float32", "int32", "uint32"),
+        *("int16", "uint16", "int8", "uint8"),
+    )
 }
 """NumPy type of each ROS 2 type a field may have."""
 
