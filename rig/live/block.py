@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,7 @@ class BlockError(DataError):
 
 @dataclass(frozen=True, slots=True)
 class DeviceStatus:
-    """State of one device.
-
-    Attributes:
-        name: Name of the device.
-        state: One word: `ok`, `armed`, `disarmed`, `stale`, `fault`, ...
-        detail: Further information for the user; may be empty.
-    """
+    """State of one device in a word, such as `ok`, `armed` or `stale`, and details of it."""
 
     name: str
     state: str
@@ -33,14 +28,7 @@ class DeviceStatus:
 
 @dataclass(frozen=True, slots=True)
 class LimitStatus:
-    """One watched quantity and how far it may go.
-
-    Attributes:
-        name: Limited quantity.
-        value: Its value now; the limit holds in both directions.
-        limit: The magnitude that trips the rig, positive.
-        unit: Unit of both.
-    """
+    """A watched quantity now, and the magnitude in either direction that trips the rig."""
 
     name: str
     value: float
@@ -50,9 +38,7 @@ class LimitStatus:
 
 @dataclass(frozen=True, eq=False)
 class SampleBlock:
-    """Consecutive samples, usually 50 ms of them.
-
-    A block without samples means that nothing arrived during its time.
+    """Consecutive samples, usually 50 ms of them; none when nothing arrived during its time.
 
     Attributes:
         time_s: Device clock, shape (n,), increasing.
@@ -60,10 +46,11 @@ class SampleBlock:
         flags: `estimation.recording.Flag` bits, shape (n,), uint8.
         estimates: Channel name to its estimate, shape (n,) each; may be empty.
         lost: Samples lost since the start.
-        devices: State of each device.
-        limits: Watched limits; may be empty.
         inside: Channel name to whether its estimate is within the fitted range of its
             estimator, shape (n,) each; channels of estimators without a range are missing.
+
+    Raises:
+        BlockError: The parts are not of one length, or time does not increase.
     """
 
     time_s: FloatArray
@@ -76,15 +63,8 @@ class SampleBlock:
     inside: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check that the parts have one length and time increases.
-
-        Raises:
-            BlockError: They do not.
-        """
-        parts: list[tuple[str, NDArray[Any]]] = [("flags", self.flags)]
-        for named in (self.columns, self.estimates, self.inside):
-            parts += named.items()
-        for name, values in parts:
+        parts: dict[str, NDArray[Any]] = {"flags": self.flags, **self.columns}
+        for name, values in chain(parts.items(), self.estimates.items(), self.inside.items()):
             if values.shape != self.time_s.shape:
                 raise BlockError(
                     f"{name} of a block has shape {values.shape}, its time {self.time_s.shape}."
@@ -117,11 +97,7 @@ def through(
 ) -> Iterator[SampleBlock]:
     """Yield blocks as they come, each after every step and shown on every sink.
 
-    Args:
-        blocks: The stream. It is closed when this one is.
-        steps: Applied one after the other.
-        sinks: What else the blocks are shown on.
-        duration_s: Device time after which the stream ends, s; None for no end.
+    The stream ends after a duration of device time, if any; it is closed when this one is.
     """
     steps, sinks = tuple(steps), tuple(sinks)
     first_s: float | None = None

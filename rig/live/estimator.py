@@ -41,7 +41,7 @@ class ModelEstimator:
             path: Model file, or a state estimator or a network (`.npz`).
             sample_rate_hz: Nominal rate of the device's clock, Hz.
             balance: Which model of a file of several; by default the first.
-            conditions: Conditions of the run, where a header states them.
+            conditions: Conditions of the run, as far as they are known.
 
         Raises:
             EstimationError: The file is not an estimator, the model is not fitted, or it cannot run
@@ -87,10 +87,7 @@ class ModelEstimator:
 
     @property
     def inside(self) -> NDArray[np.bool_] | None:
-        """Which of the last samples lay in the range that the estimator was fitted on, shape (n,).
-
-        None for a physical model, which has no validity per sample.
-        """
+        """Which of the last samples lay in the fitted range, shape (n,); None without a range."""
         return self._stream.inside
 
     @property
@@ -128,28 +125,17 @@ def within_range(estimator: ModelEstimator, estimate: FloatArray) -> FloatArray:
 def estimators_of(
     path: Path, sample_rate_hz: float, conditions: Mapping[str, float | str] = NOT_STATED
 ) -> list[ModelEstimator]:
-    """Return the estimators of a file, each before its first sample.
-
-    Args:
-        path: Model file, or a state estimator or a network (`.npz`).
-        sample_rate_hz: Nominal rate of the device's clock, Hz.
-        conditions: Conditions of the run, where a header states them.
-
-    Raises:
-        EstimationError: As for `ModelEstimator`.
-    """
+    """Return the estimators of a file, each before its first sample; as `ModelEstimator`."""
     if path.suffix == ".npz":
         return [ModelEstimator(path, sample_rate_hz, conditions=conditions)]
     return [ModelEstimator(path, sample_rate_hz, m.balance) for m in models_in_use(path)]
 
 
 def with_estimates(recording: Recording, path: Path) -> Recording:
-    """Return a recording with what a file's estimators would have shown live, as `estimated_*`.
-
-    Outside the range of an estimator it is NaN.
+    """Return a recording with the live estimates of a file, `estimated_*`; NaN out of range.
 
     Raises:
-        EstimationError: As for `estimators_of`; a channel is missing; the recording is of another
+        EstimationError: As for `ModelEstimator`; a channel is missing; the recording is of another
             instrument than the estimator.
     """
     estimated = {}
@@ -164,10 +150,7 @@ def with_estimates(recording: Recording, path: Path) -> Recording:
 def models_in_use(path: Path) -> list[Model]:
     """Return the models in use of a model file: those of a grasper's axes, else the first.
 
-    Of a machine of one's own it is the first of each target.
-
-    Raises:
-        ModelFileError: The file cannot be read.
+    Of a machine of one's own it is the first of each target. Raises ModelFileError as `read_all`.
     """
     models = model_file.read_all(path)
     of_axes = [model for model in models if model.target in AXES]

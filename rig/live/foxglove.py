@@ -13,7 +13,7 @@ import numpy as np
 from rig.errors import MissingExtraError, UsageError
 from rig.live.block import SampleBlock
 
-HOST, PORT = "127.0.0.1", 8765
+HOST = "127.0.0.1"
 LAYOUT = Path(__file__).with_name("foxglove.layout.json")
 RATE_HZ = 100.0
 """Samples a second that are sent: a display needs no more."""
@@ -25,11 +25,10 @@ _NUMBER = {"type": ["number", "null"]}
 class FoxgloveServer:
     """A WebSocket server that sends samples and states as JSON with a schema.
 
-    Args:
-        port: TCP port on the loopback address; 0 takes any that is free.
+    Port 0 takes any that is free.
     """
 
-    def __init__(self, port: int = PORT) -> None:
+    def __init__(self, port: int) -> None:
         try:
             import foxglove
         except ImportError as error:

@@ -5,6 +5,7 @@ friction hides as much torque as a grip may have, and in motion the estimate inc
 period the load is corrected by a fraction of the control error.
 """
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -31,14 +32,7 @@ SHARE = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """One period.
-
-    Attributes:
-        time_s: Its end, s of the session.
-        estimate_n_m: Mean estimate in motion.
-        sensor_n_m: Mean of the sensor over the same samples.
-        load_a: Load that was asked for.
-    """
+    """One period: its end in the session, means in motion, and the load that was asked for."""
 
     time_s: float
     estimate_n_m: float
@@ -47,14 +41,7 @@ class Held:
 
 
 class Grip:
-    """The controller: returns the next setpoints and takes the readings.
-
-    Args:
-        torque_n_m: Set point.
-        centre_rad: Where the spindle moves to and fro.
-        most_a: Greatest load it may ask for.
-        duration_s: Time to hold.
-    """
+    """The controller: yields setpoints about a centre, and corrects a load of at most `most_a`."""
 
     def __init__(
         self, torque_n_m: float, centre_rad: float, most_a: float, duration_s: float
@@ -68,13 +55,12 @@ class Grip:
 
     def setpoints(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Yield pieces of spindle angle and load until the time is over and the load is off."""
-        step = REFERENCE.max_setpoints / trajectory.SAMPLE_RATE_HZ
-        for k in range(round(self._duration_s / step)):
-            yield self._angles(k), self._loads(self._asked_a)
-        last = round(self._duration_s / step)
-        while self._load_a > 0.0:
-            yield self._angles(last), self._loads(0.0)
-            last += 1
+        pieces = round(self._duration_s * trajectory.SAMPLE_RATE_HZ / REFERENCE.max_setpoints)
+        for piece in itertools.count():
+            is_over = piece >= pieces
+            if is_over and self._load_a <= 0.0:
+                return
+            yield self._angles(piece), self._loads(0.0 if is_over else self._asked_a)
 
     def correct(self, estimate_n_m: float) -> float:
         """Move the load by what the estimate of a period lacks; returns the load, A."""
@@ -98,13 +84,9 @@ class Grip:
 def hold_grip(
     session: Session, estimator: ModelEstimator, torque_n_m: float, duration_s: float
 ) -> Iterator[Held]:
-    """Hold a grip torque and yield each period as it ends.
+    """Hold a grip torque, closing positive, in an open session; yield each period as it ends.
 
-    Args:
-        session: An open session; the rig moves.
-        estimator: Estimates the jaw's torque from motor channels; has seen nothing yet.
-        torque_n_m: Set point, closing positive.
-        duration_s: Duration.
+    The estimator has seen nothing yet.
 
     Raises:
         UsageError: The torque is not within the limits, or not what is estimated.

@@ -31,11 +31,7 @@ def no_keys() -> str:
 
 
 class DisplayKeys:
-    """Keys, of which those of the display alone are kept back: the channel shown, and the help.
-
-    Args:
-        keys: All keys pressed.
-    """
+    """Keys, of which those of the display alone are kept back: the channel shown, and the help."""
 
     def __init__(self, keys: Keys) -> None:
         self._keys = keys
@@ -63,26 +59,22 @@ def display_keys() -> Iterator[DisplayKeys | None]:
         import select
         import termios
         import tty
+
+        is_readable = sys.stdin.isatty()
     except ImportError:  # Windows
-        yield None
-        return
-    if not sys.stdin.isatty():
+        is_readable = False
+    if not is_readable:
         yield None
         return
     handle = sys.stdin.fileno()
     before = termios.tcgetattr(handle)
 
     def pressed() -> str:
-        keys = ""
-        while select.select([handle], [], [], 0)[0]:
-            try:
-                key = os.read(handle, 1)
-            except OSError:  # the terminal is gone; SIGHUP ends the session
-                break
-            if not key:
-                break
-            keys += key.decode("ascii", "ignore").lower()
-        return keys
+        keys = b""
+        with suppress(OSError):  # the terminal is gone; SIGHUP ends the session
+            while select.select([handle], [], [], 0)[0] and (key := os.read(handle, 1)):
+                keys += key
+        return keys.decode("ascii", "ignore").lower()
 
     try:
         tty.setcbreak(handle)

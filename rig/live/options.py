@@ -13,16 +13,17 @@ class ShowOptions:
     """Options of a display.
 
     Attributes:
-        title: Title of the display.
         channels: Quantities to watch, the main one first.
         devices: Further devices whose channels are shown too.
-        lever_m: Lever arm from the jaw's axis to its tip, m; 12 mm in O'Neill et al. 2018.
+        lever_m: Lever arm from the jaw's axis to its tip; 12 mm in O'Neill et al. 2018.
         plain: Lines for people, also in a terminal that could draw.
         json: One JSON object a line on stdout, nothing for people.
         half_widths: Returns half of the 95 % interval of each channel's newest estimate, SI.
         footer: Available keys.
         help: What the keys do, a line each.
-        keys: Keys of the display; None without.
+
+    Raises:
+        UsageError: The lever arm is not a positive length.
     """
 
     title: str
@@ -37,11 +38,6 @@ class ShowOptions:
     keys: DisplayKeys | None = None
 
     def __post_init__(self) -> None:
-        """Check the lever arm.
-
-        Raises:
-            UsageError: It is not a positive length.
-        """
         if not 0 < self.lever_m < math.inf:
             raise UsageError(
                 f"A lever arm of {self.lever_m * 1e3:g} mm gives no force.",

@@ -34,16 +34,10 @@ def replay_blocks(
     speed: float | None,
     pace: "Pace | None" = None,
 ) -> Iterator[SampleBlock]:
-    """Yield a recording block by block, at the pace of its own clock or faster.
+    """Yield a recording block by block, at its own pace times a speed; None for no wait.
 
-    Estimates are the estimators', and those recorded in `estimated_*` columns for other channels.
-    Samples flagged missing and gaps in the clock count as lost.
-
-    Args:
-        recording: The run.
-        estimators: Streams that have seen nothing yet; none for none.
-        speed: Times real time; None for as fast as it can be read.
-        pace: Waits for each block, and obeys keys; None for the speed alone.
+    Estimates are the estimators', which have seen nothing yet, and for other channels those
+    recorded in `estimated_*` columns. Samples flagged missing and gaps in the clock count as lost.
 
     Raises:
         DataError: The run holds no samples.
@@ -91,11 +85,7 @@ def _blocks(
 class Pace:
     """Speed of a replay, changed by keys: space pauses, + and - double and halve, f skips 5 s.
 
-    Args:
-        speed: Times real time; None for as fast as it can be read.
-        keys: Keys pressed since it was last asked.
-        sleep: Waits, s.
-        clock: Monotonic time, s.
+    Speed is times real time; None for as fast as it can be read.
     """
 
     def __init__(

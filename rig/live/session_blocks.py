@@ -35,14 +35,8 @@ def session_blocks(
     """Open the rig, take its zeros, and yield what it measures until closed.
 
     The session lives inside the generator: closing it disarms the rig before anything else happens.
-
-    Args:
-        config: The rig's configuration.
-        open_transport: Opens the way to the logger.
-        plans: Runs to play one after the other; without any, the rig is only watched.
-        estimators: Streams before their first sample; empty for none.
-        keys: Keys pressed; see `rig.live.keys`.
-        folder: Folder of the recordings started by a key.
+    Without plans the rig is only watched. The estimators have seen nothing yet. Recordings started
+    by a key go to the folder.
     """
     with Session(config, open_transport()) as session:
         session.take_zeros(ZERO_S)
@@ -59,7 +53,7 @@ def session_blocks(
                     estimate = one.push(reading.columns, reading.time_s)
                     estimates[one.target_channel] = estimate
                     recorded[f"{ESTIMATED}{one.target_channel}"] = within_range(one, estimate)
-                devices = _device_status(session, reading)
+                devices = tuple(_device_status(session, reading))
                 limits = _limits(session, reading)
                 beside = session.take_beside()
                 hand.obey(replace(reading, columns=recorded), beside)
@@ -105,16 +99,12 @@ class _Hand:
                 self._said = "" if self._recorder.is_on else "no recording to mark: r starts one"
         self._recorder.write(reading, beside)
 
-    def status(self) -> tuple[DeviceStatus, ...]:
-        """Return the message for the user."""
-        said = ", ".join(part for part in (self._recorder.said, self._said) if part)
-        found = []
+    def status(self) -> Iterator[DeviceStatus]:
+        """Yield the messages for the user."""
         if self.stopped:
-            found.append(DeviceStatus("stop", "disarmed", "confirmed by the board"))
-        if said:
-            state = "on" if self._recorder.is_on else "off"
-            found.append(DeviceStatus("recording", state, said))
-        return tuple(found)
+            yield DeviceStatus("stop", "disarmed", "confirmed by the board")
+        if said := ", ".join(filter(None, (self._recorder.said, self._said))):
+            yield DeviceStatus("recording", "on" if self._recorder.is_on else "off", said)
 
     def close(self) -> None:
         """Close a log that is open."""
@@ -172,17 +162,13 @@ def _readings(session: Session, plans: Sequence[Plan], hand: _Hand) -> Iterator[
         yield from session.watch()
 
 
-def _device_status(session: Session, reading: Reading) -> list[DeviceStatus]:
-    """Return the states of the logger and of the further devices, a silent one of which raises."""
+def _device_status(session: Session, reading: Reading) -> Iterator[DeviceStatus]:
+    """Yield the states of the logger and of the further devices, a silent one of which raises."""
     state = "armed" if reading.armed else "disarmed"
     logger = _with_faults(f"logger {session.identity.serial}", session.counters)
-    return [
-        DeviceStatus("logger", state, logger),
-        *(
-            DeviceStatus(one.name, "ok", _with_faults(one.device.name, one.device.counters))
-            for one in session.companions
-        ),
-    ]
+    yield DeviceStatus("logger", state, logger)
+    for one in session.companions:
+        yield DeviceStatus(one.name, "ok", _with_faults(one.device.name, one.device.counters))
 
 
 def _with_faults(device: str, counters: Mapping[str, int]) -> str:

@@ -49,13 +49,9 @@ def show(
 
     Frames are timed by the device's clock. A block that spans several frames gives one, so the
     display is never behind the stream. Ctrl-C ends the stream and is not an error; whatever else
-    the stream raises is passed on after the terminal has been given back.
-
-    Args:
-        blocks: The stream. A generator is closed on the way out, before anything else is done.
-        options: How to show it.
-        console: Console of the user.
-        clock: Monotonic time, s; only for silence and for frames that cost too much.
+    the stream raises is passed on after the terminal has been given back. A generator is closed on
+    the way out, before anything else is done. The clock, monotonic, s, is for silence and for
+    frames that cost too much.
     """
     close = getattr(blocks, "close", None)
     if not options.channels or options.devices:  # which channels they have, they know alone
@@ -89,13 +85,9 @@ def _shown(options: ShowOptions, first: SampleBlock) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Writer:
-    """One way to show a stream.
+    """One way to show a stream: a frame each period of device time, and its summary at the end.
 
-    Attributes:
-        period_s: Device time from one frame to the next, s.
-        frame: Shows one snapshot.
-        summary: Shows what the stream came to, when it no longer runs.
-        running: Holds the output while the stream runs.
+    `running` holds the output while the stream runs.
     """
 
     period_s: float

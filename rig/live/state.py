@@ -27,19 +27,17 @@ SILENT_BLOCKS = 2
 """After this many consecutive blocks without samples, the last value is out of date."""
 
 FLAGS = tuple(flag for flag in Flag if flag)
-RECEIVED, FIRST_FLAG = 0, 1
+TIME, RECEIVED, FIRST_FLAG = range(3)
 FIRST_CHANNEL = FIRST_FLAG + len(FLAGS)
 ESTIMATE, SENSOR, SQUARED_ERROR = range(3)
+"""Rows of the signals: first those of all samples, then three for each channel."""
+
+NOTHING = SampleBlock(np.empty(0), {}, np.empty(0, np.uint8), {}, 0, ())
 
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A number, or the reason why there is none.
-
-    Attributes:
-        number: The value, or None.
-        missing: Why the value is missing; empty when it is not.
-    """
+    """A number, or the reason why it is missing."""
 
     number: float | None
     missing: str = ""
@@ -47,14 +45,11 @@ class Value:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One quantity: estimate and sensor reading.
+    """One quantity: estimate and sensor reading, means of the last 0.1 s.
 
     Attributes:
-        channel: Name of the channel.
-        unit: Its SI unit.
+        unit: SI unit.
         has_estimator: Whether the stream carries estimates of it.
-        estimate: Mean estimate of the last 0.1 s.
-        sensor: Mean sensor value of the last 0.1 s.
         error_rms: Root mean square of estimate minus sensor over the last 5 s, or None.
         estimate_trace: Least and greatest estimate in each 20 ms of the last 10 s, shape (2, 500),
             oldest first, NaN where there is none.
@@ -87,13 +82,10 @@ class Snapshot:
 
     Attributes:
         time_s: Device time of the newest sample, or None before the first.
-        samples: Samples received since the start.
-        lost: Samples lost since the start.
+        samples: Samples received since the start, as `lost`.
         sample_rate_hz: Samples received over device time in the last 2 s, or None.
         flagged: Name of each flag seen in the last 10 s and on how many samples.
         readings: The watched quantities, the main one first.
-        devices: State of each device.
-        limits: Watched limits.
     """
 
     time_s: float | None
@@ -112,9 +104,7 @@ class Summary:
 
     Attributes:
         ended: `finished` when the stream ended, `interrupted` when a person left.
-        duration_s: Device time covered, s.
-        samples: Samples received.
-        lost: Samples lost.
+        duration_s: Device time covered.
         flagged: Name of each flag seen and on how many samples.
         channel: The main quantity.
         error_rms: Root mean square of its estimate minus its sensor value, SI, or None.
@@ -144,27 +134,18 @@ class LiveState:
     """Accumulates blocks. Flagged samples count as received but give no value."""
 
     def __init__(self, channels: tuple[str, ...], all_columns: bool = False) -> None:
-        """Start with nothing seen.
-
-        Args:
-            channels: The quantities to watch, the main one first.
-            all_columns: Watch all other columns of the first block, too.
-        """
+        """Start with nothing seen; `all_columns` watches all columns of the first block too."""
         self.channels = channels
         self._takes_all = all_columns
-        self._held: deque[tuple[FloatArray, FloatArray]] = deque()
+        self._held: deque[FloatArray] = deque()
         self._time_s: float | None = None
-        self._last: SampleBlock | None = None
-        self._estimated: frozenset[str] = frozenset()
-        self._sensed: frozenset[str] = frozenset()
+        self._last = self._last_full = NOTHING
         self._silent = 0
         self._duration_s = 0.0
         self._samples = 0
         self._flagged = np.zeros(len(FLAGS), np.int64)
-        self._squared_error = 0.0
-        self._error_samples = 0
-        self._inside_squared = 0.0
-        self._inside_samples = 0
+        self._error = np.zeros(2)  # sum of squares, samples
+        self._inside_error = np.zeros(2)
 
     def feed(self, block: SampleBlock) -> None:
         """Take in one block; where time runs backwards, a device restarted and so do the traces."""
@@ -175,7 +156,7 @@ class LiveState:
         if self._takes_all:
             self._takes_all = False
             self.channels = tuple(dict.fromkeys((*self.channels, *block.columns)))
-        self._estimated, self._sensed = frozenset(block.estimates), frozenset(block.columns)
+        self._last_full = block
         first_s, last_s = float(block.time_s[0]), float(block.time_s[-1])
         if self._time_s is not None and first_s <= self._time_s:
             self._held.clear()
@@ -183,25 +164,22 @@ class LiveState:
         self._duration_s += last_s - (first_s if self._time_s is None else self._time_s)
         self._time_s = last_s
         signals = self._signals(block)
-        self._held.append((block.time_s, signals))
-        while last_s - self._held[0][0][-1] > TRACE_S:
+        self._held.append(signals)
+        while last_s - self._held[0][TIME, -1] > TRACE_S:
             self._held.popleft()
         self._samples += int(np.isfinite(signals[RECEIVED]).sum())
         self._flagged += np.isfinite(signals[FIRST_FLAG:FIRST_CHANNEL]).sum(axis=1)
         squared = self._squared_error_of(block)
-        self._squared_error += float(np.nansum(squared))
-        self._error_samples += int(np.isfinite(squared).sum())
-        inside = block.inside.get(self.channels[0])
-        if inside is not None:
-            self._inside_squared += float(np.nansum(squared[inside]))
-            self._inside_samples += int(np.isfinite(squared[inside]).sum())
+        self._error += np.nansum(squared), np.isfinite(squared).sum()
+        if (inside := block.inside.get(self.channels[0])) is not None:
+            self._inside_error += np.nansum(squared[inside]), np.isfinite(squared[inside]).sum()
 
     def _signals(self, block: SampleBlock) -> FloatArray:
         """Return the signals of a block, shape (signals, n), NaN where missing."""
         nan = np.full(len(block), np.nan)
         valid = block.flags == 0
         received = (block.flags & Flag.MISSING) == 0
-        rows = [np.where(received, block.time_s, nan)]
+        rows = [block.time_s, np.where(received, block.time_s, nan)]
         rows += [np.where(block.flags & flag, 1.0, nan) for flag in FLAGS]
         for channel in self.channels:
             estimate = np.where(valid, block.estimates.get(channel, nan), nan)
@@ -218,56 +196,46 @@ class LiveState:
 
     def snapshot(self) -> Snapshot:
         """Return the picture of now."""
-        last, seen = self._last, self._recent()
+        nothing = np.empty((FIRST_CHANNEL + 3 * len(self.channels), 0))
+        seen = Recent(np.concatenate([nothing, *self._held], axis=1))
         return Snapshot(
             time_s=self._time_s,
             samples=self._samples,
-            lost=last.lost if last is not None else 0,
+            lost=self._last.lost,
             sample_rate_hz=seen.rate_hz(),
             flagged=_named(seen.flags(TRACE_S)),
             readings=tuple(self._reading(index, seen) for index in range(len(self.channels))),
-            devices=last.devices if last is not None else (),
-            limits=last.limits if last is not None else (),
-        )
-
-    def _recent(self) -> "Recent":
-        if not self._held:
-            rows = FIRST_CHANNEL + 3 * len(self.channels)
-            return Recent(np.empty(0), np.empty((rows, 0)))
-        return Recent(
-            np.concatenate([time_s for time_s, _ in self._held]),
-            np.concatenate([signals for _, signals in self._held], axis=1),
+            devices=self._last.devices,
+            limits=self._last.limits,
         )
 
     def summary(self, ended: str) -> Summary:
         """Return the summary since the start; `ended` is the reason of the end."""
-        n, known = self._error_samples, self._inside_samples
         return Summary(
             ended=ended,
             duration_s=self._duration_s,
             samples=self._samples,
-            lost=self._last.lost if self._last is not None else 0,
+            lost=self._last.lost,
             flagged=_named(self._flagged),
             channel=self.channels[0],
-            error_rms=math.sqrt(self._squared_error / n) if n else None,
-            error_samples=n,
-            inside_rms=math.sqrt(self._inside_squared / known) if known else None,
-            inside_samples=known,
+            error_rms=_rms(*self._error),
+            error_samples=int(self._error[1]),
+            inside_rms=_rms(*self._inside_error),
+            inside_samples=int(self._inside_error[1]),
         )
 
     def _reading(self, index: int, seen: "Recent") -> Reading:
-        channel = self.channels[index]
+        channel, block = self.channels[index], self._last_full
         row = FIRST_CHANNEL + 3 * index
-        has_range = self._last is not None and channel in self._last.inside
-        beyond = "outside what it was fitted on" if has_range else "not a number"
+        beyond = "outside what it was fitted on" if channel in block.inside else "not a number"
         squared = seen.last(ERROR_S, row + SQUARED_ERROR)
         squared = squared[np.isfinite(squared)]
-        no_estimate = "" if channel in self._estimated else "no estimator"
-        no_sensor = "" if channel in self._sensed else "no sensor"
+        no_estimate = "" if channel in block.estimates else "no estimator"
+        no_sensor = "" if channel in block.columns else "no sensor"
         return Reading(
             channel=channel,
             unit=unit_of(channel),
-            has_estimator=channel in self._estimated,
+            has_estimator=channel in block.estimates,
             estimate=self._value(seen, row + ESTIMATE, no_estimate, beyond),
             sensor=self._value(seen, row + SENSOR, no_sensor, "not a number"),
             error_rms=math.sqrt(squared.mean()) if squared.size else None,
@@ -293,26 +261,23 @@ class LiveState:
 
 
 class Recent:
-    """The samples of the last 10 s.
+    """The samples of the last 10 s, shape (signals, n).
 
-    Args:
-        time_s: Device time, shape (n,).
-        signals: Time where received, 1 where flagged, values; shape (signals, n), NaN elsewhere.
+    Signals are the time, the time where received, 1 where flagged, and values; NaN elsewhere.
     """
 
-    def __init__(self, time_s: FloatArray, signals: FloatArray) -> None:
-        self._time_s, self._signals = time_s, signals
-        bins = np.floor(time_s / BIN_S).astype(np.int64)
+    def __init__(self, signals: FloatArray) -> None:
+        self._signals = signals
+        bins = np.floor(signals[TIME] / BIN_S).astype(np.int64)
         bins = bins - bins[-1:] + BINS - 1
         self._first = np.flatnonzero(np.diff(bins, prepend=-1))
         self._bins = bins[self._first]
 
     def last(self, span_s: float, row: int | slice) -> FloatArray:
         """Return the last samples of a signal, or of several."""
-        if not self._time_s.size:
-            return self._signals[row]
-        since_s = self._time_s[-1] - span_s + 1e-9
-        return self._signals[row, np.searchsorted(self._time_s, since_s) :]
+        time_s = self._signals[TIME]
+        first = np.searchsorted(time_s, time_s[-1] - span_s + 1e-9) if time_s.size else 0
+        return self._signals[row, first:]
 
     def flags(self, span_s: float) -> NDArray[np.int64]:
         """Return on how many of the last samples each flag was seen."""
@@ -331,12 +296,14 @@ class Recent:
         """Return the least and the greatest value of each bin, shape (2, bins)."""
         shown = np.full((2, BINS), np.nan)
         inside = self._bins >= 0
-        if inside.any():
-            for side, extreme in enumerate((np.fmin, np.fmax)):
-                shown[side, self._bins[inside]] = extreme.reduceat(self._signals[row], self._first)[
-                    inside
-                ]
+        for side, extreme in enumerate((np.fmin, np.fmax)):
+            values = extreme.reduceat(self._signals[row], self._first)
+            shown[side, self._bins[inside]] = values[inside]
         return shown
+
+
+def _rms(squared: float, samples: float) -> float | None:
+    return math.sqrt(squared / samples) if samples else None
 
 
 def _named(counts: NDArray[np.int64]) -> dict[str, int]:

@@ -36,9 +36,7 @@ PIECE_SPREAD = 0.25
 class CalibrationStatus:
     """Holds a session's active records against today and against what is measured.
 
-    Args:
-        config: The configuration; without a store only the set is named.
-        set_name: Name of the set in use.
+    Without a store only the set in use is named.
     """
 
     def __init__(self, config: Config, set_name: str) -> None:
@@ -74,20 +72,9 @@ class CalibrationStatus:
 
 
 class ModelStatus:
-    """Holds models against today and what they estimate against what they were fitted on.
+    """Holds models against today and what they estimate against what they were fitted on."""
 
-    Args:
-        models: Fitted models.
-        estimators: The estimators of the stream's estimates.
-        now: Time of the session.
-    """
-
-    def __init__(
-        self,
-        models: Sequence[Model],
-        estimators: Sequence[ModelEstimator] = (),
-        now: datetime | None = None,
-    ) -> None:
+    def __init__(self, models: Sequence[Model], estimators: Sequence[ModelEstimator] = ()) -> None:
         self._estimators = estimators
         evidence = {model.target: model.evidence for model in models if model.evidence}
         self._ranges = {
@@ -95,9 +82,8 @@ class ModelStatus:
             for target, known in evidence.items()
             if known.target_range is not None
         }
-        made = [model.evidence.made_at for model in models if model.evidence is not None]
-        days = [_days(datetime.fromisoformat(at), now or datetime.now(UTC)) for at in made if at]
-        self._days = max(days, default=None)
+        made = [datetime.fromisoformat(one.made_at) for one in evidence.values() if one.made_at]
+        self._days = max((_days(at, datetime.now(UTC)) for at in made), default=None)
 
     def step(self, block: SampleBlock) -> SampleBlock:
         """Return a block with the status, and with where its estimates are within their range."""
@@ -109,11 +95,8 @@ class ModelStatus:
     def of(self, estimates: Mapping[str, FloatArray], outside: Sequence[str] = ()) -> DeviceStatus:
         """Return the status with new estimates: `suspect` beyond a range, `stale` when too old.
 
-        Beyond is by more than the estimate's own interval.
-
-        Args:
-            estimates: Estimates of the newest samples by channel.
-            outside: Channels whose estimates lie outside the fitted range, by their estimator.
+        Beyond is by more than the estimate's own interval. `outside` are the channels whose
+        estimators state that they are outside their fitted range.
         """
         beyond = [
             _beyond(name, low, high)
@@ -132,11 +115,7 @@ class ModelStatus:
 
 
 class FitStatus:
-    """Watches whether a model still fits what is measured, by the error of its equation.
-
-    Args:
-        model: A fitted model.
-    """
+    """Watches whether a fitted model still fits what is measured, by the error of its equation."""
 
     def __init__(self, model: Model) -> None:
         self._model = model

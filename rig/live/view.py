@@ -1,5 +1,6 @@
 """The text of the display: lines made from one snapshot, for any terminal size."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -11,7 +12,6 @@ from estimation.recording import FloatArray
 from rig.live import text as words
 from rig.live.block import DeviceStatus, LimitStatus
 from rig.live.options import ShowOptions
-from rig.live.sparkline import round_scale, sparkline
 from rig.live.state import TRACE_S, Reading, Snapshot
 
 # The palette of Okabe and Ito (2008), distinguishable by every kind of colour vision; each
@@ -54,15 +54,13 @@ LEAST_LIMITS = 2
 MARGIN = 18
 """Columns left of a trace, for its name and the edges of its scale."""
 
+DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
+"""Bit of each dot of a braille character, (row, column), Unicode block U+2800."""
+
 
 @dataclass(frozen=True)
 class View:
-    """A snapshot as rich renders it. Fits the width; the traces take what height is left.
-
-    Attributes:
-        snapshot: Content of the display.
-        options: How it is shown.
-    """
+    """A snapshot as rich renders it. Fits the width; the traces take what height is left."""
 
     snapshot: Snapshot
     options: ShowOptions
@@ -175,6 +173,40 @@ def _trace(
     for title, label, line in zip(names, labels, drawn, strict=True):
         edge = "┤" if label else "│"
         yield _styled(f"{title:<8} {label:>7} {edge}").append(line, style=STYLES[name])
+
+
+def sparkline(
+    low: FloatArray, high: FloatArray, width: int, height: int, scale: tuple[float, float]
+) -> list[str]:
+    """Return `height` lines of `width` braille characters: the range of a signal over time.
+
+    Least and greatest value of each segment have shape (n,), oldest first; NaN makes a gap. The
+    scale is the values at the lower and the upper edge.
+    """
+    edges = np.linspace(0, low.size, 2 * width + 1)
+    first = np.minimum(edges[:-1].astype(int), low.size - 1)
+    low, high = np.fmin.reduceat(low, first), np.fmax.reduceat(high, first)
+    # reach out to the neighbour, so that a steep rise is one line and not two dots
+    low, high = (
+        np.fmin(low, np.where(np.isnan(low), np.nan, np.append(np.nan, high[:-1]))),
+        np.fmax(high, np.where(np.isnan(high), np.nan, np.append(np.nan, low[:-1]))),
+    )
+    rows = 4 * height
+    per_row = (scale[1] - scale[0]) / (rows - 1)
+    level = scale[1] - per_row * np.arange(rows)[:, None]
+    dots = (level >= low - per_row / 2) & (level <= high + per_row / 2)
+    cells = dots.reshape(height, 4, width, 2) * DOTS[None, :, None, :]
+    return ["".join(chr(0x2800 + int(c)) for c in row) for row in cells.sum(axis=(1, 3))]
+
+
+def round_scale(low: float, high: float) -> tuple[float, float]:
+    """Return round edges around a range and zero, so that the scale seldom changes."""
+    low, high = min(low, 0.0), max(high, 0.0)
+    if high - low < 1e-9:
+        return 0.0, 1.0
+    power = 10.0 ** math.floor(math.log10(high - low))
+    step = next(power * s for s in (0.2, 0.5, 1.0, 2.0) if power * s * 5 >= high - low)
+    return step * math.floor(low / step), step * math.ceil(high / step)
 
 
 def _device(device: DeviceStatus) -> Text:

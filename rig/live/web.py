@@ -16,8 +16,7 @@ from rig.live.state import LiveState, Snapshot
 if TYPE_CHECKING:
     from rig.live.web_server import PageServer
 
-HOST, PORT = "127.0.0.1", 8766
-
+HOST = "127.0.0.1"
 FRAME_S = 0.08
 """Device time of a frame at least, s: less than two blocks of 50 ms."""
 PIECES = 2
@@ -45,10 +44,6 @@ class WebView:
     """Sends a stream to the page: ten frames a second of device time.
 
     The page answers from the first block on, so that its stop button never does nothing.
-
-    Args:
-        page: The server.
-        options: What the display shows.
     """
 
     def __init__(self, page: "PageServer", options: ShowOptions) -> None:
@@ -95,9 +90,8 @@ def frame(snapshot: Snapshot, options: ShowOptions) -> dict[str, Any]:
 def traces(blocks: list[SampleBlock]) -> dict[str, Any]:
     """Return the range of every channel and estimate of valid samples, in pieces.
 
-    Returns:
-        `time_s`: two entries a piece; `values`: name of a trace to as many, in its shown unit,
-        None where no sample is valid; `units`: name of a trace to that unit.
+    `time_s` has two entries a piece; `values` maps the name of a trace to as many, in its shown
+    unit, None where no sample is valid; `units` maps it to that unit.
     """
     valid = np.concatenate([block.flags for block in blocks]) == 0
     time_s = np.concatenate([block.time_s for block in blocks])

@@ -38,11 +38,9 @@ MOST_UNSENT = 50
 
 
 class PageServer:
-    """Listens on one address; serves the page and what it shows.
+    """Listens on an address of this computer; serves the page and what it shows.
 
-    Args:
-        host: Address of this computer to listen on.
-        port: TCP port; 0 takes any that is free.
+    Port 0 takes any that is free.
 
     Raises:
         UsageError: The address cannot be listened on.

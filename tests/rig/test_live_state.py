@@ -11,10 +11,9 @@ from rich.console import Console
 from estimation.recording import Flag
 from rig.live.block import BlockError, DeviceStatus, LimitStatus
 from rig.live.options import ShowOptions
-from rig.live.sparkline import round_scale
 from rig.live.state import LiveState
 from rig.live.text import plain_line, summary_lines
-from rig.live.view import View
+from rig.live.view import View, round_scale
 from tests.rig.blocks import GRIP, block
 
 
