@@ -32,8 +32,7 @@ from drivers.teensy.fake_device import HandMovedBench
 from drivers.teensy.reference import REFERENCE, SAMPLE_DTYPE, Limits
 from drivers.usb520 import protocol as usb520
 from estimation.errors import EstimationError
-from rig.configuration.config import SHIPPED, load_config, shipped_configs
-from rig.configuration.text import to_toml
+from rig.configuration.config import SHIPPED, load_config, shipped_configs, to_toml
 from rig.errors import RigError
 
 REFUSALS = (DriverError, RigError, EstimationError, CalibrationError)

@@ -1,12 +1,12 @@
 """`rig config`: is a configuration sound, and what does it come to."""
 
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer import Argument, Option
 
+from estimation.errors import nearest
 from estimation.files import write_text_atomic
 from rig.cli.help import group
 from rig.cli.options import SimFlag, complete_config, config_names, require_new
@@ -44,11 +44,8 @@ def init(
     from rig.doctor.ports import serial_ports
 
     if like not in config_names():
-        near = get_close_matches(like, config_names(), n=1)
         raise UsageError(
-            f"There is no shipped configuration {like!r}.",
-            f"There are: {', '.join(config_names())}.",
-            f"Did you mean {near[0]!r}?" if near else "",
+            f"There is no shipped configuration {like!r}.", fix=nearest(like, config_names())
         )
     require_new(out)
     boards = [port for port in serial_ports() if port.usb.startswith(TEENSY)]
@@ -92,7 +89,7 @@ def check(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = Fa
 def show(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = False) -> None:
     """Show the whole configuration as every log keeps it, defaults and units written out."""
     from rig.configuration.chosen import choose_rig
-    from rig.configuration.text import to_toml
+    from rig.configuration.config import to_toml
 
     settings = choose_rig(path, sim)
     if json:
@@ -104,9 +101,9 @@ def show(path: ConfigArgument = None, sim: SimFlag = False, json: JsonFlag = Fal
 @config_app.command(name="list")
 def list_(json: JsonFlag = False) -> None:
     """List the shipped configurations."""
-    from rig.configuration.config import SHIPPED, load_config, shipped_configs
+    from rig.configuration.config import SHIPPED, load_config
 
-    found = {name: load_config(Path(name)).name for name in shipped_configs()}
+    found = {name: load_config(Path(name)).name for name in config_names()}
     width = max(map(len, found))
     lines = (f"{name:{width}}  {rig}" for name, rig in found.items())
     present(json, {"folder": SHIPPED, "configs": found}, *lines)

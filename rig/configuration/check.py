@@ -3,7 +3,6 @@
 import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from pydantic import ConfigDict, ValidationError, create_model
 
 from calibration.linear import SHIPPED as SHIPPED_CALIBRATIONS
 from drivers.registry import Driver, UnknownDriverError, driver, fakes
+from estimation.errors import nearest
 from rig.configuration.config import SHIPPED, Config, is_simulated
 from rig.configuration.machine_settings import settings_of
 from rig.configuration.sections import DeviceSection
@@ -25,13 +25,7 @@ LOGGER = "logger"
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing that is wrong.
-
-    Attributes:
-        key: The part of the configuration it stands in.
-        what: The fault.
-        fix: Replacement.
-    """
+    """One thing that is wrong, the part of the configuration it stands in, and what to write."""
 
     key: str
     what: str
@@ -84,10 +78,8 @@ def _name_problems(config: Config) -> list[Problem]:
 
 
 def _unknown(key: str, name: str, known: list[str]) -> Problem:
-    """Return the problem of a name that is neither a file nor shipped."""
-    near = get_close_matches(name, known, n=1)
-    fix = f"Did you mean {near[0]!r}?" if near else f"Name a file, or one of: {', '.join(known)}."
-    return Problem(key, f"There is no {key} {name!r}: neither a file nor shipped.", fix)
+    what = f"There is no {key} {name!r}: neither a file nor shipped."
+    return Problem(key, what, f"Name a file, or a shipped one. {nearest(name, known)}")
 
 
 def _driver_problems(name: str, section: DeviceSection) -> list[Problem]:
@@ -97,13 +89,14 @@ def _driver_problems(name: str, section: DeviceSection) -> list[Problem]:
     except UnknownDriverError as error:
         return [Problem(key, error.what, error.fix or error.why)]
     found = _option_problems(key, named, section.options)
-    if is_simulated(section.url) and named.name not in fakes():
-        what = f"The driver {named.name} has no fake."
-        found.append(Problem(key, what, "Write the url of the device in place of sim://."))
     on_can = section.url.startswith("can:")
-    if not is_simulated(section.url) and on_can and named.can is None:
+    if is_simulated(section.url):
+        if named.name not in fakes():
+            what = f"The driver {named.name} has no fake."
+            found.append(Problem(key, what, "Write the url of the device in place of sim://."))
+    elif on_can and named.can is None:
         found.append(Problem(key, f"The driver {named.name} is on no CAN bus.", "Change its url."))
-    if not is_simulated(section.url) and named.can is not None and not on_can:
+    elif named.can is not None and not on_can:
         what = f"The driver {named.name} needs a CAN bus."
         found.append(Problem(key, what, "Write e.g. can:socketcan:can0."))
     return found
@@ -120,14 +113,13 @@ def _option_problems(key: str, named: Driver, options: Mapping[str, Any]) -> lis
         create_model(named.name, __config__=rules, **fields).model_validate(options)
     except ValidationError as error:
         what = f"Options of the driver {named.name}: {explain(error, fields)}"
-        return [Problem(key, what, _one_of(fields))]
+        fix = f"Choose from: {', '.join(fields)}." if fields else "It has no options."
+        return [Problem(key, what, fix)]
     return []
 
 
 @dataclass(frozen=True, slots=True)
 class _OnBus:
-    """One device's place on a bus."""
-
     name: str
     identifiers: frozenset[int]
     bit_rate: int
@@ -140,8 +132,7 @@ def _bus_problems(sections: Mapping[str, DeviceSection]) -> list[Problem]:
         if not section.url.startswith("can:"):
             continue
         named = driver(section.driver)
-        use = named.can
-        if use is None:
+        if (use := named.can) is None:
             continue
         bus, _, query = section.url.partition("?")
         options = {**named.options, **section.options}
@@ -176,10 +167,6 @@ def _clash(bus: str, one: _OnBus, other: _OnBus) -> list[Problem]:
         fix = "Set both to one bit rate and write it as `bit_rate`, or give them two buses."
         found.append(Problem(bus, what, fix))
     return found
-
-
-def _one_of(names: Mapping[str, Any]) -> str:
-    return f"Choose from: {', '.join(names)}." if names else "It has no options."
 
 
 def _key(name: str) -> str:

@@ -42,11 +42,7 @@ def configured_rigs() -> list[Path]:
 
 
 def choose_config(config: Path | None, sim: bool) -> Path:
-    """Return the configuration a command is about.
-
-    Args:
-        config: What `--config` names.
-        sim: Whether `--sim` asks for the simulated rig.
+    """Return the configuration a command is about, by its options `--config` and `--sim`.
 
     Raises:
         UsageError: Both are given, or neither and no rig is configured.

@@ -1,8 +1,9 @@
 """The rig's configuration: one TOML file, every key checked, the resolved form kept in each log."""
 
+import json
 import tomllib
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from calibration.store import (
     default_folder,
     simulated_folder,
 )
+from estimation.channels import UnknownUnitError, unit_of
+from estimation.errors import nearest
 from rig.configuration.machine_settings import (
     DriftSection,
     LimitsSection,
@@ -32,7 +35,6 @@ from rig.configuration.machine_settings import (
     settings_of,
 )
 from rig.configuration.model_in_use import model_in_use
-from rig.configuration.plausibility import PlausibilitySection
 from rig.configuration.sections import (
     ControllerSection,
     DeviceSection,
@@ -40,6 +42,7 @@ from rig.configuration.sections import (
     Length,
     LoggerSection,
     Name,
+    PlausibilitySection,
     SafetySection,
     Section,
     SimulationSection,
@@ -98,9 +101,8 @@ class Config(Section):
         settings = settings_of(profile)
         kinds = {"limits": settings.limits, "drift": settings.drift, "machine": settings.own}
         kind = kinds[str(info.field_name)]
-        takes_any = getattr(kind, "takes_any", False)
-        known = set(kind.model_fields)
-        if isinstance(value, dict) and value and not takes_any and not set(value) & known:
+        is_free = getattr(kind, "takes_any", False) or not isinstance(value, dict) or not value
+        if not is_free and not set(value) & set(kind.model_fields):
             raise ValueError(
                 f"[{info.field_name}] are not those of [logger] profile = {profile!r}, which has "
                 + (", ".join(kind.model_fields) or "none")
@@ -229,13 +231,10 @@ def load_config(path: Path | None = None) -> Config:
         text = path.read_text()
         return Config.model_validate(tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as error:
-        near = get_close_matches(str(path), shipped_configs(), n=1)
         raise UsageError(
             f"The configuration {path} cannot be read.",
             str(error),
-            f"Did you mean {near[0]!r}?"
-            if near
-            else f"Give a TOML file, or one of: {', '.join(shipped_configs())}.",
+            f"Give a TOML file, or a shipped one by name. {nearest(str(path), shipped_configs())}",
         ) from error
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path} is not TOML.", str(error)) from error
@@ -246,9 +245,41 @@ def load_config(path: Path | None = None) -> Config:
 
 
 def _known_keys() -> set[str]:
-    """Every key of a configuration, whatever machine it is of."""
     every = map(settings_of, profiles())
     kinds = [Config, *(kind for one in every for kind in (one.limits, one.drift, one.own))]
     schemas = [kind.model_json_schema() for kind in kinds]
     tables = [table for whole in schemas for table in (whole, *whole.get("$defs", {}).values())]
     return {key for table in tables for key in table.get("properties", {})}
+
+
+def to_toml(config: Config) -> str:
+    """Return the configuration as TOML that `load_config` reads back to the same configuration."""
+    return "\n".join(_table((), config.model_dump())).strip() + "\n"
+
+
+def _table(path: tuple[str, ...], values: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a table's lines: its own keys, then the tables inside it; keys without a value last."""
+    own = {k: v for k, v in values.items() if not isinstance(v, Mapping)}
+    inner = {k: v for k, v in values.items() if isinstance(v, Mapping)}
+    if path and (own or not inner):
+        yield ""
+        yield f"[{'.'.join(_key(part) for part in path)}]"
+    for key, value in own.items():
+        yield (
+            f"# {_key(key)} is not set" if value is None else f"{_key(key)} = {_value(key, value)}"
+        )
+    for key, table in inner.items():
+        yield from _table((*path, key), table)
+
+
+def _value(key: str, value: Any) -> str:
+    text = json.dumps(value)  # of strings, numbers, truth values and lists: TOML's own form
+    try:
+        unit = unit_of(key)
+    except UnknownUnitError:
+        return text
+    return text if unit == "1" else f"{text}  # {unit}"
+
+
+def _key(name: str) -> str:
+    return name if name.replace("_", "").replace("-", "").isalnum() else json.dumps(name)

@@ -19,13 +19,9 @@ DIGITS = 8
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One choice.
+    """A choice for a rig, at a time in ISO 8601: the name of the copy, and the file it was made of.
 
-    Attributes:
-        rig: Name of the rig.
-        model: Name of the copy; None to go back to the configured model.
-        source: File that was copied.
-        at: When, ISO 8601.
+    Without a name the rig goes back to the configured model.
     """
 
     rig: str
@@ -69,16 +65,8 @@ def model_in_use(rig: str) -> Path | None:
     return own[-1].path if own else None
 
 
-def choose(rig: str, source: Path | None, at: str) -> Path | None:
-    """Copy a model and make it the one in use for a rig.
-
-    Args:
-        rig: Name of the rig.
-        source: Model file; None to go back to the configured one.
-        at: When, ISO 8601.
-
-    Returns:
-        The copy.
+def choose(rig: str, source: Path | None, at: str) -> None:
+    """Copy a model and make it the one in use for a rig; None for the configured one again.
 
     Raises:
         OutputError: It cannot be written.
@@ -95,4 +83,3 @@ def choose(rig: str, source: Path | None, at: str) -> Path | None:
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / CHOICES).open("a", encoding="utf-8") as file:
         file.write(json.dumps(asdict(made)) + "\n")
-    return made.path

@@ -18,10 +18,7 @@ KEY = re.compile(r"\s*([\w\"'.\s-]+?)\s*=")
 def explain(error: ValidationError, known: Iterable[str] = (), text: str = "") -> str:
     """Return one line a problem: where it stands, the message, the nearest known key.
 
-    Args:
-        error: Error of pydantic.
-        known: Keys to suggest for one that does not exist.
-        text: The TOML that was read; with it each problem names its line.
+    With the TOML that was read each problem names its line.
     """
     sentences = []
     for problem in error.errors():
@@ -41,11 +38,8 @@ def explain(error: ValidationError, known: Iterable[str] = (), text: str = "") -
 def line_of(text: str, path: Sequence[int | str]) -> int | None:
     """Return the line of TOML text where a key stands, from 1; of a missing key its table's.
 
-    A key inside an inline table stands where that table does. None where nothing is there.
-
-    Args:
-        text: The TOML.
-        path: Keys from the top, a number for each place in an array of tables.
+    The path is the keys from the top, a number for each place in an array of tables. A key inside
+    an inline table stands where that table does. None where nothing is there.
     """
     table: list[int | str] = []
     arrays: dict[tuple[int | str, ...], int] = {}
@@ -67,7 +61,6 @@ def line_of(text: str, path: Sequence[int | str]) -> int | None:
 
 
 def _unit(key: str) -> str:
-    """Return the unit a key's name ends in, with a space before it; nothing where it has none."""
     try:
         return f" {unit_of(key)}"
     except UnknownUnitError:

@@ -12,7 +12,7 @@ from calibration.linear import CalibrationSet
 from drivers.teensy.protocol import TOP, SafeState
 from drivers.teensy.reference import Limits
 from rig.configuration.config import Config
-from rig.configuration.plausibility import PlausibilitySection
+from rig.configuration.sections import PlausibilitySection
 from rig.configuration.sections import SafetySection
 from rig.errors import SafetyTripError
 
@@ -140,7 +140,7 @@ def loop_limits(
     current_limit_a: float,
     tick_s: float,
 ) -> dict[str, Any]:
-    """Return the limits of one motor's position loop: `drivers.teensy.limits.LOOP_LIMIT_NAMES`.
+    """Return the limits of one motor's position loop: `drivers.teensy.profile.LOOP_LIMIT_NAMES`.
 
     The motor's jump is not among them. What the rig has no channel for is not limited. `channels`
     are the names of the channels `motor`, `followed`, `current` and `command`.

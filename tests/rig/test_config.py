@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from rig.configuration.check import problems, refuse_problems
-from rig.configuration.config import SIMULATED, load_config, shipped_configs
-from rig.configuration.text import to_toml
+from rig.configuration.config import SIMULATED, load_config, shipped_configs, to_toml
 from rig.errors import ExitCode, UsageError
 
 
