@@ -18,8 +18,8 @@ from rig.cli.options import (
     say_left_out,
 )
 from rig.errors import UsageError
-from rig.output.console import JsonFlag, present, progress, show_result, to_json
-from rig.output.table import TextTable, to_page
+from rig.output.console import JsonFlag, present, progress, to_json
+from rig.output.table import TextTable
 
 if TYPE_CHECKING:
     from rig.models.adapt import Adaptation
@@ -49,6 +49,7 @@ def compare(
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.importers.registry import open_campaign
     from rig.models.compared import compare as compared
+    from rig.output.page import Page
     from rig.reports import compared as shown
 
     files, estimators = (first, second), (load(first), load(second))
@@ -57,8 +58,8 @@ def compare(
         task = bar.add_task("runs", total=len(campaign))
         found = compared(files, estimators, campaign, lambda run: bar.advance(task))
     lines, tables = [*shown.lines(found), *sentence(steps)], shown.tables(found)
-    said = ["Two estimators on the same runs", *lines]
-    show_result(lines, tables, out, lambda: to_page(said, tables, found.provenance), json, found)
+    page = Page("Two estimators on the same runs", lines, tables, found.provenance)
+    page.show(found, out, json)
 
 
 def adapt(

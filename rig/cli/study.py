@@ -9,7 +9,7 @@ from typer import Argument, Option
 
 from rig.cli.help import GroupedHelp
 from rig.cli.options import FiguresFolder, SeedOption, TablesFile, WorkersOption
-from rig.cli.study_arm import StateFolder, arm_studies, counted, described, resumable, show
+from rig.cli.study_arm import StateFolder, arm_studies, counted, described, resumable
 from rig.output.console import JsonFlag, progress
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def oneill(
             every_kind = run_kinds(campaign, seed, on_fit)
     found = {"networks": deep, "states": physical, "kinds": every_kind or None}
     whole = asdict(study) | {name: each for name, each in found.items() if each is not None}
-    show(whole, page(study, deep, physical, every_kind, shown), out, json, figures)
+    page(study, deep, physical, every_kind, shown).show(whole, out, json, figures)
 
 
 @study_app.command()
@@ -143,7 +143,7 @@ def zhao(
     cells = {"prototype": study.prototype, "spread": study.spread, "cells": study.cells}
     found = {", ".join(key): each.findings for key, each in study.lacking.items()}
     whole = {"study": {**cells, "findings": found}, "haptics": haptics}
-    show(whole, page(study, haptics), out, json, figures)
+    page(study, haptics).show(whole, out, json, figures)
 
 
 @study_app.command()
@@ -166,7 +166,7 @@ def loop(
     tasks = [TASKS[number - 1] for number in task] if task else TASKS
     with described("loop") as step:
         study = run_study(data, seed, tasks, on_stage=step)
-    show(study, page(study), out, json)
+    page(study).show(study, out, json)
 
 
 @study_app.command()
@@ -196,7 +196,7 @@ def instruments(
             seed=seed,
             on_row=on_row,
         )
-    show(study, page(study), out, json)
+    page(study).show(study, out, json)
 
 
 @study_app.command()
@@ -223,7 +223,7 @@ def intervals(
     campaigns = {name: open_campaign(part_of(data, name)) for name in names}
     with described("intervals") as step:
         study = run_intervals(campaigns, source or names[:3], seed, on_step=step)
-    show(study, page(study), out, json)
+    page(study).show(study, out, json)
 
 
 @study_app.command()
@@ -255,4 +255,4 @@ def machines(
             " ".join(study.skipped),
             "Put emps, smart-grasper, sts3215 or ur10e there.",
         )
-    show(study, page(study), out, json)
+    page(study).show(study, out, json)

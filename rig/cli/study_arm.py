@@ -1,6 +1,5 @@
 """`rig study` on simulated and measured arms, and what all studies share: page and kept parts."""
 
-import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,10 +11,9 @@ import typer
 from typer import Option
 
 from rig.cli.options import FiguresFolder, TablesFile, WorkersOption
-from rig.output.console import JsonFlag, progress, show_result
+from rig.output.console import JsonFlag, progress
 
 if TYPE_CHECKING:
-    from rig.output.page import Page
     from rig.studies.seeds import Keeper
 
 arm_studies = typer.Typer(rich_markup_mode=None)
@@ -25,27 +23,6 @@ StateFolder = Annotated[
 ]
 
 ArmData = Annotated[Path, Option(help="Folder of measured arm motion, such as the dVRK paths.")]
-
-
-def show(
-    study: object, page: "Page", out: Path | None, json: bool, figures: Path | None = None
-) -> None:
-    """Print a study, write its page and its figures, and print it as JSON if asked.
-
-    Args:
-        study: What goes to stdout as JSON.
-        page: Its page.
-        out: File for the page.
-        json: Whether it is wanted as JSON.
-        figures: Folder for its figures.
-    """
-    drawn = []
-    if figures is not None:
-        from rig.output.figures import write_svgs
-
-        drawn = write_svgs(figures, page.figures())
-    places = [] if out is None else [os.path.relpath(path, out.parent) for path in drawn]
-    show_result(page.paragraphs, page.tables, out, lambda: page.markdown(places), json, study)
 
 
 @contextmanager
@@ -107,7 +84,7 @@ def pique(
     with described("paths") as step:
         first, second, *others = open_paths(data, [*paths, *(also or [])])
         study = run_study(first, second, also=others, on_step=step)
-    show(study, page(study), out, json, figures)
+    page(study).show(study, out, json, figures)
 
 
 @arm_studies.command()
@@ -129,7 +106,7 @@ def excitation(
         study, best = run_excitation(starts, evaluations, on_start)
     if trajectory is not None:
         write_trajectory(best, trajectory)
-    show(study, page(study), out, json)
+    page(study).show(study, out, json)
 
 
 def _of_simulated_arms(name: str) -> Callable[..., None]:
@@ -150,7 +127,7 @@ def _of_simulated_arms(name: str) -> Callable[..., None]:
         page, made = (import_module(f"rig.studies.{name}.{part}") for part in ("page", "study"))
         with resumable(state, name, seeds * len(FAMILIES), workers) as keeper:
             study = made.run(seeds, keeper)
-        show(study, page.page(study), out, json, figures)
+        page.page(study).show(study, out, json, figures)
 
     return command
 
@@ -186,4 +163,4 @@ def payload(
     with described("paths") as step:
         fitted, *runs = open_paths(data, [model, *on])
         found = find_payload(fitted, runs, height_m, height_error_m, step)
-    show(found, page(found), out, json)
+    page(found).show(found, out, json)

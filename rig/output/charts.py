@@ -1,15 +1,18 @@
-"""Interactive charts of a page: plain data that the Plotly library, inside the page, draws.
+"""Pages of HTML that need nothing else, no network, one style for paper and screen.
 
-A chart has the numbers it shows as a table too, for readers who cannot see it.
+Their charts are plain data that the Plotly library, inside the page, draws. A chart has the numbers
+it shows as a table too, for readers who cannot see it.
 """
 
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import resources
 from typing import Any
 
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from estimation.recording import FloatArray
@@ -31,7 +34,6 @@ class Chart:
         name: Id in the page and name of exported files.
         title: Title, also of an exported file.
         judgement: Conclusion that the chart supports, in a sentence.
-        caption: What is drawn.
         layout: Axes, as Plotly has them.
         lines: What is drawn.
         choices: Name to what is drawn once it is chosen, in place of `lines`; empty without choice.
@@ -62,12 +64,9 @@ def thinned(values: FloatArray, points: int = POINTS) -> FloatArray:
 def binned(
     x: FloatArray, y: FloatArray, bins: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return bin centres, mean, 5th and 95th percentile of y over bins of x.
+    """Return bin centres, mean, 5th and 95th percentile of y over bins of x, both of shape (n,).
 
-    Args:
-        x: The variable, shape (n,).
-        y: The values, shape (n,).
-        bins: Bins over the middle 98 % of x; those with under ten samples are left out.
+    The bins cover the middle 98 % of x; those with under ten samples are left out.
     """
     low, high = np.percentile(x, [1, 99])
     edges = np.linspace(low, high if high > low else low + 1.0, bins + 1)
@@ -113,7 +112,31 @@ def trace(
     return {"type": kind, "x": x, "y": y, "name": name, "meta": {"role": role}, **more}
 
 
-def embedded(charts: Sequence[Chart]) -> Markup:
+@cache
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("rig.output"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def render(template: str, context: Mapping[str, Any]) -> str:
+    """Fill a template of this package, such as `diagnosis.html`, and put its charts into it.
+
+    Text is escaped; figures from `rig.output.figures` are markup already and are not. `charts` of
+    the context are drawn by the page.
+
+    Raises:
+        jinja2.UndefinedError: The template uses a name that the context lacks.
+    """
+    drawn = {"data": _embedded(context["charts"]), "script": _scripts()}
+    return _environment().get_template(template).render({**context, **drawn})
+
+
+def _embedded(charts: Sequence[Chart]) -> Markup:
     """Return the data of charts as JSON that may stand inside a script element."""
     names = ("name", "title", "layout", "lines", "choices")
     plain = [{name: getattr(chart, name) for name in names} for chart in charts]
@@ -121,7 +144,7 @@ def embedded(charts: Sequence[Chart]) -> Markup:
     return Markup(text.replace("<", "\\u003c"))  # noqa: S704 - no tag can begin in it
 
 
-def scripts() -> Markup:
+def _scripts() -> Markup:
     """Return the drawing library and the code that draws a page's charts with it."""
     folder = resources.files("rig.output") / "assets"
     texts = [(folder / name).read_text("utf-8") for name in ("plotly-basic.min.js", "charts.js")]

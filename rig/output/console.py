@@ -6,7 +6,7 @@ With `--json` stdout carries JSON alone, and results for people go to stderr.
 import json
 import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -44,17 +44,21 @@ def results(json: bool) -> "Console":
 
 def present(json: bool, data: Any, *shown: "str | TextTable") -> None:
     """Show a result: text and tables to people, and with `json` its data on stdout."""
-    screen = results(json)
-    for one in shown:
-        if isinstance(one, str):
-            screen.print(one)
-        else:
-            show_table(screen, one)
+    show(results(json), *shown)
     if json:
         emit_json(data)
 
 
-def show_table(screen: "Console", table: "TextTable") -> None:
+def show(screen: "Console", *shown: "str | TextTable") -> None:
+    """Print lines and tables."""
+    for one in shown:
+        if isinstance(one, str):
+            screen.print(one)
+        else:
+            _show_table(screen, one)
+
+
+def _show_table(screen: "Console", table: "TextTable") -> None:
     """Print a table; where the terminal is too narrow for it, a paragraph for each row."""
     from rig.output.table import to_rich
 
@@ -110,10 +114,7 @@ def progress() -> "Progress":
 def time_left(expected: Mapping[str, tuple[float, float]], stage: str, elapsed_s: float) -> str:
     """Return the time that is left in words; empty where it is not known.
 
-    Args:
-        expected: Shortest and longest time of each stage, s, in order.
-        stage: The one at work.
-        elapsed_s: Time since it began.
+    Expected are the shortest and longest time of each stage, s, in order; one of them is at work.
     """
     if stage not in expected:
         return ""
@@ -131,13 +132,20 @@ def time_left(expected: Mapping[str, tuple[float, float]], stage: str, elapsed_s
 
 
 @contextmanager
+def counting(what: str, total: float | None = None) -> "Iterator[Callable[..., None]]":
+    """Show how much of some work is done; yields what is called after each part of it."""
+    with progress() as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda *_: bar.advance(task)
+
+
+@contextmanager
 def stages(
     expected: Mapping[str, tuple[float, float]] | None = None,
 ) -> "Iterator[Callable[[str], None]]":
     """Yield what is called with each stage that begins; a terminal shows how long each takes.
 
-    Args:
-        expected: Shortest and longest time of each stage, s, in order, as far as they are known.
+    Expected is as in `time_left`, as far as it is known.
     """
     from rich.progress import Progress, ProgressColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
     from rich.text import Text
@@ -163,41 +171,6 @@ def stages(
         yield begin
         for task in shown.tasks:
             shown.update(task.id, total=1, completed=1)
-
-
-def show_result(
-    lines: Iterable[str],
-    tables: Iterable["TextTable"],
-    out: Path | None,
-    markdown: Callable[[], str],
-    json: bool,
-    data: Any,
-) -> None:
-    """Show a result, and write it as Markdown where a file is asked for.
-
-    Args:
-        lines: Lines printed first.
-        tables: Shown below.
-        out: File for the Markdown, or None for none.
-        markdown: Returns the file's text.
-        json: Whether stdout is to carry JSON.
-        data: What it carries.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
-    from estimation.files import write_text_atomic
-
-    screen = results(json)
-    for line in lines:
-        screen.print(line)
-    for table in tables:
-        show_table(screen, table)
-    if out is not None:
-        write_text_atomic(out, markdown())
-        screen.print(f"Markdown: {out}")
-    if json:
-        emit_json(data)
 
 
 def plain(value: Any) -> Any:

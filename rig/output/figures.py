@@ -77,13 +77,9 @@ def _legend_above(ax: Axes) -> None:
 def over_time(
     time_s: FloatArray, series: Mapping[str, FloatArray], unit: str, caption: str
 ) -> Markup:
-    """Draw signals over time.
+    """Draw signals of a unit over time, by name, each of shape (n,); NaN makes a gap.
 
-    Args:
-        time_s: Shape (n,), s.
-        series: Name to values, each of shape (n,); NaN makes a gap.
-        unit: Unit of the values.
-        caption: Description of the figure, also for readers who cannot see it.
+    The caption of any figure describes it for readers who cannot see it.
     """
     figure, (ax,) = _axes(7.2, 2.6)
     with mpl.rc_context(_STYLE):
@@ -106,15 +102,8 @@ def against(
 ) -> Markup:
     """Draw values against several variables: mean and the middle 90 % in each of 24 bins.
 
-    The bins cover the middle 98 % of each variable; those with under ten samples are left out.
-
-    Args:
-        variables: Name and unit of each variable to its values, shape (n,); the panels stand side
-            by side, on one scale.
-        before: Values to compare with, shape (n,).
-        after: The values, shape (n,).
-        y_label: Name and unit of the values.
-        caption: Description of the figure.
+    Variables, by name and unit, and values have shape (n,). The panels stand side by side, on one
+    scale. The bins are those of `binned`.
     """
     figure, axes = _axes(7.2, 2.5, len(variables))
     series = [("before", before, COLOURS[1]), ("after", after, COLOURS[0])]
@@ -135,13 +124,7 @@ def against(
 
 
 def bars(values: Mapping[str, float], unit: str, caption: str) -> Markup:
-    """Draw one bar a name.
-
-    Args:
-        values: Name to value.
-        unit: Name and unit of the values.
-        caption: Description of the figure.
-    """
+    """Draw one bar a name."""
     named = {name.replace("_", " "): (value,) for name, value in values.items()}
     return paired_bars(named, ("",), unit, caption)
 
@@ -149,14 +132,7 @@ def bars(values: Mapping[str, float], unit: str, caption: str) -> Markup:
 def paired_bars(
     values: Mapping[str, Sequence[float]], sides: Sequence[str], unit: str, caption: str
 ) -> Markup:
-    """Draw the bars of each name, side by side.
-
-    Args:
-        values: Name to its values, one a side.
-        sides: What each of the values is.
-        unit: Name and unit of the values.
-        caption: Description of the figure.
-    """
+    """Draw the bars of each name next to one another, one for each side."""
     figure, (ax,) = _axes(7.2, 2.2)
     with mpl.rc_context(_STYLE):
         place, step = np.arange(len(values)), 0.72 / len(sides)
@@ -176,14 +152,7 @@ def paired_bars(
 def scattered(
     series: Mapping[str, tuple[FloatArray, FloatArray]], x_label: str, y_label: str, caption: str
 ) -> Markup:
-    """Draw points, one colour a series, and a line at zero; the names where there are few.
-
-    Args:
-        series: Name to x and y, each of shape (n,).
-        x_label: Name and unit of x.
-        y_label: Name and unit of y.
-        caption: Description of the figure.
-    """
+    """Draw points, one colour a series of x and y, and a line at zero."""
     figure, (ax,) = _axes(7.2, 2.6)
     with mpl.rc_context(_STYLE):
         for number, (name, (x, y)) in enumerate(series.items()):
@@ -199,15 +168,7 @@ def scattered(
 
 
 def write_svgs(folder: Path, drawn: Mapping[str, Markup]) -> list[Path]:
-    """Write figures as files of their own, in a colour that reads on light and dark pages.
-
-    Args:
-        folder: Folder of the output.
-        drawn: Name of the file to figure.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
+    """Write figures by name as files, in a colour that reads on light and dark pages."""
     paths = []
     for name, figure in drawn.items():
         path = folder / f"{name}.svg"

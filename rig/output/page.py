@@ -2,22 +2,24 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from os.path import relpath
+from pathlib import Path
 
 from markupsafe import Markup
 
+from estimation.files import write_text_atomic
+from rig.output.console import emit_json, results, show
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable, to_page
 
 
 @dataclass(frozen=True)
 class Page:
-    """A page of a study.
+    """A page of a result.
 
     Attributes:
         title: Title of the Markdown.
         paragraphs: The result in a few sentences, then remarks for a comparison.
-        tables: The tables, in order.
-        provenance: When and from what the study was made.
         figures: Draws the figures, by the name of their file.
     """
 
@@ -30,3 +32,29 @@ class Page:
     def markdown(self, places: Sequence[str] = ()) -> str:
         """Return the page as Markdown, with its figures at places relative to it."""
         return to_page([self.title, *self.paragraphs], self.tables, self.provenance, places)
+
+    def show(self, data: object, out: Path | None, json: bool, figures: Path | None = None) -> None:
+        """Print the page, write it as Markdown, and its figures, where they are asked for.
+
+        Args:
+            data: What goes to stdout as JSON, if that is asked for.
+            out: File for the Markdown.
+            json: Whether stdout is to carry JSON.
+            figures: Folder for the figures.
+
+        Raises:
+            OutputError: A file cannot be written.
+        """
+        drawn: list[Path] = []
+        if figures is not None:
+            from rig.output.figures import write_svgs
+
+            drawn = write_svgs(figures, self.figures())
+        screen = results(json)
+        show(screen, *self.paragraphs, *self.tables)
+        if out is not None:
+            places = [relpath(path, out.parent) for path in drawn]
+            write_text_atomic(out, self.markdown(places))
+            screen.print(f"Markdown: {out}")
+        if json:
+            emit_json(data)

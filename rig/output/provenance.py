@@ -28,8 +28,7 @@ class Provenance:
 
     Attributes:
         date: Day and time, UTC, ISO 8601 to the minute.
-        commit: Commit of the source tree, with `+changes` when files outside `docs` differ from
-            it; `unknown` outside a git tree.
+        commit: As `commit` returns it.
         version: Version of rig.
         seed: Seed of everything random.
         command: Command line; of a path only the last part, since the others are the machine's own.
@@ -66,25 +65,21 @@ class Provenance:
 def commit(tree: Path) -> str:
     """Return the short commit of a source tree, or `unknown` when it is not a git tree.
 
-    Changes in `docs` do not count: pages made one after the other are of one commit.
-
-    Args:
-        tree: Root of the source tree.
+    It ends in `+changes` when files outside `docs` differ from it. Those in `docs` do not count:
+    pages made one after the other are of one commit.
     """
     git = shutil.which("git")
     if git is None or not (tree / ".git").exists():
         return "unknown"
-    head = _ask(git, tree, "rev-parse", "--short", "HEAD")
+
+    def ask(*words: str) -> str | None:
+        answer = subprocess.run(  # noqa: S603 - git itself, with fixed words
+            [git, "-C", str(tree), *words], capture_output=True, text=True, check=False, timeout=20
+        )
+        return answer.stdout.strip() if answer.returncode == 0 else None
+
+    head = ask("rev-parse", "--short", "HEAD")
     if head is None:
         return "unknown"
-    changes = _ask(
-        git, tree, "status", "--porcelain", "--untracked-files=no", "--", ":/", ":/!docs"
-    )
+    changes = ask("status", "--porcelain", "--untracked-files=no", "--", ":/", ":/!docs")
     return head + ("+changes" if changes else "")
-
-
-def _ask(git: str, tree: Path, *words: str) -> str | None:
-    answer = subprocess.run(  # noqa: S603 - git itself, with fixed words
-        [git, "-C", str(tree), *words], capture_output=True, text=True, check=False, timeout=20
-    )
-    return answer.stdout.strip() if answer.returncode == 0 else None

@@ -12,14 +12,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table of text.
-
-    Attributes:
-        title: Heading.
-        columns: Column headings; the first column is text, the others are numbers.
-        rows: Cells, one sequence a row.
-        note: Remark below the table; may be empty.
-    """
+    """A table of text; the first column is text, the others are numbers; a note stands below."""
 
     title: str
     columns: Sequence[str]

@@ -9,9 +9,8 @@ from calibration.history import COVERAGE, changes, deviation, earlier_ones
 from calibration.procedure import Conclusion, Residuals
 from calibration.record import CalibrationRecord
 from rig.calibrate.shown import parameter_unit, with_unit
-from rig.output.charts import Chart, Line, embedded, numbers, scripts, thinned, trace
+from rig.output.charts import Chart, Line, numbers, render, thinned, trace
 from rig.output.provenance import Provenance
-from rig.output.render import render
 from rig.output.table import TextTable
 
 
@@ -37,8 +36,6 @@ def page(
             "facts": _facts(records),
             "charts": charts,
             "tables": tables,
-            "data": embedded(charts),
-            "script": scripts(),
             "provenance": provenance,
         },
     )

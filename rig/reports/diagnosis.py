@@ -10,9 +10,8 @@ from estimation.causes.verdict import Answer
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.files import write_text_atomic
 from rig.diagnosis.traces import Traces, traces
-from rig.output.charts import embedded, scripts
+from rig.output.charts import render
 from rig.output.provenance import Provenance
-from rig.output.render import render
 from rig.output.table import TextTable
 from rig.reports import diagnosis_words as words
 from rig.reports.diagnosis_figures import charts
@@ -64,8 +63,6 @@ def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
             "limits": [*diagnosis.notes, CONFIDENCE],
             "next_experiment": words.next_sentence(diagnosis),
             "method": method,
-            "data": embedded(drawn),
-            "script": scripts(),
             "provenance": provenance,
         },
     )

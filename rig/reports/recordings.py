@@ -8,9 +8,8 @@ import numpy as np
 from estimation.campaign import Campaign
 from estimation.channels import ESTIMATED, plain_name, unit_of
 from estimation.recording import FloatArray, Recording
-from rig.output.charts import Chart, axis, embedded, line, scripts, thinned
+from rig.output.charts import Chart, axis, line, render, thinned
 from rig.output.provenance import Provenance
-from rig.output.render import render
 from rig.output.table import TextTable, listed
 from rig.reports.diagnosis_words import display
 
@@ -53,8 +52,6 @@ def page(campaign: Campaign, title: str, provenance: Provenance) -> str:
             "title": title,
             "runs": TextTable("Runs", columns, rows),
             "charts": [chart],
-            "data": embedded([chart]),
-            "script": scripts(),
             "provenance": provenance,
         },
     )
