@@ -11,8 +11,7 @@ from typer import Option
 
 from rig.cli.calibrate_check import check
 from rig.cli.calibrate_store import add, diagnose, diff, list_, show, use
-from rig.cli.help import group
-from rig.cli.options import ConfigOption, SimFlag, SimulationSeed
+from rig.cli.options import ConfigOption, SimFlag, SimulationSeed, group
 from rig.errors import UsageError
 from rig.output.console import JsonFlag
 

@@ -11,7 +11,7 @@ from rig.campaigns.index import IndexedCampaign
 from rig.diagnosis.ledger import default_ledger
 from rig.diagnosis.refit import Refit, refit_all
 from rig.diagnosis.work import engine
-from rig.output.console import present, progress
+from rig.output.console import counting, present
 from rig.output.table import TextTable
 from rig.reports.diagnosed import FolderDiagnosis, diagnose_all
 
@@ -27,12 +27,11 @@ def show_diagnoses(
     """
     folders = [one.folder for one in reversed(found)]  # the newest come first
     new: list[Path] = []
-    with progress() as bar:
-        task = bar.add_task("campaigns", total=len(folders))
+    with counting("campaigns", len(folders)) as advance:
 
         def count(folder: Path, _: FolderDiagnosis) -> None:
             new.append(folder)
-            bar.advance(task)
+            advance()
 
         done = diagnose_all(folders, default_ledger(), partial(engine, workers, scheduler), count)
     rows = [
@@ -68,11 +67,8 @@ def show_refit(
     """
     declared = to_toml(read(Path(model)))
     dates = {one.folder: one.runs[0].date for one in reversed(found)}  # the newest come first
-    with progress() as bar:
-        task = bar.add_task("campaigns", total=None)
-        fitted = refit_all(
-            list(dates), declared, partial(engine, workers, scheduler), lambda _: bar.advance(task)
-        )
+    with counting("campaigns") as advance:
+        fitted = refit_all(list(dates), declared, partial(engine, workers, scheduler), advance)
     good = {folder: fit for folder, fit in fitted.items() if not fit.failed}
     moved = _changes(good, dates, root)
     rows = [{"folder": folder, "date": dates[folder], "fit": one} for folder, one in fitted.items()]

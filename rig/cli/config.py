@@ -8,8 +8,7 @@ from typer import Argument, Option
 
 from estimation.errors import nearest
 from estimation.files import write_text_atomic
-from rig.cli.help import group
-from rig.cli.options import SimFlag, complete_config, config_names, require_new
+from rig.cli.options import SimFlag, complete_config, config_names, group, require_new
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, emit_json, present
 

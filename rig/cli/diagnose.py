@@ -1,53 +1,45 @@
-"""`rig diagnose`: what does the declared model lack?"""
+"""`rig diagnose | diff | loop`: what a declared model lacks, what changed, what to record next."""
 
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Option
+from typer import Argument, Option
 
 from estimation.files import OutputError, check_output
-from rig.cli.options import (
-    EquationOption,
-    FormatOption,
-    JsonFile,
-    LedgerOption,
-    MachineOption,
-    ModelOption,
-    QuickFlag,
-    RecordingsArgument,
-    SchedulerOption,
-    SeedOption,
-    SkipBad,
-    WorkersOption,
-    say_left_out,
-)
-from rig.output.console import JsonFlag, present
+from rig.cli import options
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, counted, counting, present, progress, remarks, results
+from rig.output.table import TextTable
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from estimation.causes.verdict import Answer
+    from rig.diagnosis.loop import Round
 
 
 def diagnose(
-    path: RecordingsArgument,
-    model: ModelOption = None,
-    machine: MachineOption = None,
-    balance: EquationOption = None,
+    path: options.RecordingsArgument,
+    model: options.ModelOption = None,
+    machine: options.MachineOption = None,
+    balance: options.EquationOption = None,
     json_: JsonFlag = False,
-    json_out: JsonFile = None,
+    json_out: options.JsonFile = None,
     report: Annotated[
         Path | None, Option(help="Folder of the HTML report; of a folder of logs, diagnosis in it.")
     ] = None,
     model_out: Annotated[
         Path | None, Option(help="File of the models with the identified effects.")
     ] = None,
-    seed: SeedOption = 0,
-    workers: WorkersOption = 1,
-    quick: QuickFlag = False,
-    scheduler: SchedulerOption = None,
+    seed: options.SeedOption = 0,
+    workers: options.WorkersOption = 1,
+    quick: options.QuickFlag = False,
+    scheduler: options.SchedulerOption = None,
     protocol_out: Annotated[
         Path | None, Option(help="Protocol file of the next experiment.")
     ] = None,
-    ledger: LedgerOption = None,
+    ledger: options.LedgerOption = None,
     plan: Annotated[
         bool,
         Option(
@@ -55,8 +47,8 @@ def diagnose(
             help="PATH is a protocol or recordings: which effects such runs can distinguish.",
         ),
     ] = False,
-    skip_bad: SkipBad = False,
-    format_: FormatOption = None,
+    skip_bad: options.SkipBad = False,
+    format_: options.FormatOption = None,
 ) -> None:
     """Identify the effect that the declared model lacks, and confirm it on held-out test runs."""
     if plan:
@@ -82,7 +74,7 @@ def diagnose(
     looks = Ledger(ledger or default_ledger())
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_, machine, skip_bad)
-        say_left_out(path, asked.campaign)
+        options.say_left_out(path, asked.campaign)
         with timed_stages(asked, quick) as on_stage:
             done, look = run_diagnosis(
                 asked, looks, seed=seed, executor=executor, quick=quick, on_stage=on_stage
@@ -120,7 +112,6 @@ def _kept_with(path: Path) -> Path | None:
     from estimation.file_kinds import DIAGNOSIS as KIND
     from estimation.file_kinds import HTML
     from rig.campaigns.index import DIAGNOSIS
-    from rig.output.console import remarks
 
     if not path.is_dir() or not any(path.glob("*.mcap")):
         return None
@@ -138,13 +129,124 @@ def _plan(
     path: Path, model: Path | None, balance: str | None, machine: Path | None, json_: bool
 ) -> None:
     from rig.diagnosis.plan import plan_of, sentences
-    from rig.output.console import progress
 
-    with progress() as bar:
-        task = bar.add_task("effects")
-
-        def count(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total)
-
+    with counted("effects") as count:
         found = plan_of(path, model, balance, machine, count)
     present(json_, found.to_json(), *sentences(found))
+
+
+def diff(
+    a: Annotated[Path, Argument(help="Recordings of the first campaign.")],
+    b: Annotated[Path, Argument(help="Recordings of the second campaign.")],
+    model: options.ModelOption = None,
+    machine: options.MachineOption = None,
+    balance: options.EquationOption = None,
+    on: Annotated[Path | None, Option(help="Recordings of a third campaign, to predict.")] = None,
+    seed: options.SeedOption = 0,
+    format_: options.FormatOption = None,
+    json_: JsonFlag = False,
+) -> None:
+    """Find what changed between two campaigns of one machine, with intervals over runs.
+
+    Two dates, two instruments, before and after a repair: which declared parameters moved, which
+    effects came or went. A change is stated where it predicts runs left out better than none does.
+    """
+    from estimation.changes.compare import compare
+    from rig.diagnosis.subject import subject
+    from rig.reports.changes import change_table, lines, prediction_table
+
+    first = subject(a, model, balance, format_, machine)
+    second = subject(b, model, balance, format_, machine)
+    third = () if on is None else subject(on, model, balance, format_, machine).campaign.evidence
+    for path, campaign in ((a, first.campaign), (b, second.campaign)):
+        options.say_left_out(path, campaign)
+    both = first.campaign.evidence, second.campaign.evidence
+    with counting("changes", total=1) as done:
+        found = compare(*both, first.models, third, seed)
+        done()
+    shown: list[str | TextTable] = [*lines(found)]
+    shown += [change_table(found)] if found.changes else []
+    shown += [prediction_table(found)] if found.predicted else []
+    present(json_, found, *shown)
+
+
+def loop(
+    sim: options.SimFlag = False,
+    hide: Annotated[
+        list[str] | None,
+        Option(
+            help="Hidden effect, or effect=strength; by default drawn by the seed; `none` for none."
+        ),
+    ] = None,
+    balance: options.EquationOption = None,
+    protocol: Annotated[
+        str | None, Option("--protocol", "-p", help="First protocol; by default `diagnosis`.")
+    ] = None,
+    out: options.OutFolder = None,
+    rounds: Annotated[int, Option(help="Maximum number of campaigns.")] = 3,
+    minutes: Annotated[float, Option(help="No round starts after this time, min.")] = 20.0,
+    seed: options.SimulationSeed = None,
+    quick: options.QuickFlag = False,
+    workers: options.WorkersOption = 1,
+    scheduler: options.SchedulerOption = None,
+    json: JsonFlag = False,
+) -> None:
+    """Record, diagnose and choose the next experiment, until the effect is unique.
+
+    Ends when every effect is unique, when the model is complete, or at the limit of rounds or time.
+    """
+    from rig.configuration.config import load_config
+    from rig.diagnosis.loop import Budget, Round, run_loop
+    from rig.diagnosis.subject import declared_models
+    from rig.diagnosis.work import engine
+    from rig.protocols.protocol import load_protocol
+    from rig.simulation.hidden import chosen
+
+    if not sim:
+        raise UsageError("The loop moves the simulated rig only.", fix="Type `rig loop --sim`.")
+    screen, now = results(json), datetime.now()
+    number = seed if seed is not None else int(now.timestamp()) % 1000
+    hidden = chosen(hide, number)
+    settings = load_config().changed(
+        simulation={"seed": number, "hidden": hidden, "plant": "declared"}
+    )
+    folder = out or Path("logs") / f"loop-{now:%Y-%m-%d-%H%M%S}"
+    remarks().print(f"rig loop, seed {number}: everything goes to {folder}")
+    made: list[Round] = []
+    with engine(workers, scheduler) as executor, progress() as bar:
+        task = bar.add_task("samples", total=None)
+
+        def count(name: str, samples: int, expected: int) -> None:
+            bar.update(task, completed=samples, total=expected, description=name)
+
+        for one in run_loop(
+            folder,
+            settings,
+            declared_models(None, balance),
+            Budget(rounds, minutes),
+            first=load_protocol(protocol) if protocol else None,
+            seed=number,
+            executor=executor,
+            quick=quick,
+            on_stage=lambda text: bar.console.print(f"- {text}"),
+            on_progress=count,
+        ):
+            made.append(one)
+            bar.stop()
+            _report(one, folder, number, screen)
+            bar.start()
+    drawn = ", ".join(f"{name} ({strength:g})" for name, strength in hidden.items())
+    last = {"stopped": made[-1].stopped, "rounds": [one.to_json() for one in made]}
+    data = {"folder": folder, "hidden": hidden, **last}
+    present(json, data, f"Hidden effects: {drawn or 'none'}.")
+
+
+def _report(one: "Round", folder: Path, seed: int, screen: "Console") -> None:
+    """Print the sentences of a round, and write its page."""
+    from rig.reports.diagnosis import write
+    from rig.reports.diagnosis_words import next_sentence, sentences
+
+    found = one.done.diagnosis
+    written = write(one.done, seed, folder / f"round-{one.number}" / "diagnosis.html")
+    for line in (*sentences(found), *written, one.stopped or next_sentence(found)):
+        screen.print(line)

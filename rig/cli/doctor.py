@@ -1,4 +1,4 @@
-"""`rig doctor | devices | udev | selftest | commission`: what is there, and is it in order."""
+"""`rig doctor | devices | udev | selftest | commission | firmware`: what is there, in order?"""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -6,8 +6,14 @@ from typing import Annotated, Any
 import typer
 from typer import Option
 
-from rig.cli.options import ConfigOption, SimFlag, chosen_rig, require_yes
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig, group, require_yes
 from rig.output.console import JsonFlag, emit_json, present, results
+
+firmware_app = group("firmware", "Show firmware versions, build the firmware, flash it.")
+
+BoardOption = Annotated[
+    str, Option("--board", "-b", help="teensy35, teensy41 or teensy41-grasper.")
+]
 
 YesFlag = Annotated[
     bool, Option("--yes", help="The jaw is empty and the emergency stop at hand; do not ask.")
@@ -148,3 +154,51 @@ def commission(
     if json:
         emit_json({"passed": passed, "checks": made})
     return 0 if passed else 1
+
+
+@firmware_app.command()
+def version(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
+    """Hold the board's firmware against this program's and this source tree's.
+
+    Exit code 1 when they do not go together.
+    """
+    from rig.bench.firmware import compare
+
+    versions = compare(chosen_rig(config, sim))
+    present(
+        json,
+        versions,
+        f"program   {versions.program}",
+        f"sources   {versions.sources}",
+        f"board     {versions.board}",
+        *versions.remarks,
+    )
+    return 0 if versions.fits else 1
+
+
+@firmware_app.command()
+def build(board: BoardOption = "", json: JsonFlag = False) -> None:
+    """Build the firmware: for the simulated rig, or with --board for a Teensy."""
+    from rig.bench.firmware import build as make
+    from rig.bench.firmware import build_for
+
+    where = build_for(board) if board else make()
+    present(json, {"built": where}, f"Built {where}.")
+
+
+@firmware_app.command()
+def flash(
+    board: BoardOption = "teensy41",
+    serial: Annotated[str, Option(help="Serial number the board must have.")] = "",
+    json: JsonFlag = False,
+) -> None:
+    """Build for a Teensy and write it to the only one that is plugged in.
+
+    A second Teensy on this computer is refused, for the loader takes the first it finds, and so is
+    an armed board or one that another program has.
+    """
+    from rig.bench.firmware import flash as write
+
+    found = write(board, serial)
+    text = f"Flashed {board} to the board {found.serial}. Next: rig firmware version"
+    present(json, {"flashed": board, "serial": found.serial, "port": found.port}, text)

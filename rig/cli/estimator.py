@@ -8,17 +8,17 @@ from typer import Argument, Option
 
 from estimation.errors import nearest
 from estimation.files import write_text_atomic
-from rig.cli.help import group
 from rig.cli.options import (
     FormatOption,
     JsonFile,
     SeedOption,
     TablesFile,
+    group,
     require_new,
     say_left_out,
 )
 from rig.errors import UsageError
-from rig.output.console import JsonFlag, present, progress, to_json
+from rig.output.console import JsonFlag, counting, present, to_json
 from rig.output.table import TextTable
 
 if TYPE_CHECKING:
@@ -31,8 +31,7 @@ estimator_app = group("estimator", "Compare estimators.")
 
 
 @estimator_app.callback()
-def _estimator() -> None:
-    """Compare estimators."""
+def _estimator() -> None: ...
 
 
 @estimator_app.command()
@@ -54,9 +53,8 @@ def compare(
 
     files, estimators = (first, second), (load(first), load(second))
     campaign, steps = with_one_zero(open_campaign(on, format_), estimators[0].target)
-    with progress() as bar:
-        task = bar.add_task("runs", total=len(campaign))
-        found = compared(files, estimators, campaign, lambda run: bar.advance(task))
+    with counting("runs", len(campaign)) as on_run:
+        found = compared(files, estimators, campaign, on_run)
     lines, tables = [*shown.lines(found), *sentence(steps)], shown.tables(found)
     page = Page("Two estimators on the same runs", lines, tables, found.provenance)
     page.show(found, out, json)
@@ -93,8 +91,7 @@ def adapt(
     say_left_out(path, campaign)
     campaign, steps = with_one_zero(campaign, estimator.target)
     named = [name.strip() for name in runs.split(",") if name.strip()]
-    with progress() as bar:
-        task = bar.add_task("runs", total=len(campaign))
+    with counting("runs", len(campaign)) as on_run:
         named = named or runs_by_rule(estimator, campaign, choose)
         result, new = run_adaptation(
             estimator,
@@ -103,7 +100,7 @@ def adapt(
             named,
             from_scratch=scratch,
             seed=seed,
-            on_run=lambda run: bar.advance(task),
+            on_run=on_run,
         )
     said = [*sentence(steps)]
     if out is not None:

@@ -20,7 +20,7 @@ from rig.cli.options import (
     say_left_out,
 )
 from rig.errors import UsageError
-from rig.output.console import JsonFlag, present, progress
+from rig.output.console import JsonFlag, counting, present, progress
 from rig.output.provenance import now_utc
 from rig.output.table import TextTable, counted
 
@@ -77,15 +77,14 @@ def _learn(
     kept, error = campaign.evidence, None
     folds = min(folds, len(kept))
     said, figures = [*sentence(steps)], {}
-    with progress() as bar:
-        task = bar.add_task("fits", total=1 + folds)
+    with counting("fits", 1 + folds) as advance:
         estimator = recipe.fit(campaign)
-        bar.advance(task)
+        advance()
         if isinstance(recipe, NetworkRecipe):
             facts: dict[str, Any] = {"inputs": recipe.inputs, "nodes": STATE_NODES}
             said.insert(0, f"{target} from {', '.join(recipe.inputs)}: {STATE_NODES} nodes.")
             if len(kept) > 1:
-                error = closing_score(recipe, kept, folds, seed, lambda: bar.advance(task))
+                error = closing_score(recipe, kept, folds, seed, advance)
         else:
             facts = {"surrogate": recipe.bank.surrogate}
             error = held_out_score(recipe, kept, folds, seed) if len(kept) > 1 else None

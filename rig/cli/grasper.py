@@ -5,8 +5,7 @@ from typing import Annotated
 
 from typer import Option
 
-from rig.cli.help import group
-from rig.cli.options import ConfigOption, SeedOption, SimFlag, chosen_rig, require_number
+from rig.cli.options import ConfigOption, SeedOption, SimFlag, chosen_rig, group, require_number
 from rig.output.console import JsonFlag, present, progress, remarks
 from rig.output.table import TextTable
 

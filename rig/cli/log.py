@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from rig.cli.help import group
 from rig.cli.log_export import export
-from rig.cli.options import say_left_out
+from rig.cli.options import group, say_left_out
 from rig.errors import ExitCode, UsageError
 from rig.output.console import JsonFlag, present, remarks
 from rig.output.provenance import utc_of

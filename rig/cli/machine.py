@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from rig.cli.help import group
-from rig.cli.options import FormatOption, complete_machine, machine_names, require_new
+from rig.cli.options import FormatOption, complete_machine, group, machine_names, require_new
 from rig.errors import ExitCode
 from rig.output.console import JsonFlag, present
 

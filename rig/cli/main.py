@@ -13,30 +13,25 @@ from typer import Option
 from typer.exceptions import TyperException
 
 from rig import __version__
+from rig.cli.board import clear, reference, stop
 from rig.cli.calibrate import calibrate_app
 from rig.cli.campaigns import campaigns
 from rig.cli.config import config_app
 from rig.cli.demo import demo
-from rig.cli.diagnose import diagnose
-from rig.cli.diff import diff
-from rig.cli.doctor import commission, devices, doctor, selftest, udev
+from rig.cli.diagnose import diagnose, diff, loop
+from rig.cli.doctor import commission, devices, doctor, firmware_app, selftest, udev
 from rig.cli.effects import effects
 from rig.cli.estimator import adapt, estimator_app, export
-from rig.cli.firmware import firmware_app
 from rig.cli.fit import fit
 from rig.cli.grasper import grasper_app
 from rig.cli.grip import grip
-from rig.cli.help import GroupedHelp
 from rig.cli.import_ import import_
-from rig.cli.live import live
+from rig.cli.live import live, replay
 from rig.cli.log import log_app
-from rig.cli.loop import loop
 from rig.cli.machine import machine_app
 from rig.cli.model import model_app
+from rig.cli.options import GroupedHelp
 from rig.cli.record import record
-from rig.cli.reference import reference
-from rig.cli.replay import replay
-from rig.cli.stop import clear, stop
 from rig.cli.study import study_app
 from rig.cli.view import view
 
@@ -86,6 +81,7 @@ for heading, members in COMMANDS.items():
             app.add_typer(member, rich_help_panel=heading)
         else:
             app.command(_name(member), rich_help_panel=heading)(member)
+app.add_typer(calibrate_app, name="cal", hidden=True)  # the name it had
 
 
 def _version(wanted: bool) -> None:
@@ -111,7 +107,6 @@ def options(
 
 @cache
 def _commands() -> Any:
-    """Return all commands with their options, made once in a process."""
     return typer.main.get_command(app)
 
 
@@ -121,7 +116,7 @@ def main(arguments: list[str] | None = None) -> int:
     Args:
         arguments: Words after `rig`; the process' own when None.
     """
-    words = _present_words(sys.argv[1:] if arguments is None else arguments)
+    words = sys.argv[1:] if arguments is None else arguments
     try:
         result = _commands()(args=words, standalone_mode=False, prog_name="rig")
     except typer.Exit as stop:
@@ -136,14 +131,6 @@ def main(arguments: list[str] | None = None) -> int:
     if result == 130:  # what typer makes of Ctrl-C
         sys.stderr.write("Interrupted.\n")
     return int(result) if isinstance(result, int) else 0
-
-
-def _present_words(words: list[str]) -> list[str]:
-    """Return the words of a command line, `cal` by its present name."""
-    verb = next((k for k, word in enumerate(words) if not word.startswith("-")), None)
-    if verb is None or words[verb] != "cal":
-        return words
-    return [*words[:verb], "calibrate", *words[verb + 1 :]]
 
 
 def _of_the_computer(error: OSError) -> Exception:

@@ -7,8 +7,7 @@ import typer
 from typer import Argument, Option
 
 from estimation.channels import unit_of
-from rig.cli.help import group
-from rig.cli.options import ConfigOption, SimFlag, complete_fitted
+from rig.cli.options import ConfigOption, SimFlag, complete_fitted, group
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, present
 from rig.output.provenance import now_utc

@@ -1,13 +1,14 @@
-"""Options that several commands share, the names they complete, and the rig that they choose."""
+"""What commands share: options, the names they complete, the rig they choose, how help is shown."""
 
 import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
+from typer.core import TyperGroup
 
 import estimation
 import rig
@@ -160,6 +161,31 @@ SimulationSeed = Annotated[
 ]
 TablesFile = Annotated[Path | None, Option("--out", help="File for the tables, in Markdown.")]
 FiguresFolder = Annotated[Path | None, Option(help="Folder for the figures, as SVG.")]
+
+
+class GroupedHelp(TyperGroup):
+    """A group of commands whose help shows them under their headings, with whole sentences."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands of each heading, `Commands` for those of none."""
+        commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
+        width = max(map(len, commands), default=0)
+        headings: dict[str, list[tuple[str, str]]] = {}
+        for name, command in commands.items():
+            if command is not None and not command.hidden:
+                row = (name.ljust(width), command.get_short_help_str(limit=1000))
+                heading = getattr(command, "rich_help_panel", None)
+                known = heading if isinstance(heading, str) else "Commands"
+                headings.setdefault(known, []).append(row)
+        for heading, rows in headings.items():
+            with formatter.section(heading):
+                formatter.write_dl(rows)
+
+
+def group(name: str, help_: str, **options: Any) -> typer.Typer:
+    """Return a group of commands; without one of them it shows its help."""
+    options = {"no_args_is_help": True} | options
+    return typer.Typer(name=name, help=help_, cls=GroupedHelp, rich_markup_mode=None, **options)
 
 
 def chosen_rig(config: Path | None, sim: bool) -> "Config":

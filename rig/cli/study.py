@@ -4,33 +4,19 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from typer import Argument, Option
 
-from rig.cli.help import GroupedHelp
-from rig.cli.options import FiguresFolder, SeedOption, TablesFile, WorkersOption
-from rig.cli.study_arm import StateFolder, arm_studies, counted, described, resumable
-from rig.output.console import JsonFlag, progress
+from rig.cli.options import FiguresFolder, SeedOption, TablesFile, WorkersOption, group
+from rig.cli.study_arm import StateFolder, arm_studies, resumable
+from rig.errors import UsageError
+from rig.output.console import JsonFlag, counted, counting, described
 
 if TYPE_CHECKING:
     from rig.studies.oneill.kinds import KindRow
     from rig.studies.oneill.states import Shown
 
-study_app = typer.Typer(
-    name="study",
-    help="Reproduce a paper's results, on measured or simulated data.",
-    cls=GroupedHelp,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
-
-
+study_app = group("study", "Reproduce a paper's results, on measured or simulated data.")
 study_app.add_typer(arm_studies)
-
-
-@study_app.callback()
-def studies() -> None:
-    """Reproduce a paper's results, on measured or simulated data."""
 
 
 @study_app.command()
@@ -77,9 +63,8 @@ def oneill(
         source = Source(simulate_reference_campaign(seed), name, measured=False)
     else:
         source = open_reference(data)
-    with progress() as bar:
-        task = bar.add_task("runs", total=len(source.campaign))
-        study = run_study(source, seed=seed, on_run=lambda name: bar.advance(task))
+    with counting("runs", len(source.campaign)) as on_run:
+        study = run_study(source, seed=seed, on_run=on_run)
     campaign = source.campaign.exclude(study.left_out)
     deep, physical = None, None
     every_kind: tuple[KindRow, ...] = ()
@@ -90,9 +75,8 @@ def oneill(
         kept = state or Path.home() / ".cache" / "rig" / "oneill"
         limit = float("inf") if minutes is None else minutes
         training = Training(kept, every=every, seed=seed, workers=workers, minutes=limit)
-        with progress() as bar:
-            task = bar.add_task("closing samples", total=None)
-            tables, notes = network_tables(campaign, data, on_run=lambda name: bar.advance(task))
+        with counting("closing samples") as on_run:
+            tables, notes = network_tables(campaign, data, on_run=on_run)
         with counted("networks") as on_network:
             deep = run_networks(tables, training, notes, on_network)
     if states:
@@ -124,7 +108,6 @@ def zhao(
 ) -> None:
     """Reproduce Tables 2 to 4 and the haptic experiments of Zhao and Nelson 2016, simulated."""
     from estimation.model_file import parse
-    from rig.errors import UsageError
     from rig.grasper.hidden import FAMILIES, OWN
     from rig.grasper.plant import PROTOTYPES
     from rig.studies.zhao.haptics import haptics_of
@@ -157,7 +140,6 @@ def loop(
     json: JsonFlag = False,
 ) -> None:
     """Add effects to the paper's linear models, confirmed on held-out test runs."""
-    from rig.errors import UsageError
     from rig.studies.loop.page import page
     from rig.studies.loop.study import TASKS, run_study
 
@@ -241,7 +223,6 @@ def machines(
     json: JsonFlag = False,
 ) -> None:
     """Diagnose machines that other people built, and compare with what they published."""
-    from rig.errors import UsageError
     from rig.studies.machines.page import page
     from rig.studies.machines.study import run_study
 

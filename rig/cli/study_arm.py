@@ -11,7 +11,7 @@ import typer
 from typer import Option
 
 from rig.cli.options import FiguresFolder, TablesFile, WorkersOption
-from rig.output.console import JsonFlag, progress
+from rig.output.console import JsonFlag, counted, described, progress
 
 if TYPE_CHECKING:
     from rig.studies.seeds import Keeper
@@ -23,22 +23,6 @@ StateFolder = Annotated[
 ]
 
 ArmData = Annotated[Path, Option(help="Folder of measured arm motion, such as the dVRK paths.")]
-
-
-@contextmanager
-def described(what: str) -> Iterator[Callable[[str], None]]:
-    """Show what a study does; yields what is called with each step, in words."""
-    with progress() as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda step: bar.update(task, description=step)
-
-
-@contextmanager
-def counted(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Show how much of a study is done; yields what is called with that, and the total."""
-    with progress() as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 @contextmanager

@@ -140,6 +140,22 @@ def counting(what: str, total: float | None = None) -> "Iterator[Callable[..., N
 
 
 @contextmanager
+def described(what: str) -> Iterator[Callable[[str], None]]:
+    """Show what some work does; yields what is called with each step, in words."""
+    with progress() as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda step: bar.update(task, description=step)
+
+
+@contextmanager
+def counted(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Show how much of some work is done; yields what is called with that, and the total."""
+    with progress() as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextmanager
 def stages(
     expected: Mapping[str, tuple[float, float]] | None = None,
 ) -> "Iterator[Callable[[str], None]]":
