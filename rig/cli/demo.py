@@ -1,8 +1,7 @@
 """`rig demo`: the whole way from bytes to a diagnosis, on the simulated rig.
 
-The simulated rig contains one effect that the declared model lacks. The campaign uses the whole
-chain: frames from the board, its driver, calibration, one log a run. What the diagnosis is
-given are those logs and nothing else.
+The simulated rig contains one effect that the declared model lacks. The diagnosis is given the logs
+of a campaign, which went through the board's frames, its driver and calibration, and nothing else.
 """
 
 from collections.abc import Callable

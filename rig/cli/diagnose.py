@@ -109,16 +109,15 @@ def _with_models(
 
 def _kept_with(path: Path) -> Path | None:
     """Return the file of a campaign's diagnosis in its folder; None where it cannot be kept."""
-    from estimation.file_kinds import DIAGNOSIS as KIND
-    from estimation.file_kinds import HTML
+    from estimation import file_kinds
     from rig.campaigns.index import DIAGNOSIS
 
     if not path.is_dir() or not any(path.glob("*.mcap")):
         return None
     kept = path / DIAGNOSIS
     try:
-        check_output(kept, KIND)
-        check_output(kept.with_suffix(".html"), HTML)
+        check_output(kept, file_kinds.DIAGNOSIS)
+        check_output(kept.with_suffix(".html"), file_kinds.HTML)
     except OutputError as error:
         remarks().print(f"The page is not kept with the recordings: {error}")
         return None

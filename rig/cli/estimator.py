@@ -8,15 +8,7 @@ from typer import Argument, Option
 
 from estimation.errors import nearest
 from estimation.files import write_text_atomic
-from rig.cli.options import (
-    FormatOption,
-    JsonFile,
-    SeedOption,
-    TablesFile,
-    group,
-    require_new,
-    say_left_out,
-)
+from rig.cli import options
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, counting, present, to_json
 from rig.output.table import TextTable
@@ -27,7 +19,7 @@ if TYPE_CHECKING:
 USUAL_HZ = 1000.0
 """Rate of a header whose estimator's file contains none."""
 
-estimator_app = group("estimator", "Compare estimators.")
+estimator_app = options.group("estimator", "Compare estimators.")
 
 
 @estimator_app.callback()
@@ -39,8 +31,8 @@ def compare(
     first: Annotated[Path, Argument(help="Estimator of rig fit or rig adapt.")],
     second: Annotated[Path, Argument(help="Another one of the same channel.")],
     on: Annotated[Path, Option("--on", help="Recordings: a file, folder or archive.")],
-    format_: FormatOption = None,
-    out: TablesFile = None,
+    format_: options.FormatOption = None,
+    out: options.TablesFile = None,
     json: JsonFlag = False,
 ) -> None:
     """Compare two estimators on the same runs: which is better, and where."""
@@ -73,10 +65,10 @@ def adapt(
     scratch: Annotated[
         bool, Option(help="Also fit on the other instrument's runs alone, in folds.")
     ] = True,
-    seed: SeedOption = 0,
-    format_: FormatOption = None,
+    seed: options.SeedOption = 0,
+    format_: options.FormatOption = None,
     json: JsonFlag = False,
-    json_out: JsonFile = None,
+    json_out: options.JsonFile = None,
 ) -> None:
     """Adapt an estimator with some runs and report its error on the runs not used."""
     from estimation.estimator import load
@@ -85,10 +77,10 @@ def adapt(
     from rig.models.adapt import open_source, run_adaptation, runs_by_rule
     from rig.models.origins import with_origin
 
-    require_new(out)
+    options.require_new(out)
     estimator = open_source(load(source))
     campaign = open_campaign(path, format_)
-    say_left_out(path, campaign)
+    options.say_left_out(path, campaign)
     campaign, steps = with_one_zero(campaign, estimator.target)
     named = [name.strip() for name in runs.split(",") if name.strip()]
     with counting("runs", len(campaign)) as on_run:

@@ -8,17 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Option
 
 from estimation.channels import unit_of
-from rig.cli.options import (
-    DECLARED_MODEL,
-    FormatOption,
-    MachineOption,
-    RecordingsArgument,
-    SeedOption,
-    SkipBad,
-    complete_model,
-    require_new,
-    say_left_out,
-)
+from rig.cli import options
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, counting, present, progress
 from rig.output.provenance import now_utc
@@ -103,24 +93,24 @@ def _learn(
 
 
 def fit(
-    path: RecordingsArgument,
+    path: options.RecordingsArgument,
     model: Annotated[
         str | None,
         Option(
             "--model",
             "-m",
-            help=f"Declared model: {DECLARED_MODEL}; `states` for"
+            help=f"Declared model: {options.DECLARED_MODEL}; `states` for"
             " products of physical states, `network` for a network with some of them as inputs. If"
             " none: grip, or with --machine all equations of the machine.",
-            autocompletion=complete_model,
+            autocompletion=options.complete_model,
         ),
     ] = None,
-    machine: MachineOption = None,
+    machine: options.MachineOption = None,
     out: Annotated[Path | None, Option("--out", "-o", help="File of the fitted model.")] = None,
     folds: Annotated[
         int | None, Option(min=2, help="Folds of the error on runs not fitted on. If none: 5.")
     ] = None,
-    seed: SeedOption = 0,
+    seed: options.SeedOption = 0,
     target: Annotated[
         str, Option(help="Channel to estimate; with --model states or network.")
     ] = "proximal_torque_n_m",
@@ -128,8 +118,8 @@ def fit(
         str, Option(help="Channel that represents the load; with --model states or network.")
     ] = "motor_current_a",
     live: Annotated[bool, Option("--live", help="Fit for use live; with --model states.")] = False,
-    skip_bad: SkipBad = False,
-    format_: FormatOption = None,
+    skip_bad: options.SkipBad = False,
+    format_: options.FormatOption = None,
     json_: JsonFlag = False,
 ) -> None:
     """Fit a declared model on all runs and report its error on runs it was not fitted on.
@@ -142,9 +132,9 @@ def fit(
     from rig.machines.recordings import open_recordings
     from rig.reports.fit import held_out_sentence, parameter_table
 
-    require_new(out)
+    options.require_new(out)
     campaign = open_recordings(path, machine, format_, skip_bad)
-    say_left_out(path, campaign)
+    options.say_left_out(path, campaign)
     folds = _folds(folds, len(campaign.evidence))
     if model in ("states", "network"):
         _learn(_recipe(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)

@@ -6,15 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from rig.cli.options import (
-    ConfigOption,
-    SimFlag,
-    SimulationSeed,
-    announced,
-    chosen_rig,
-    complete_protocol,
-    protocol_names,
-)
+from rig.cli import options
 from rig.errors import KNOWN_ERRORS, UsageError
 from rig.output.console import JsonFlag, present, progress, remarks
 from rig.output.table import counted
@@ -32,18 +24,18 @@ def record(
         Option(
             "--protocol",
             "-p",
-            help=f"Protocol: a file, or one of {', '.join(protocol_names())}. If none: diagnosis;"
-            " unloaded without a load motor, grasper on a grasper.",
-            autocompletion=complete_protocol,
+            help=f"Protocol: a file, or one of {', '.join(options.protocol_names())}. If none:"
+            " diagnosis; unloaded without a load motor, grasper on a grasper.",
+            autocompletion=options.complete_protocol,
         ),
     ] = None,
-    config: ConfigOption = None,
-    sim: SimFlag = False,
+    config: options.ConfigOption = None,
+    sim: options.SimFlag = False,
     out: Annotated[Path | None, Option("--out", "-o", help="Folder of the campaign.")] = None,
     resume: Annotated[
         Path | None, Option("--resume", help="Resume the campaign in this folder.")
     ] = None,
-    seed: SimulationSeed = None,
+    seed: options.SimulationSeed = None,
     model: Annotated[
         Path | None,
         Option("--model", "-m", help="Fitted model to monitor for a change of the rig."),
@@ -71,10 +63,10 @@ def record(
                 f"Type `rig record --resume {resume}` alone.",
             )
         plan, settings = read_manifest(resume)
-        announced(settings)
+        options.announced(settings)
         folder = resume
     else:
-        settings = chosen_rig(config, sim)
+        settings = options.chosen_rig(config, sim)
         if seed is not None:
             settings = settings.changed(simulation={"seed": seed})
         first = machine_of(settings).first_look(settings)

@@ -9,14 +9,7 @@ from typer import Option
 
 from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
-from rig.cli.options import (
-    FormatOption,
-    MachineOption,
-    RecordingsArgument,
-    ReplayModel,
-    SkipBad,
-    say_left_out,
-)
+from rig.cli import options
 from rig.errors import DataError, UsageError
 from rig.output.console import JsonFlag, present, remarks
 from rig.output.table import counted
@@ -26,14 +19,14 @@ if TYPE_CHECKING:
 
 
 def view(
-    path: RecordingsArgument,
+    path: options.RecordingsArgument,
     run: Annotated[
         list[str] | None, Option(help="Only this run, in more points; may be repeated.")
     ] = None,
-    model: ReplayModel = None,
-    machine: MachineOption = None,
-    format_: FormatOption = None,
-    skip_bad: SkipBad = False,
+    model: options.ReplayModel = None,
+    machine: options.MachineOption = None,
+    format_: options.FormatOption = None,
+    skip_bad: options.SkipBad = False,
     out: Annotated[
         Path | None, Option("--out", "-o", help="Page to write; by default NAME.view.html.")
     ] = None,
@@ -52,7 +45,7 @@ def view(
     from rig.reports.recordings import page
 
     whole = open_recordings(path, machine, format_, skip_bad)
-    say_left_out(path, whole)
+    options.say_left_out(path, whole)
     shown = whole.evidence if skip_bad else whole
     campaign = with_model(chosen_runs(shown, run or []), model)
     name = path.resolve().name

@@ -115,9 +115,8 @@ def notes(reading: Reading, options: ShowOptions) -> Iterator[str]:
 
 def rate(snapshot: Snapshot) -> str:
     """Return the sample rate in words."""
-    if snapshot.sample_rate_hz is None:
-        return "rate unknown"
-    return f"{snapshot.sample_rate_hz:.0f} Hz"
+    rate_hz = snapshot.sample_rate_hz
+    return "rate unknown" if rate_hz is None else f"{rate_hz:.0f} Hz"
 
 
 def lost(count: int, received: int) -> str:

@@ -24,13 +24,7 @@ REST_S = 0.5
 
 @dataclass(frozen=True, eq=False)
 class JointPlan:
-    """One run of a grasper to be made.
-
-    Attributes:
-        name: Name of the run, unique in its protocol.
-        joint_rad: Yaw, pitch and grasp at 2 kHz, shape (n, 3).
-        conditions: Constant conditions of the run.
-    """
+    """One run of a grasper: yaw, pitch and grasp at 2 kHz, shape (n, 3)."""
 
     name: str
     joint_rad: NDArray[np.float64]
@@ -43,8 +37,8 @@ class JointPlan:
 
     @property
     def duration_s(self) -> float:
-        """Length of the run, s."""
-        return len(self.joint_rad) / GRASPER.rate_hz
+        """Length of the run."""
+        return self.samples / GRASPER.rate_hz
 
 
 class _JointTable(Section):

@@ -25,7 +25,7 @@ class Motion:
     Attributes:
         setpoints: One array of shape (n,) for each field of a setpoint, closing-positive, SI units.
         first: Index of the run's first setpoint.
-        last: Index behind its last.
+        last: Index behind the run's last.
     """
 
     setpoints: tuple[FloatArray, ...]
@@ -36,17 +36,9 @@ class Motion:
 def path_of(
     run_rad: FloatArray, here_rad: ArrayLike, rate_hz: float, speed_rad_s: float, relax_rad: float
 ) -> tuple[FloatArray, int]:
-    """Return the approach, a run, the way back to its start and a relaxation there.
+    """Return the approach, a run of shape (n, axes), the way back to its start and a relaxation.
 
-    Args:
-        run_rad: Angles of every axis in the run, shape (n, axes).
-        here_rad: Where the axes stand, shape (axes,).
-        rate_hz: Setpoints a second.
-        speed_rad_s: Mean speed of approach and way back; all axes arrive at once.
-        relax_rad: Amplitude of the relaxation.
-
-    Returns:
-        The angles, shape (m, axes), and the index of the run's first.
+    All axes arrive at once. The second value is the index of the run's first angle.
     """
     approach = _move(np.asarray(here_rad), run_rad[0], rate_hz, speed_rad_s)
     back = _move(run_rad[-1], run_rad[0], rate_hz, speed_rad_s)
@@ -61,12 +53,7 @@ def relaxed(centre_rad: FloatArray, rate_hz: float, relax_rad: float) -> FloatAr
 
 
 def motion_of(plan: RunPlan, here_rad: float) -> Motion:
-    """Return the motion of spindle and load motor at 1 kHz that makes a run.
-
-    Args:
-        plan: The run.
-        here_rad: Where the spindle stands, rad.
-    """
+    """Return the motion of spindle and load motor at 1 kHz that makes a run from here."""
     run, load = plan.target_angle_rad[:, None], plan.load_command_a
     whole, first = path_of(run, [here_rad], SAMPLE_RATE_HZ, APPROACH_SPEED_RAD_S, RELAX_RAD)
     load_up = trajectory.minimum_jerk(0.0, float(load[0]), LOAD_RAMP_S)

@@ -32,14 +32,7 @@ _Motion = tuple[str, NDArray[np.float64], dict[str, float]]
 
 @dataclass(frozen=True, eq=False)
 class RunPlan:
-    """One run to be made.
-
-    Attributes:
-        name: Name of the run, unique in its protocol.
-        target_angle_rad: Spindle trajectory at 1 kHz, closing-positive, shape (n,).
-        load_command_a: Load motor current at 1 kHz, shape (n,).
-        conditions: Constant conditions of the run.
-    """
+    """One run: spindle trajectory, closing-positive, and load current at 1 kHz, shape (n,) each."""
 
     name: str
     target_angle_rad: NDArray[np.float64]
@@ -53,7 +46,7 @@ class RunPlan:
 
     @property
     def duration_s(self) -> float:
-        """Length of the run, s."""
+        """Length of the run."""
         return self.samples / trajectory.SAMPLE_RATE_HZ
 
 
@@ -218,22 +211,11 @@ TABLES: tuple[type[Section], ...] = get_args(AnyTable)
 
 
 class Protocol(Section):
-    """A protocol file.
-
-    Attributes:
-        name: Name of the protocol.
-        description: Purpose.
-        runs: Tables that expand into runs.
-    """
+    """A protocol file: tables that expand into runs."""
 
     name: str = Field(min_length=1)
     description: str = ""
     runs: list[RunTable] = Field(min_length=1)
-
-    @property
-    def moves_joints(self) -> bool:
-        """Whether its runs are of a grasper's joints, not of the reference rig's spindle."""
-        return isinstance(self.runs[0], (JointHoldRuns, JointSineRuns))
 
     @model_validator(mode="after")
     def _runs_are_of_one_rig(self) -> "Protocol":
@@ -248,13 +230,14 @@ class Protocol(Section):
         Raises:
             UsageError: The runs are of a grasper's joints.
         """
-        if self.moves_joints:
+        plans = [plan for plan in self.any_plans() if isinstance(plan, RunPlan)]
+        if not plans:
             raise UsageError(
                 f"The protocol {self.name!r} moves the joints of a grasper.",
                 "This rig has a spindle.",
                 "Choose a protocol for it, such as quick.",
             )
-        return [plan for plan in self.any_plans() if isinstance(plan, RunPlan)]
+        return plans
 
     def any_plans(self) -> list[Plan]:
         """Return every run in order, of whatever rig, numbered likewise."""
