@@ -32,12 +32,7 @@ QUESTION = "Enter when done, b to measure the step before again, q to stop: "
 
 
 def conduct(procedure: Procedure, how: Keeping) -> None:
-    """Measure a calibration, or read its raw logs; conclude, keep and show it.
-
-    Raises:
-        UsageError: The options ask for something that cannot be.
-        CalibrationError: The session was stopped, or its data cannot carry a calibration.
-    """
+    """Measure a calibration, or read its raw logs; conclude, keep and show it."""
     if not how.operator.strip():
         raise UsageError("Who calibrates is not known.", fix="Give --operator NAME.")
     settings = chosen_rig(how.config, how.sim)

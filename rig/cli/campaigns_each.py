@@ -19,12 +19,7 @@ from rig.reports.diagnosed import FolderDiagnosis, diagnose_all
 def show_diagnoses(
     found: Sequence[IndexedCampaign], root: Path, workers: int, scheduler: str | None, json: bool
 ) -> None:
-    """Diagnose campaigns, without next experiments, and print what each lacks, oldest first.
-
-    Raises:
-        LedgerError: The access log cannot be read or written.
-        UsageError: No scheduler answers.
-    """
+    """Diagnose campaigns, without next experiments, and print what each lacks, oldest first."""
     folders = [one.folder for one in reversed(found)]  # the newest come first
     new: list[Path] = []
     with counting("campaigns", len(folders)) as advance:
@@ -59,12 +54,7 @@ def show_refit(
     scheduler: str | None,
     json: bool,
 ) -> None:
-    """Fit a model on campaigns and print its parameters from the oldest to the newest.
-
-    Raises:
-        UsageError: The model names an estimator, or no scheduler answers.
-        ModelFileError: There is no such model.
-    """
+    """Fit a model on campaigns and print its parameters from the oldest to the newest."""
     declared = to_toml(read(Path(model)))
     dates = {one.folder: one.runs[0].date for one in reversed(found)}  # the newest come first
     with counting("campaigns") as advance:

@@ -34,11 +34,7 @@ def as_typed(words: list[str]) -> str:
 
 
 def offer(extra: str) -> bool:
-    """Ask on a terminal whether to install an extra, and install it; never ask elsewhere.
-
-    Returns:
-        Whether it was installed.
-    """
+    """Whether a person at a terminal had an extra installed; never asked elsewhere."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False
     if not typer.confirm("Install it now?", default=False, err=True):

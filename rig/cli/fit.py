@@ -156,11 +156,7 @@ def fit(
 
 
 def _folds(asked: int | None, runs: int) -> int:
-    """Return the number of folds, at most one a run.
-
-    Raises:
-        UsageError: More were asked for than there are runs.
-    """
+    """Return the number of folds, at most one a run."""
     if asked is not None and asked > runs:
         raise UsageError(
             f"--folds {asked} cannot be used: there are {counted(runs, 'run')}.",
@@ -194,13 +190,7 @@ def _fitted(
 
 
 def declared_models(model: str | None, machine: Path | None) -> "list[Model]":
-    """Return the models to fit: of a machine its equations, or the one of that name.
-
-    Raises:
-        ModelFileError: The model cannot be read.
-        PlantFileError: The machine cannot be read.
-        UsageError: The machine's sensors allow no equation.
-    """
+    """Return the models to fit: of a machine its equations, or the one of that name."""
     from rig.live.estimator import models_in_use
     from rig.machines.shipped import equations_of
 

@@ -35,14 +35,7 @@ READS: Mapping[str, Reads] = {
 
 
 def asked(table: Path | None) -> dict[str, list[str]]:
-    """Ask for the parts of a machine on a terminal.
-
-    Args:
-        table: Its data, if any; without a terminal the error states how to see their columns.
-
-    Raises:
-        UsageError: Standard input is not a terminal.
-    """
+    """Ask for the parts of a machine, which has a table of data or none, on a terminal."""
     if not sys.stdin.isatty():
         raise UsageError(
             "Nothing states what the machine is.",
@@ -61,15 +54,7 @@ def asked(table: Path | None) -> dict[str, list[str]]:
 
 
 def plant_of(name: str, words: Mapping[str, Sequence[str]]) -> Plant:
-    """Return the machine that is stated.
-
-    Args:
-        name: Its name.
-        words: Kind of part to the words of each, parts of a word separated by colons.
-
-    Raises:
-        UsageError: A word is not of its form, or the parts do not fit together.
-    """
+    """Return the machine that words for its kinds of parts state; a wrong one is a UsageError."""
     parts = {kind: [_parts(kind, word) for word in words[kind]] for kind in PARTS}
     try:
         return Plant(
@@ -111,12 +96,7 @@ def reads_of(channel: str) -> Reads:
 
 
 def data_text(table: Path, plant: Plant) -> str:
-    """Return `[data]` for a table: a line for each channel, and the table's columns as remarks.
-
-    Raises:
-        UsageError: No such file.
-        DataError: The table cannot be read.
-    """
+    """Return `[data]` for a table: a line for each channel, and the table's columns as remarks."""
     from rig.importers.table.data import Data
     from rig.importers.table.mapping import Mapping
     from rig.importers.table.open import files_at, read_raw

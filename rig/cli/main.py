@@ -111,11 +111,7 @@ def _commands() -> Any:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line and return its exit code.
-
-    Args:
-        arguments: Words after `rig`; the process' own when None.
-    """
+    """Run the command line, without arguments the process' own, and return its exit code."""
     words = sys.argv[1:] if arguments is None else arguments
     try:
         result = _commands()(args=words, standalone_mode=False, prog_name="rig")

@@ -61,12 +61,7 @@ def _of_calibrations() -> Iterator[Step]:
 
 
 def of_recordings(root: Path, record: str) -> Iterator[Step]:
-    """Yield the state of the newest campaign below a folder.
-
-    Args:
-        root: Folder of the campaigns.
-        record: Command that records one.
-    """
+    """Yield the state of the newest campaign below a folder, else the command that records one."""
     try:
         found = campaigns(root, default_index(root)) if root.is_dir() else []
     except OSError as error:

@@ -189,11 +189,7 @@ def group(name: str, help_: str, **options: Any) -> typer.Typer:
 
 
 def chosen_rig(config: Path | None, sim: bool) -> "Config":
-    """Return the chosen configuration, and say on stderr if it is a simulated rig's.
-
-    Raises:
-        UsageError: No rig is configured, or the configuration is wrong.
-    """
+    """Return the chosen configuration, and say on stderr if it is a simulated rig's."""
     from rig.configuration.chosen import choose_rig
 
     return announced(choose_rig(config, sim))
@@ -207,12 +203,7 @@ def announced(settings: "Config") -> "Config":
 
 
 def require_yes(question: str, yes: bool) -> None:
-    """Ask a person at the terminal, unless `--yes` was given; no for an answer ends the command.
-
-    Raises:
-        UsageError: There is no terminal to ask on.
-        Abort: The person answers no.
-    """
+    """Ask a person at the terminal, unless `--yes` was given; no for an answer ends the command."""
     if yes:
         return
     if not sys.stdin.isatty():
@@ -225,11 +216,7 @@ def require_yes(question: str, yes: bool) -> None:
 
 
 def require_number(option: str, value: float | None, least: float) -> None:
-    """Refuse a number that is not finite or is below the least; None where none was given.
-
-    Raises:
-        UsageError: It cannot be used.
-    """
+    """Refuse a number that is not finite or is below the least; None where none was given."""
     if value is not None and not least <= value < math.inf:
         raise UsageError(
             f"{option} {value:g} cannot be used.", fix=f"Give a finite number from {least:g} on."
@@ -237,11 +224,7 @@ def require_number(option: str, value: float | None, least: float) -> None:
 
 
 def require_new(path: Path | None) -> None:
-    """Refuse to write over a file that is there, None for no file.
-
-    Raises:
-        UsageError: Something is there.
-    """
+    """Refuse to write over a file that is there, None for no file."""
     if path is not None and path.exists():
         raise UsageError(f"{path} is there already.", fix="Name another file.")
 

@@ -29,11 +29,7 @@ ArmData = Annotated[Path, Option(help="Folder of measured arm motion, such as th
 def resumable(
     state: Path | None, study: str, total: int, workers: int, what: str = "arms"
 ) -> Iterator["Keeper"]:
-    """Show how much of a study is done; after an interruption, print how to resume.
-
-    Yields:
-        What keeps what the study has done.
-    """
+    """Yield the keeper of a study's finished parts; when interrupted, print how to resume."""
     from rig.studies.seeds import Keeper
 
     kept = state or Path.home() / ".cache" / "rig" / study

@@ -59,12 +59,7 @@ def view(
 
 
 def chosen_runs(campaign: "Campaign", names: list[str]) -> "Campaign":
-    """Return the named runs of a campaign; all without a name.
-
-    Raises:
-        DataError: The campaign has no runs.
-        UsageError: It has no run of that name.
-    """
+    """Return the named runs of a campaign, all without a name; without runs it is a DataError."""
     if not len(campaign):
         raise DataError("The recordings hold no runs.", "There is nothing to show.")
     for name in names:

@@ -49,11 +49,7 @@ def problems(config: Config) -> list[Problem]:
 
 
 def refuse_problems(config: Config) -> None:
-    """Refuse a configuration with problems.
-
-    Raises:
-        UsageError: Names every problem and what to write.
-    """
+    """Refuse a configuration with problems; the UsageError names each and what to write."""
     found = problems(config)
     if found:
         raise UsageError(

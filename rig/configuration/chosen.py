@@ -61,9 +61,5 @@ def choose_config(config: Path | None, sim: bool) -> Path:
 
 
 def choose_rig(config: Path | None, sim: bool) -> Config:
-    """Return the configuration a command is about, read and checked.
-
-    Raises:
-        UsageError: As `choose_config`; or the file cannot be read, or a key is wrong.
-    """
+    """Return the configuration a command is about, as `choose_config`, read and checked."""
     return load_config(choose_config(config, sim))

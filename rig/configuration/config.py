@@ -216,10 +216,7 @@ def shipped_configs() -> list[str]:
 
 
 def load_config(path: Path | None = None) -> Config:
-    """Read a configuration; the simulated rig's when no path is given.
-
-    Args:
-        path: A TOML file, or the name of a shipped configuration such as `reference`.
+    """Read a configuration, of a file or shipped, by name; the simulated rig's without one.
 
     Raises:
         UsageError: The file cannot be read or a key is wrong; names the key and the nearest one.

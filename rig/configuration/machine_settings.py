@@ -103,11 +103,7 @@ def installed(group: str, profile: str) -> Any:
 
 
 def settings_of(profile: str) -> MachineSettings:
-    """Settings of the machine that is installed under a name.
-
-    Raises:
-        UsageError: None is, or it cannot be loaded.
-    """
+    """Return the settings of the machine that is installed under a name; as `installed`."""
     loaded = installed(MACHINE_SETTINGS, profile)
     if not isinstance(loaded, MachineSettings):
         raise UsageError(f"{profile}: a {type(loaded).__name__} is installed, not MachineSettings.")

@@ -66,11 +66,7 @@ def model_in_use(rig: str) -> Path | None:
 
 
 def choose(rig: str, source: Path | None, at: str) -> None:
-    """Copy a model and make it the one in use for a rig; None for the configured one again.
-
-    Raises:
-        OutputError: It cannot be written.
-    """
+    """Copy a model and make it the one in use for a rig; None for the configured one again."""
     name = None
     if source is not None:
         content = source.read_bytes()

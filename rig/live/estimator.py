@@ -134,9 +134,7 @@ def estimators_of(
 def with_estimates(recording: Recording, path: Path) -> Recording:
     """Return a recording with the live estimates of a file, `estimated_*`; NaN out of range.
 
-    Raises:
-        EstimationError: As for `ModelEstimator`; a channel is missing; the recording is of another
-            instrument than the estimator.
+    An EstimationError, too, where it is of another instrument or lacks a channel.
     """
     estimated = {}
     for estimator in estimators_of(path, recording.sample_rate_hz):

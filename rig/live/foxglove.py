@@ -12,6 +12,7 @@ import numpy as np
 
 from rig.errors import MissingExtraError, UsageError
 from rig.live.block import SampleBlock
+from rig.output.console import plain
 
 HOST = "127.0.0.1"
 LAYOUT = Path(__file__).with_name("foxglove.layout.json")
@@ -19,7 +20,6 @@ RATE_HZ = 100.0
 """Samples a second that are sent: a display needs no more."""
 
 SAMPLE, STATUS = "/rig/sample", "/rig/status"
-_NUMBER = {"type": ["number", "null"]}
 
 
 class FoxgloveServer:
@@ -61,9 +61,8 @@ class FoxgloveServer:
             if self._last_s <= now_s < self._last_s + 1.0 / RATE_HZ - 1e-9:
                 continue
             self._last_s = now_s
-            sample: dict[str, float | None] = {"time_s": now_s}
-            sample |= {name: _plain(values[k]) for name, values in block.columns.items()}
-            sample |= {f"{n}_estimate": _plain(values[k]) for n, values in block.estimates.items()}
+            sample = {"time_s": now_s} | {name: x[k] for name, x in block.columns.items()}
+            sample |= {f"{name}_estimate": x[k] for name, x in block.estimates.items()}
             self._log(SAMPLE, sample, now_s)
         if len(block):
             states = {device.name: f"{device.state} {device.detail}" for device in block.devices}
@@ -79,13 +78,9 @@ class FoxgloveServer:
                 "type": "object",
                 "title": topic.strip("/").replace("/", "."),
                 "properties": {
-                    name: _NUMBER if not isinstance(value, dict) else {"type": "object"}
+                    name: {"type": "object" if isinstance(value, dict) else ["number", "null"]}
                     for name, value in message.items()
                 },
             }
             self._channels[topic] = self._channel(topic, schema=schema, context=self._context)
-        self._channels[topic].log(dict(message), log_time=self._start_ns + round(time_s * 1e9))
-
-
-def _plain(value: Any) -> float | None:
-    return float(value) if np.isfinite(value) else None
+        self._channels[topic].log(plain(message), log_time=self._start_ns + round(time_s * 1e9))

@@ -37,11 +37,7 @@ def require_channels(estimators: Sequence[ModelEstimator], config: Config, path:
 
 
 def require_measured(estimators: Sequence[ModelEstimator], config: Config, path: Path) -> None:
-    """Refuse a model of simulated recordings for a real rig.
-
-    Raises:
-        UsageError: The model states that its recordings were simulated, and the rig is real.
-    """
+    """Refuse a model that states it is of simulated recordings, for a real rig (UsageError)."""
     if config.is_simulated or not any(one.is_of_simulation for one in estimators):
         return
     raise UsageError(

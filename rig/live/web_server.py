@@ -38,9 +38,7 @@ MOST_UNSENT = 50
 
 
 class PageServer:
-    """Listens on an address of this computer; serves the page and what it shows.
-
-    Port 0 takes any that is free.
+    """Serves the page and what it shows on an address of this computer; port 0 is any free one.
 
     Raises:
         UsageError: The address cannot be listened on.

@@ -34,16 +34,9 @@ class Page:
         return to_page([self.title, *self.paragraphs], self.tables, self.provenance, places)
 
     def show(self, data: object, out: Path | None, json: bool, figures: Path | None = None) -> None:
-        """Print the page, write it as Markdown, and its figures, where they are asked for.
+        """Print the page, and write its figures and its Markdown where they are asked for.
 
-        Args:
-            data: What goes to stdout as JSON, if that is asked for.
-            out: File for the Markdown.
-            json: Whether stdout is to carry JSON.
-            figures: Folder for the figures.
-
-        Raises:
-            OutputError: A file cannot be written.
+        With `json` the data goes to stdout. A file that cannot be written is an OutputError.
         """
         drawn: list[Path] = []
         if figures is not None:

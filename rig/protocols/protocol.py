@@ -278,8 +278,7 @@ def _constant_load(
 def load_protocol(name_or_path: str) -> Protocol:
     """Read a protocol file, or a shipped protocol by its name.
 
-    Raises:
-        UsageError: The file is missing or not a protocol; the message names the wrong key.
+    The UsageError of a file that is missing or is not a protocol names the wrong key.
     """
     path = Path(name_or_path)
     if not path.is_file() and path.suffix == "":

@@ -29,6 +29,16 @@ def recording(seed):
 
 
 @pytest.fixture
+def motor(tmp_path):
+    """The estimator of the declared equation of the motor, and a run that it was fitted on."""
+    path, made = tmp_path / "motor.toml", campaign()
+    (declared,) = [m for m in model_file.reference_rig() if m.balance == "motor"]
+    model_file.write(fit(declared, made), path)
+    run = made.runs[0].recording()
+    return lambda: ModelEstimator(path, run.sample_rate_hz), run
+
+
+@pytest.fixture
 def model_path(tmp_path):
     declared = model_file.read(model_file.shipped()["linear"])
     campaign = Campaign.of([recording(seed) for seed in range(3)])
@@ -40,7 +50,6 @@ def model_path(tmp_path):
 def test_replayed_estimates_are_the_causal_prediction(model_path):
     run = recording(7)
     estimator = ModelEstimator(model_path, run.sample_rate_hz)
-    assert estimator.target_channel == SPINDLE
     blocks = list(replay_blocks(run, [estimator], speed=None))
     live = np.concatenate([block.estimates[SPINDLE] for block in blocks])
     offline = predict(model_file.read(model_path), run, causal=True)
@@ -50,30 +59,22 @@ def test_replayed_estimates_are_the_causal_prediction(model_path):
     assert np.abs(live[1000:] - run[SPINDLE][1000:]).max() < 0.01
 
 
-def test_a_stream_that_begins_in_motion_shows_no_estimate_until_the_filters_have_settled(tmp_path):
+def test_a_stream_that_begins_in_motion_shows_no_estimate_until_the_filters_have_settled(motor):
     """The first sample counts as one that had always been there: a step in the acceleration."""
-    path = tmp_path / "motor.toml"
-    runs = list(campaign())
-    (declared,) = [m for m in model_file.reference_rig() if m.balance == "motor"]
-    model_file.write(fit(declared, Campaign.of(runs)), path)
-    run = runs[0]
+    estimator, run = motor
     speed = np.abs(np.gradient(run["spindle_angle_rad"], run.time_s))
     moving = run.at(np.arange(int(speed.argmax()), len(run)))
-    live = ModelEstimator(path, run.sample_rate_hz).push(moving.columns, moving.time_s)
-    whole = ModelEstimator(path, run.sample_rate_hz).push(run.columns, run.time_s)[-len(moving) :]
+    live = estimator().push(moving.columns, moving.time_s)
+    whole = estimator().push(run.columns, run.time_s)[-len(moving) :]
     shown = np.isfinite(live)
     assert shown.sum() > len(moving) - 50
     error = np.abs(live - whole)[shown]
     assert error.max() < 0.05 * np.ptp(whole)
 
 
-def test_a_physical_model_states_no_interval_at_rest(tmp_path):
+def test_a_physical_model_states_no_interval_at_rest(motor):
     """Friction at rest takes any value: an interval of the errors in motion does not hold there."""
-    path = tmp_path / "motor.toml"
-    runs = list(campaign())
-    (declared,) = [m for m in model_file.reference_rig() if m.balance == "motor"]
-    model_file.write(fit(declared, Campaign.of(runs)), path)
-    estimator, run = ModelEstimator(path, runs[0].sample_rate_hz), runs[0]
+    estimator, run = motor[0](), motor[1]
     stood = {name: np.full(4000, values[0]) for name, values in run.columns.items()}
     estimator.push(stood, np.arange(4000) / run.sample_rate_hz)
     assert SPINDLE not in half_widths([estimator])

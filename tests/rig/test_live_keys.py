@@ -2,7 +2,9 @@
 
 import os
 import sys
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,8 +89,6 @@ def test_q_quits_and_a_mark_needs_a_recording(tmp_path):
     ],
 )
 def test_age_and_range_of_calibrations_are_shown(tmp_path, low, days_old, state, words):
-    from datetime import UTC, datetime, timedelta
-
     store = CalibrationStore(tmp_path / "store")
     record = record_of_line(
         shipped_calibration_set("reference").channels["proximal_torque_n_m"],
@@ -111,7 +111,8 @@ def test_keys_are_read_from_a_terminal_and_it_is_given_back(monkeypatch):
 
     ours, theirs = pty.openpty()
     with os.fdopen(theirs, "r+b", buffering=0) as terminal:
-        monkeypatch.setattr(sys, "stdin", Terminal(terminal))
+        stdin = SimpleNamespace(isatty=lambda: True, fileno=terminal.fileno)
+        monkeypatch.setattr(sys, "stdin", stdin)
         before = termios.tcgetattr(theirs)
         with display_keys() as keys:
             assert keys() == ""
@@ -123,16 +124,3 @@ def test_keys_are_read_from_a_terminal_and_it_is_given_back(monkeypatch):
         monkeypatch.setattr(sys, "stdin", nothing)
         with display_keys() as keys:
             assert keys is None
-
-
-class Terminal:
-    """A stdin that is a pseudo-terminal."""
-
-    def __init__(self, raw):
-        self.raw = raw
-
-    def isatty(self):
-        return True
-
-    def fileno(self):
-        return self.raw.fileno()
