@@ -184,9 +184,9 @@ def replay(
         return _core(log, config, json_)
     from rig.live.block import through
     from rig.live.estimator import half_widths, shown_channels
-    from rig.live.keys import display_keys
+    from rig.live.keys import display_keys, no_keys
     from rig.live.options import ShowOptions
-    from rig.live.replay import OF_REPLAY, Pace, replay_blocks
+    from rig.live.replay import OF_REPLAY, replay_blocks
     from rig.live.show import show
     from rig.live.status import model_steps
     from rig.machines.recordings import open_recordings
@@ -203,8 +203,7 @@ def replay(
         json=json_,
     )
     with display_keys() as keys:
-        pace = Pace(speed or None, keys) if keys else None
-        blocks = replay_blocks(recording, estimators, speed or None, pace=pace)
+        blocks = replay_blocks(recording, estimators, speed or None, keys or no_keys)
         blocks = through(blocks, model_steps(estimators))
         summary = show(blocks, wanted.with_keys(keys, OF_REPLAY), results(json_))
     return summary.exit_code

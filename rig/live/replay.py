@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -32,9 +32,11 @@ def replay_blocks(
     recording: Recording,
     estimators: Sequence[ModelEstimator],
     speed: float | None,
-    pace: "Pace | None" = None,
+    keys: Keys = no_keys,
 ) -> Iterator[SampleBlock]:
     """Yield a recording block by block, at its own pace times a speed; None for no wait.
+
+    Keys change the pace: space pauses, + and - double and halve the speed, f skips 5 s.
 
     Estimates are the estimators', which have seen nothing yet, and for other channels those
     recorded in `estimated_*` columns. Samples flagged missing and gaps in the clock count as lost.
@@ -47,11 +49,11 @@ def replay_blocks(
         raise DataError(f"Run {recording.name!r} holds no samples.", "There is nothing to show.")
     if speed is not None and not speed > 0:
         raise UsageError(f"A speed of {speed:g} shows nothing.", fix="Give a positive speed.")
-    return _blocks(recording, estimators, pace or Pace(speed))
+    return _blocks(recording, estimators, _Pace(speed, keys))
 
 
 def _blocks(
-    recording: Recording, estimators: Sequence[ModelEstimator], pace: "Pace"
+    recording: Recording, estimators: Sequence[ModelEstimator], pace: "_Pace"
 ) -> Iterator[SampleBlock]:
     lost = lost_samples(recording)
     start_s = float(recording.time_s[0])
@@ -82,20 +84,9 @@ def _blocks(
         )
 
 
-class Pace:
-    """Speed of a replay, changed by keys: space pauses, + and - double and halve, f skips 5 s.
-
-    Speed is times real time; None for as fast as it can be read.
-    """
-
-    def __init__(
-        self,
-        speed: float | None,
-        keys: Keys = no_keys,
-        sleep: Callable[[float], None] = time.sleep,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._speed, self._keys, self._sleep, self._clock = speed, keys, sleep, clock
+class _Pace:
+    def __init__(self, speed: float | None, keys: Keys) -> None:
+        self._speed, self._keys = speed, keys
         self._is_paused = False
         self._skip_to_s = -np.inf
         self._from_s: tuple[float, float] | None = None
@@ -108,7 +99,7 @@ class Pace:
             wait_s = LONGEST_WAIT_S if self._is_paused else self._wait_s(time_s)
             if self.is_left or wait_s < SHORTEST_WAIT_S:
                 return
-            self._sleep(min(wait_s, LONGEST_WAIT_S))
+            time.sleep(min(wait_s, LONGEST_WAIT_S))
 
     def _wait_s(self, time_s: float) -> float:
         """Return the wait by the clock, not from block to block: small delays do not add up."""
@@ -116,9 +107,9 @@ class Pace:
             self._from_s = None
             return 0.0
         if self._from_s is None:
-            self._from_s = time_s, self._clock()
+            self._from_s = time_s, time.monotonic()
         begun_s, began_s = self._from_s
-        return (time_s - begun_s) / self._speed - (self._clock() - began_s)
+        return (time_s - begun_s) / self._speed - (time.monotonic() - began_s)
 
     def _obey(self, time_s: float) -> None:
         for key in self._keys():

@@ -16,6 +16,8 @@ LOAD_RAMP_S = SHORTEST_MOVE_S = 0.5
 RELAX_RAD = 0.15
 RELAX_HZ = 4.0
 RELAX_CYCLES = 12
+RELAX_DECAYS = 4.0
+"""Time constants of a relaxation's decay."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +49,15 @@ def path_of(
 
 
 def relaxed(centre_rad: FloatArray, rate_hz: float, relax_rad: float) -> FloatArray:
-    """Return an oscillation of every axis that dies out where it stands, shape (n, axes)."""
-    swing = trajectory.relaxation(0.0, relax_rad, RELAX_HZ, RELAX_CYCLES, rate_hz)
+    """Return an oscillation of every axis that dies out where it stands, shape (n, axes).
+
+    Friction gives up the torque it holds. The amplitude decays exponentially to nothing, as in
+    demagnetising: each reversal is a little smaller than the one before, so that what friction
+    still holds at the end is small too.
+    """
+    t = trajectory.times(RELAX_CYCLES / RELAX_HZ, rate_hz)
+    decay: FloatArray = np.exp(-RELAX_DECAYS * t / t[-1]) - np.exp(-RELAX_DECAYS)
+    swing = relax_rad * decay * np.sin(2.0 * np.pi * RELAX_HZ * t)
     return np.asarray(centre_rad + swing[:, None])
 
 

@@ -97,7 +97,7 @@ class SineRuns(_LoadedTable):
 
 
 class FourierRuns(_LoadedTable):
-    """A finite Fourier series of spindle angle at each load."""
+    """A finite Fourier series of spindle angle, shifted to its start, at each load."""
 
     kind: Literal["fourier"]
     base_frequency_hz: Positive
@@ -107,8 +107,12 @@ class FourierRuns(_LoadedTable):
 
     def _motions(self, start_rad: float) -> Iterator[_Motion]:
         base = self.base_frequency_hz
-        angle = trajectory.fourier(self.duration_s, start_rad, base, self.cosine_rad, self.sine_rad)
-        yield "fourier", angle, {"frequency_hz": base}
+        phase = 2.0 * np.pi * base * trajectory.times(self.duration_s)
+        angle = np.zeros_like(phase)
+        pairs = zip(self.cosine_rad, self.sine_rad, strict=True)
+        for order, (cosine, sine) in enumerate(pairs, start=1):
+            angle += cosine * np.cos(order * phase) + sine * np.sin(order * phase)
+        yield "fourier", start_rad + angle - angle[:1], {"frequency_hz": base}
 
 
 class SpeedStaircaseRuns(_LoadedTable):

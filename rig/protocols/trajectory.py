@@ -13,9 +13,6 @@ from estimation.recording import FloatArray
 
 SAMPLE_RATE_HZ = 1000.0
 
-DECAYS = 4.0
-"""Time constants of a relaxation's decay."""
-
 
 def times(duration_s: float, rate_hz: float = SAMPLE_RATE_HZ) -> FloatArray:
     """Return the sample times of a duration, s."""
@@ -28,21 +25,6 @@ def sine(
     """Return grasps as a raised cosine: open at `start_rad`, closed at start + 2 amplitude, rad."""
     phase = 2.0 * np.pi * frequency_hz * times(duration_s)
     return start_rad + amplitude_rad * (1.0 - np.cos(phase))
-
-
-def fourier(
-    duration_s: float,
-    start_rad: float,
-    base_frequency_hz: float,
-    cosine_rad: Sequence[float],
-    sine_rad: Sequence[float],
-) -> FloatArray:
-    """Return a finite Fourier series about its mean, shifted to start at `start_rad`, rad."""
-    phase = 2.0 * np.pi * base_frequency_hz * times(duration_s)
-    angle = np.zeros_like(phase)
-    for order, (a, b) in enumerate(zip(cosine_rad, sine_rad, strict=True), start=1):
-        angle += a * np.cos(order * phase) + b * np.sin(order * phase)
-    return start_rad + angle - angle[0] if angle.size else angle
 
 
 def speed_staircase(
@@ -95,20 +77,3 @@ def minimum_jerk(
     """Return the minimum-jerk move between two rests (Flash and Hogan 1985, the quintic)."""
     s = np.linspace(0.0, 1.0, max(round(duration_s * rate_hz), 1))
     return start + (stop - start) * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5)
-
-
-def relaxation(
-    centre_rad: float,
-    amplitude_rad: float,
-    frequency_hz: float,
-    cycles: int,
-    rate_hz: float = SAMPLE_RATE_HZ,
-) -> FloatArray:
-    """Return an oscillation that dies out at its centre; friction gives up the torque it holds.
-
-    The amplitude decays exponentially to nothing, as in demagnetising: each reversal is a little
-    smaller than the one before, so that what friction still holds at the end is small too.
-    """
-    t = times(cycles / frequency_hz, rate_hz)
-    decay: FloatArray = np.exp(-DECAYS * t / t[-1]) - np.exp(-DECAYS)
-    return centre_rad + amplitude_rad * decay * np.sin(2.0 * np.pi * frequency_hz * t)

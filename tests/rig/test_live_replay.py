@@ -13,8 +13,7 @@ import pytest
 from estimation.campaign import Campaign
 from estimation.recording import Flag, Recording, Stretch
 from rig.errors import DataError, ExitCode, UsageError
-from rig.live.keys import no_keys
-from rig.live.replay import Pace, lost_samples, replay_blocks
+from rig.live.replay import lost_samples, replay_blocks
 from rig.log.convert import write_recording
 
 GRIP = "distal_torque_n_m"
@@ -32,29 +31,31 @@ def recording(name="07", seconds=2.0, **changes):
     return Recording(**parts | changes)
 
 
-class VirtualTime:
+@pytest.fixture
+def virtual(monkeypatch):
     """A clock that only sleeping advances."""
 
-    def __init__(self):
-        self.now_s = 100.0
+    class Time:
+        now_s = 100.0
 
-    def clock(self):
-        return self.now_s
+        def monotonic(self):
+            return self.now_s
 
-    def sleep(self, seconds):
-        assert seconds > 0
-        self.now_s += seconds
+        def sleep(self, seconds):
+            assert seconds > 0
+            self.now_s += seconds
 
-
-def keyed(*pressed):
-    """Replay 20 s with keys at each question; returns the device times and the time it took."""
-    virtual, script = VirtualTime(), iter(pressed)
-    pace = Pace(1.0, lambda: next(script, ""), virtual.sleep, virtual.clock)
-    seen = [float(b.time_s[-1]) for b in replay_blocks(recording(seconds=20), (), 1.0, pace=pace)]
-    return seen, virtual.now_s - 100.0
+    time = Time()
+    monkeypatch.setattr("rig.live.replay.time", time)
+    return time
 
 
-def test_keys_pause_hasten_skip_and_leave_a_replay():
+def test_keys_pause_hasten_skip_and_leave_a_replay(virtual):
+    def keyed(*pressed):
+        began_s, script = virtual.now_s, iter(pressed)
+        blocks = list(replay_blocks(recording(seconds=20), (), 1.0, lambda: next(script, "")))
+        return blocks, virtual.now_s - began_s
+
     _, plain_s = keyed()
     _, paused_s = keyed("", " ", "", "", "", " ")
     _, hastened_s = keyed("+")
@@ -80,15 +81,11 @@ def test_blocks_together_are_the_recording():
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 4.0])
-def test_pace_is_that_of_the_recording_times_speed(speed):
-    time = VirtualTime()
-    began = time.now_s
-    for block in replay_blocks(
-        recording(), (), speed, pace=Pace(speed, no_keys, time.sleep, time.clock)
-    ):
-        due = began + block.time_s[-1] / speed
-        assert time.now_s == pytest.approx(due), "a block comes when its last sample was taken"
-    assert time.now_s - began == pytest.approx(1.999 / speed)
+def test_pace_is_that_of_the_recording_times_speed(speed, virtual):
+    for block in replay_blocks(recording(), (), speed):
+        due = 100.0 + block.time_s[-1] / speed
+        assert virtual.now_s == pytest.approx(due), "a block comes when its last sample was taken"
+    assert virtual.now_s - 100.0 == pytest.approx(1.999 / speed)
 
 
 def test_recorded_estimates_are_shown_unless_an_estimator_replaces_them():
