@@ -52,8 +52,7 @@ def doctor(
 
         names = write_bundle(bundle, settings, found)
         screen.print(f"Wrote {bundle}: {', '.join(names)}.")
-    if json:
-        emit_json({"level": grave, "findings": found, "bundle": bundle})
+    present(json, {"level": grave, "findings": found, "bundle": bundle})
     return 1 if grave is Level.ERROR else 0
 
 
@@ -151,8 +150,7 @@ def commission(
         said = "passed" if check.passed else "FAILED"
         screen.print(f"{said:8}{check.name}: {check.detail}".rstrip(": "))
     passed = all(check.passed for check in made)
-    if json:
-        emit_json({"passed": passed, "checks": made})
+    present(json, {"passed": passed, "checks": made})
     return 0 if passed else 1
 
 

@@ -73,22 +73,12 @@ class ModelEstimator:
             self.is_of_simulation = evidence is not None and evidence.is_simulated
             self._settles_s = 2.0 * self.model.low_pass.reach_s  # as offline, at either end
         self.target_channel = estimator.target
-        self._stream: Stepper = estimator.stepper(sample_rate_hz)
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Channels that it reads."""
-        return self._stream.channels
-
-    @property
-    def half_width(self) -> float | None:
-        """Half the 95 % interval of the newest sample; None where it is not known."""
-        return self._stream.half_width
+        self.stream: Stepper = estimator.stepper(sample_rate_hz)
 
     @property
     def inside(self) -> NDArray[np.bool_] | None:
         """Which of the last samples lay in the fitted range, shape (n,); None without a range."""
-        return self._stream.inside
+        return self.stream.inside
 
     @property
     def outside(self) -> bool:
@@ -104,14 +94,14 @@ class ModelEstimator:
         Raises:
             MissingChannelError: The stream lacks a channel that the model needs.
         """
-        absent = [name for name in self.channels if name not in columns]
+        absent = [name for name in self.stream.channels if name not in columns]
         if absent:
             raise MissingChannelError(
                 f"The model needs {', '.join(absent)}, and the stream has no such channel.",
                 f"It has: {', '.join(columns) or 'none'}.",
                 "Choose another with --model or `rig model use`; `rig model reset` undoes that.",
             )
-        estimate = self._stream.step(time_s, columns)
+        estimate = self.stream.step(time_s, columns)
         if math.isnan(self._began_s) and len(time_s):
             self._began_s = float(time_s[0])
         return np.where(time_s - self._began_s < self._settles_s, np.nan, estimate)
@@ -159,7 +149,7 @@ def models_in_use(path: Path) -> list[Model]:
 
 def half_widths(estimators: Sequence[ModelEstimator]) -> dict[str, float]:
     """Return half of the 95 % interval of each channel, SI, as of the newest sample."""
-    found = {estimator.target_channel: estimator.half_width for estimator in estimators}
+    found = {estimator.target_channel: estimator.stream.half_width for estimator in estimators}
     return interval_of_joints({k: width for k, width in found.items() if width is not None})
 
 

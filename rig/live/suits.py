@@ -20,7 +20,7 @@ def require_channels(estimators: Sequence[ModelEstimator], config: Config, path:
     if config.logger.driver != "teensy":
         return
     there = config.calibration_set().channels
-    absent = sorted({name for one in estimators for name in one.channels} - set(there))
+    absent = sorted({name for one in estimators for name in one.stream.channels} - set(there))
     if not absent:
         return
     fix = "Choose a model of this rig."

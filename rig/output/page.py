@@ -8,7 +8,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from estimation.files import write_text_atomic
-from rig.output.console import emit_json, results, show
+from rig.output.console import present, results, show
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable, to_page
 
@@ -49,5 +49,4 @@ class Page:
             places = [relpath(path, out.parent) for path in drawn]
             write_text_atomic(out, self.markdown(places))
             screen.print(f"Markdown: {out}")
-        if json:
-            emit_json(data)
+        present(json, data)

@@ -39,6 +39,18 @@ def answered(said: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @pytest.fixture
+def newcomer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The empty working folder of a person with no rig, no calibration and no cache."""
+    for name in ("RIG_CONFIG", "RIG_CALIBRATIONS"):
+        monkeypatch.delenv(name, raising=False)
+    for name in ("XDG_CONFIG_HOME", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, str(tmp_path / name))
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    return tmp_path / "work"
+
+
+@pytest.fixture
 def program(library: Path) -> Path:
     """The firmware as a program."""
     if not PROGRAM.is_file():

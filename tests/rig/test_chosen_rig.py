@@ -1,5 +1,6 @@
 """Which rig a command is about: no command takes the simulated one for granted."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -11,15 +12,11 @@ BROKEN = CONFIG.replace('"sim://"', '"/dev/no-such-board"').replace("bench of Ad
 
 
 @pytest.fixture(autouse=True)
-def home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """A person's folder without a configuration, in a working folder without one."""
-    monkeypatch.delenv("RIG_CONFIG", raising=False)
-    monkeypatch.delenv("RIG_CALIBRATIONS", raising=False)
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
-    (tmp_path / "home" / "rig").mkdir(parents=True)
-    (tmp_path / "work").mkdir()
-    monkeypatch.chdir(tmp_path / "work")
-    return tmp_path / "home" / "rig"
+def home(newcomer: Path) -> Path:
+    """The folder of a person's configurations, without one."""
+    folder = Path(os.environ["XDG_CONFIG_HOME"]) / "rig"
+    folder.mkdir(parents=True)
+    return folder
 
 
 NEED_A_RIG = [

@@ -13,7 +13,7 @@ import pytest
 import typer
 
 from benchmarks import results
-from rig.cli.main import app, main
+from rig.cli.main import app
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -100,11 +100,6 @@ RUN = [
 
 
 @pytest.mark.integration
-def test_a_first_session_of_stated_commands_runs(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("RIG_CONFIG", raising=False)
-    for name in ("XDG_CONFIG_HOME", "XDG_CACHE_HOME"):
-        monkeypatch.setenv(name, str(tmp_path / name))
+def test_a_first_session_of_stated_commands_runs(newcomer, said):
     for typed in RUN:
-        code = main(shlex.split(typed)[1:])
-        assert code == 0, f"{typed}: {capsys.readouterr().err}"
+        said(typed.removeprefix("rig "))

@@ -21,23 +21,13 @@ from tests.rig.test_campaigns import diagnosed
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture
-def empty(tmp_path, monkeypatch):
-    """An empty folder of an engineer with no rig, no recording and no cache."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("RIG_CONFIG", raising=False)
-    for name in ("XDG_CONFIG_HOME", "XDG_CACHE_HOME"):
-        monkeypatch.setenv(name, str(tmp_path / name))
-    return tmp_path
-
-
-def test_with_nothing_there_the_demo_and_a_configuration_are_proposed(empty, said):
+def test_with_nothing_there_the_demo_and_a_configuration_are_proposed(newcomer, said):
     words = said().out
     for command in ("rig demo", "rig config init", "rig record --sim", "rig -h"):
         assert command in words
 
 
-def test_a_configured_rig_without_calibration_is_to_be_calibrated(empty, said):
+def test_a_configured_rig_without_calibration_is_to_be_calibrated(newcomer, said):
     said("config init")
     words = said().out
     assert "rig doctor" in words
@@ -45,14 +35,14 @@ def test_a_configured_rig_without_calibration_is_to_be_calibrated(empty, said):
     assert "rig config init" not in words
 
 
-def test_a_configuration_that_cannot_be_read_is_named(empty, said):
-    (empty / "rig.toml").write_text("nonsense = 1\n")
+def test_a_configuration_that_cannot_be_read_is_named(newcomer, said):
+    (newcomer / "rig.toml").write_text("nonsense = 1\n")
     assert "rig config check rig.toml" in said().out
 
 
 @pytest.mark.parametrize("state", ["undiagnosed", "lossy", "diagnosed"])
-def test_the_newest_recording_decides_what_to_do_with_it(empty, said, state):
-    folder = empty / "logs" / "monday"
+def test_the_newest_recording_decides_what_to_do_with_it(newcomer, said, state):
+    folder = newcomer / "logs" / "monday"
     folder.mkdir(parents=True)
     write_log(folder / "a.mcap", drop=frozenset({30} if state == "lossy" else ()))
     if state == "diagnosed":
@@ -65,7 +55,7 @@ def test_the_newest_recording_decides_what_to_do_with_it(empty, said, state):
     assert expected[state] in said().out
 
 
-def test_the_raw_logs_of_a_calibration_are_no_recording_to_diagnose(empty, said, answered):
+def test_the_raw_logs_of_a_calibration_are_no_recording_to_diagnose(newcomer, said, answered):
     said("calibrate gearbox --sim --yes --operator Ada --out logs/a")
     assert "rig record --sim" in said().out
     (campaign,) = answered("campaigns")["campaigns"]
@@ -101,22 +91,22 @@ def test_every_error_has_a_section_of_the_troubleshooting_page():
     assert A_BUG in anchors
 
 
-def test_an_error_names_its_section(empty, said):
+def test_an_error_names_its_section(newcomer, said):
     out, err = said("replay nothing.mcap --json", code=ExitCode.USAGE)
     assert err.splitlines()[-1] == f"  more: {PAGE}#a-command-is-refused"
     assert json.loads(out)["error"]["more"].endswith("#a-command-is-refused")
 
 
-def test_a_bundle_holds_what_a_question_needs_and_no_secret(empty, said, monkeypatch):
-    folder = empty / "logs" / "monday"
+def test_a_bundle_holds_what_a_question_needs_and_no_secret(newcomer, said, monkeypatch):
+    folder = newcomer / "logs" / "monday"
     folder.mkdir(parents=True)
     write_log(folder / "a.mcap", drop=frozenset({30}))
-    monkeypatch.setenv("HOME", str(empty))
+    monkeypatch.setenv("HOME", str(newcomer))
     text = said("config show --sim").out
     text = text.replace('name = "simulated rig"', 'name = "rig of //ada:hunter2@host token=abc123"')
-    (empty / "rig.toml").write_text(text)
+    (newcomer / "rig.toml").write_text(text)
     assert "question.zip" in said("doctor --bundle question.zip").out
-    with zipfile.ZipFile(empty / "question.zip") as archive:
+    with zipfile.ZipFile(newcomer / "question.zip") as archive:
         content = {name: archive.read(name).decode() for name in archive.namelist()}
     names = ("versions", "findings", "configuration", "calibrations", "newest_campaign")
     assert set(content) == {f"{name}.json" for name in names}
@@ -124,14 +114,14 @@ def test_a_bundle_holds_what_a_question_needs_and_no_secret(empty, said, monkeyp
     assert json.loads(content["newest_campaign.json"])["checks"][0]["problems"]
     whole = "".join(content.values())
     assert "rig of //***@host token=***" in whole
-    for secret in ("hunter2", "abc123", str(empty)):
+    for secret in ("hunter2", "abc123", str(newcomer)):
         assert secret not in whole
     user = getpass.getuser()
     assert len(user) < 3 or not re.search(rf"\b{re.escape(user)}\b", whole)
 
 
-def test_a_bundle_does_not_replace_another_kind_of_file(empty, said):
-    log = write_log(empty / "a.mcap")
+def test_a_bundle_does_not_replace_another_kind_of_file(newcomer, said):
+    log = write_log(newcomer / "a.mcap")
     before = log.read_bytes()
     said("doctor --sim --bundle", log, code=ExitCode.USAGE)
     assert log.read_bytes() == before

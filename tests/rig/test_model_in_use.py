@@ -56,23 +56,24 @@ def test_a_model_is_used_by_every_session_of_its_rig_until_taken_back(home, answ
     assert load_config().model_path == SHIPPED_MODEL
 
 
-def test_only_a_fitted_model_is_used(home, said):
-    assert "simulated_grip" in said("model use gripp", code=2).err
+@pytest.mark.parametrize(
+    ("words", "code", "objection"),
+    [
+        ("gripp", 2, "simulated_grip"),
+        ("declared.toml", 5, "not fitted"),
+        ("simulated_grasper --sim", 2, "which simulated rig does not measure"),
+        ("simulated_grip -c reference", 2, "fitted on simulated recordings"),
+    ],
+)
+def test_a_model_that_does_not_suit_the_rig_is_refused(home, said, words, code, objection):
     model_file.write(model_file.read(Path("motor")), home / "declared.toml")
-    assert "not fitted" in said("model use declared.toml", code=5).err
+    assert objection in said("model use", words, code=code).err
     assert load_config().model_path == SHIPPED_MODEL
+    assert load_config(Path("reference")).model_path is None
 
 
-def test_a_model_of_another_machine_is_refused(home, said):
-    err = said("model use simulated_grasper --sim", code=2).err
-    assert "which simulated rig does not measure" in err
-    assert load_config().model_path == SHIPPED_MODEL
-
-
-def test_a_model_of_simulated_recordings_is_not_taken_for_a_real_rig(home, said):
-    err = said("model use simulated_grip -c reference", code=2).err
-    assert "fitted on simulated recordings" in err
-    assert "--from-simulation" in err
+def test_a_model_of_simulated_recordings_is_taken_for_a_real_rig_when_allowed(home, said):
+    assert "--from-simulation" in said("model use simulated_grip -c reference", code=2).err
     said("model use simulated_grip -c reference --from-simulation")
     assert load_config(Path("reference")).model_path.stem.startswith("simulated_grip")
 
@@ -99,18 +100,14 @@ def test_a_fit_states_whether_its_runs_were_simulated(home, said):
     assert fitted.evidence.is_simulated
 
 
-def logs(folder: Path) -> Path:
-    """Two runs of the simulated rig's name, and a fitted model of them, in use."""
+@pytest.fixture
+def recorded(home):
+    """The folder of two runs of a rig, and a fitted model of them, in a file."""
+    folder = home / "kk"
     folder.mkdir()
     for seed, name in enumerate(("000-a", "001-b")):
         made = replace(run(name, 0.4, 0.1, seed=seed, seconds=3.0), rig="bench 7")
         write_recording(folder / f"{name}.mcap", made)
-    return folder
-
-
-@pytest.fixture
-def recorded(home):
-    folder = logs(home / "kk")
     fitted = fit(model_file.read(Path("motor")), open_campaign(folder))
     model_file.write(fitted, home / "motor.toml")
     return folder, fitted
