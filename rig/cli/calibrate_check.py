@@ -131,11 +131,11 @@ def _scales(
     recordings = [run.recording() for run in runs]
     found: list[Scale] = []
     unchecked = []
-    checks: tuple[tuple[str, Callable[[], Scale]], ...] = (
-        ("the torque sensors' scale", lambda: torque_scale(recordings)),
-        ("motor current against torque", lambda: current_scale(recordings, record)),
-    )
-    for name, check in checks:
+    checks: dict[str, Callable[[], Scale]] = {
+        "the torque sensors' scale": lambda: torque_scale(recordings),
+        "motor current against torque": lambda: current_scale(recordings, record),
+    }
+    for name, check in checks.items():
         try:
             found.append(check())
         except BadDataError as error:

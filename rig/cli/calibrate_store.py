@@ -204,10 +204,9 @@ def _stores(folder: Path | None) -> "list[CalibrationStore]":
 
 def _holding(start: str, folder: Path | None) -> "CalibrationStore":
     """Return the store that has a record of this hash; the first one where none has."""
-    first, *more = _stores(folder)
-    holds = (s for s in more if any(r.content_hash.startswith(start) for r in s.records()))
-    known = any(r.content_hash.startswith(start) for r in first.records())
-    return first if known else next(holds, first)
+    stores = _stores(folder)
+    holds = (s for s in stores if any(r.content_hash.startswith(start) for r in s.records()))
+    return next(holds, stores[0])
 
 
 def _serials(words: list[str]) -> dict[str, str]:

@@ -91,8 +91,8 @@ def import_(
             "Nothing states where the recordings are to be written.",
             fix="Add --out FOLDER, or look at the table first with --preview.",
         )
-    flags = _flags(column or [], condition or [], runs or [], set_ or [], rate)
-    mapping = read_mapping(None if machine is None else place_of(machine), flags)
+    stated = {"--column": column, "--condition": condition, "--runs": runs, "--set": set_}
+    mapping = read_mapping(None if machine is None else place_of(machine), _flags(stated, rate))
     said: list[Remark] = []
     try:
         recordings = list(read_runs(path, mapping, said))
@@ -165,30 +165,29 @@ def _cell(value: float | str) -> str:
     return value[:MOST_CELL] if isinstance(value, str) else f"{value:.10g}"
 
 
+PARTS: dict[str, tuple[str, ...]] = {
+    "--column": ("columns",),
+    "--condition": ("conditions",),
+    "--runs": ("runs",),
+    "--set": (),
+}
+"""Option to the part of a mapping that it states."""
+
+
 def _flags(
-    columns: list[str],
-    conditions: list[str],
-    runs: list[str],
-    others: list[str],
-    rate: float | None,
+    stated: dict[str, list[str] | None], rate: float | None
 ) -> list[tuple[tuple[str, ...], Any, str]]:
     """Return the options as entries of a mapping, each with the words that state it."""
     found: list[tuple[tuple[str, ...], Any, str]] = []
-    for option, part, words in (
-        ("--column", "columns", columns),
-        ("--condition", "conditions", conditions),
-        ("--runs", "runs", runs),
-        ("--set", "", others),
-    ):
-        for word in words:
+    for option, words in stated.items():
+        for word in words or []:
             name, equals, value = word.partition("=")
             if not (name and equals and value):
                 raise UsageError(
                     f"{option} {word} is not NAME=VALUE.", fix=f"Write {option} NAME=VALUE."
                 )
-            entry = _rule(name, value) if part == "runs" else value
-            keys = (part, name.strip()) if part else (name.strip(),)
-            found.append((keys, entry, f"{option} {word}"))
+            entry = _rule(name, value) if option == "--runs" else value
+            found.append(((*PARTS[option], name.strip()), entry, f"{option} {word}"))
     if rate is not None:
         found.append((("sample_rate_hz",), rate, f"--rate {rate:g}"))
     return found

@@ -60,6 +60,7 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     """
     from rig.log.attempts import standing
     from rig.log.check import Verdict, check_log
+    from rig.log.streams import SAMPLE
     from rig.recording.campaign import MANIFEST, read_manifest
 
     heads, foreign = _heads(path)
@@ -71,15 +72,18 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
         there = {report.run for report in reports}
         plans = read_manifest(path)[0].any_plans()
         missing = [plan.name for plan in plans if plan.name not in there]
-    code = max((report.verdict.exit_code for report in reports), default=ExitCode.OK)
-    code = max(code, ExitCode.FAILED if missing else ExitCode.OK)
-    code = max(code, ExitCode.DATA if foreign else ExitCode.OK)
+    codes = [ExitCode.OK, *(report.verdict.exit_code for report in reports)]
+    codes += [ExitCode.FAILED] if missing else []
+    codes += [ExitCode.DATA] if foreign else []
+    code = max(codes)
     said = [line for report in reports for line in _report_lines(report)]
     said += [f"no log      {words}" for words in foreign]
     said += [f"superseded  {item}: not counted" for item in superseded]
     said += [f"missing     {name}. Record it: rig record --resume {path}" for name in missing]
     whole = sum(report.verdict is Verdict.COMPLETE for report in reports)
-    topics = [topic for report in reports for topic in _samples_of(report)]
+    topics: list[TopicReport] = []
+    for report in reports:  # of the stream of samples, whose counts are not other samples
+        topics += [t for t in report.topics if t.topic == SAMPLE] or report.topics
     received, expected = sum(t.received for t in topics), sum(t.expected for t in topics)
     runs = f"{whole} of {len(reports) + len(missing)} runs complete"
     line = f"{runs}, {received} of {expected} samples"
@@ -89,14 +93,6 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
     found = {"logs": reports, "superseded": superseded, "missing_runs": missing}
     present(json, {**found, "no_logs": foreign, "exit_code": int(code)}, *said)
     return int(code)
-
-
-def _samples_of(report: "LogReport") -> "list[TopicReport]":
-    """Return the stream of samples, whose counts are not other samples; else all streams."""
-    from rig.log.streams import SAMPLE
-
-    own = [topic for topic in report.topics if topic.topic == SAMPLE]
-    return own or list(report.topics)
 
 
 def _heads(path: Path) -> "tuple[list[LogFile], list[str]]":

@@ -125,9 +125,7 @@ def _described(path: Path) -> str:
 
 def _name(settings: "Config") -> str:
     path = settings.model_path
-    return (
-        "no model" if path is None else path.name.removesuffix(path.suffix).removesuffix(".model")
-    )
+    return "no model" if path is None else path.stem.removesuffix(".model")
 
 
 def fitted_models() -> dict[str, Path]:
