@@ -165,12 +165,7 @@ def _cell(value: float | str) -> str:
     return value[:MOST_CELL] if isinstance(value, str) else f"{value:.10g}"
 
 
-PARTS: dict[str, tuple[str, ...]] = {
-    "--column": ("columns",),
-    "--condition": ("conditions",),
-    "--runs": ("runs",),
-    "--set": (),
-}
+PARTS = {"--column": ["columns"], "--condition": ["conditions"], "--runs": ["runs"], "--set": []}
 """Option to the part of a mapping that it states."""
 
 
