@@ -1,5 +1,6 @@
 """`rig diagnose | diff | loop`: what a declared model lacks, what changed, what to record next."""
 
+import shlex
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -95,7 +96,6 @@ def _with_models(
 ) -> "tuple[Answer, list[str]]":
     """Write the models; return the diagnosis with their errors as they run live, and the lines."""
     from estimation import model_file
-    from rig.cli.extras import as_typed
     from rig.diagnosis.traces import with_cost_of_causal_filters, written_models
 
     done = with_cost_of_causal_filters(done)
@@ -104,7 +104,7 @@ def _with_models(
     use = ["rig", "model", "use", str(model_out)]
     if machine is not None:
         use = ["rig", "replay", str(path), "--machine", str(machine), "--model", str(model_out)]
-    return done, [f"Model: {model_out}", f"To estimate with it: {as_typed(use)}"]
+    return done, [f"Model: {model_out}", f"To estimate with it: {shlex.join(use)}"]
 
 
 def _kept_with(path: Path) -> Path | None:

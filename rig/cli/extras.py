@@ -28,11 +28,6 @@ def install_command(extra: str, checkout: Path = CHECKOUT) -> list[str]:
     return [*pip, *(marker.sub("", line) for line in needed)]
 
 
-def as_typed(words: list[str]) -> str:
-    """Return a command as it is typed in a shell; words with brackets or signs are quoted."""
-    return " ".join(f"'{word}'" if re.search(r"[\s\[<>=~;]", word) else word for word in words)
-
-
 def offer(extra: str) -> bool:
     """Whether a person at a terminal had an extra installed; never asked elsewhere."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):

@@ -1,5 +1,6 @@
 """`rig import`: a table of samples, of any layout, becomes recordings."""
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -139,12 +140,10 @@ def _plotted(recordings: "list[Recording]", plots: Path) -> str:
 
 def present_columns(raw: "Raw", path: Path, json: bool) -> None:
     """Show the columns of a table of which nothing is mapped, and how they are mapped."""
-    from rig.cli.extras import as_typed
-
     first = {name: values[:FIRST].tolist() for name, values in raw.columns.items()}
     cells = [(name, *map(_cell, values)) for name, values in first.items()]
     numbers = map(str, range(1, 1 + max(map(len, first.values()))))
-    new = as_typed(["rig", "machine", "new", "FILE", "--axis", "motor:rad", "--from", str(path)])
+    new = shlex.join(["rig", "machine", "new", "FILE", "--axis", "motor:rad", "--from", str(path)])
     lines = [f"Single value {name}: {_cell(value)}" for name, value in raw.fields.items()]
     lines += [f"Note: {remark}." for remark in raw.remarks]
     lines += [

@@ -1,6 +1,7 @@
 """The `rig` command: collects the verbs and turns errors into three lines and an exit code."""
 
 import os
+import shlex
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -167,9 +168,9 @@ def _report(error: Exception, words: list[str]) -> int:
     why, fix = getattr(error, "why", ""), getattr(error, "fix", "")
     extra = getattr(error, "extra", "")
     if extra:
-        from rig.cli.extras import as_typed, install_command, offer
+        from rig.cli.extras import install_command, offer
 
-        fix = f"Install the extra {extra!r}: {as_typed(install_command(extra))}"
+        fix = f"Install the extra {extra!r}: {shlex.join(install_command(extra))}"
     lines = [f"error: {what}"]
     for word, text in (("why", why), ("fix", fix)):
         first, *more = text.splitlines() or [""]

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tornado.httpserver import HTTPServer
-from tornado.web import Application, HTTPError, RequestHandler
+from tornado.web import Application, HTTPError, RequestHandler, StaticFileHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from rig.errors import UsageError
@@ -25,10 +25,7 @@ ACTIONS = {"tare": TARE, "mark": MARK, "record": RECORD, "stop": STOP}
 """What a page may ask for, and the key that does the same."""
 
 HERE = Path(__file__).parent
-FILES = {
-    "live.js": (HERE / "live.js", "text/javascript"),
-    "plotly.js": (HERE.parent / "output" / "assets" / "plotly-basic.min.js", "text/javascript"),
-}
+ASSETS = HERE.parent / "output" / "assets"
 
 HISTORY = 300
 """Frames whose traces a page gets when it connects: 30 s."""
@@ -101,7 +98,9 @@ class PageServer:
         routes: list[Any] = [
             (r"/", Page, {"token": self._token, "server": self}),
             (r"/stream", Viewer, {"token": self._token, "server": self}),
-            (r"/(live\.js|plotly\.js)", File),
+            # nothing in these is secret
+            (r"/(live\.js)", StaticFileHandler, {"path": HERE}),
+            (r"/(plotly-basic\.min\.js)", StaticFileHandler, {"path": ASSETS}),
         ]
         server = HTTPServer(Application(routes))
         self._socket.setblocking(False)
@@ -163,16 +162,6 @@ class Page(Secret):
         self.set_header("Cache-Control", "no-store")
         self.set_header("Referrer-Policy", "no-referrer")
         self.write((HERE / "live.html").read_text())
-
-
-class File(RequestHandler):
-    """What the page is made of; nothing in it is secret."""
-
-    def get(self, name: str) -> None:
-        """Send one file."""
-        path, kind = FILES[name]
-        self.set_header("Content-Type", f"{kind}; charset=utf-8")
-        self.write(path.read_text())
 
 
 class Viewer(Secret, WebSocketHandler):
