@@ -44,7 +44,9 @@ def init(
 
     if like not in config_names():
         raise UsageError(
-            f"There is no shipped configuration {like!r}.", fix=nearest(like, config_names())
+            f"There is no shipped configuration {like!r}.",
+            f"There are: {', '.join(config_names())}.",
+            nearest(like, config_names()),
         )
     require_new(out)
     boards = [port for port in serial_ports() if port.usb.startswith(TEENSY)]

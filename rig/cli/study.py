@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 from typer import Argument, Option
 
@@ -10,10 +10,6 @@ from rig.cli.options import FiguresFolder, SeedOption, TablesFile, WorkersOption
 from rig.cli.study_arm import StateFolder, arm_studies, resumable
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, counted, counting, described
-
-if TYPE_CHECKING:
-    from rig.studies.oneill.kinds import KindRow
-    from rig.studies.oneill.states import Shown
 
 study_app = group("study", "Reproduce a paper's results, on measured or simulated data.")
 study_app.add_typer(arm_studies)
@@ -67,8 +63,8 @@ def oneill(
         study = run_study(source, seed=seed, on_run=on_run)
     campaign = source.campaign.exclude(study.left_out)
     deep, physical = None, None
-    every_kind: tuple[KindRow, ...] = ()
-    shown: dict[str, list[Shown]] = {}
+    every_kind: tuple[Any, ...] = ()
+    shown: dict[str, list[Any]] = {}
     if networks:
         from rig.studies.oneill.networks import Training, network_tables, run_networks
 

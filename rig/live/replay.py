@@ -74,14 +74,9 @@ def _blocks(
         pace.wait_for(float(time_s[-1]))
         if pace.is_left:
             return
-        yield SampleBlock(
-            time_s=time_s,
-            columns=columns,
-            flags=recording.flags[part],
-            estimates=estimates,
-            lost=int(lost[last - 1]),
-            devices=(_status(recording, float(time_s[0]), float(time_s[-1])),),
-        )
+        status = _status(recording, float(time_s[0]), float(time_s[-1]))
+        flags, so_far = recording.flags[part], int(lost[last - 1])
+        yield SampleBlock(time_s, columns, flags, estimates, so_far, (status,))
 
 
 class _Pace:

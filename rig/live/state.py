@@ -169,9 +169,12 @@ class LiveState:
             self._held.popleft()
         self._samples += int(np.isfinite(signals[RECEIVED]).sum())
         self._flagged += np.isfinite(signals[FIRST_FLAG:FIRST_CHANNEL]).sum(axis=1)
-        squared = self._squared_error_of(block)
+        # the error of the main estimate, outside its range too
+        main, nan = self.channels[0], np.full(len(block), np.nan)
+        error = block.estimates.get(main, nan) - block.columns.get(main, nan)
+        squared = np.where(block.flags == 0, error**2, nan)
         self._error += np.nansum(squared), np.isfinite(squared).sum()
-        if (inside := block.inside.get(self.channels[0])) is not None:
+        if (inside := block.inside.get(main)) is not None:
             self._inside_error += np.nansum(squared[inside]), np.isfinite(squared[inside]).sum()
 
     def _signals(self, block: SampleBlock) -> FloatArray:
@@ -187,12 +190,6 @@ class LiveState:
             estimate = np.where(block.inside.get(channel, valid), estimate, nan)
             rows += [estimate, sensor, (estimate - sensor) ** 2]
         return np.stack(rows)
-
-    def _squared_error_of(self, block: SampleBlock) -> FloatArray:
-        """Return the squared error of the main estimate, outside its range too, shape (n,)."""
-        main, nan = self.channels[0], np.full(len(block), np.nan)
-        error = block.estimates.get(main, nan) - block.columns.get(main, nan)
-        return np.where(block.flags == 0, error**2, nan)
 
     def snapshot(self) -> Snapshot:
         """Return the picture of now."""

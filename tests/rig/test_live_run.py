@@ -1,11 +1,11 @@
 """The display from the first block to the summary, in virtual time."""
 
 import io
+import itertools
 import json
 import os
 import re
 import signal
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from rich.console import Console
 
 from rig.bench.interrupts import leaving_safely
 from rig.errors import SafetyTripError
-from rig.live.block import DeviceStatus, SampleBlock
+from rig.live.block import DeviceStatus
 from rig.live.keys import DisplayKeys
 from rig.live.options import ShowOptions
 from rig.live.show import show
@@ -36,25 +36,13 @@ def blocks(count, ends_with=None, on_close=lambda: None):
 
 
 def people(terminal=False, **changes):
-    return Console(
-        file=io.StringIO(),
-        width=80,
-        height=24,
-        force_terminal=terminal,
-        _environ={"TERM": "xterm-256color"},
-        **changes,
-    )
+    usual = {"file": io.StringIO(), "width": 80, "height": 24, "force_terminal": terminal}
+    return Console(**usual | {"_environ": {"TERM": "xterm-256color"}} | changes)
 
 
 def steady_clock(step_s=0.05):
     """Return a clock that advances whenever it is read."""
-    now = [0.0]
-
-    def clock():
-        now[0] += step_s
-        return now[0]
-
-    return clock
+    return itertools.count(step_s, step_s).__next__
 
 
 def test_json_writes_ten_frames_a_second_and_a_summary(capsys):
@@ -82,15 +70,12 @@ def test_plain_writes_two_lines_a_second_and_a_summary(capsys):
 
 
 def test_plain_is_chosen_by_option_and_by_the_terminal():
-    for console, options in (
-        (people(terminal=True), ShowOptions("run", plain=True)),
-        (people(terminal=False), ShowOptions("run")),
-        (
-            Console(file=io.StringIO(), force_terminal=True, _environ={"TERM": "dumb"}, width=80),
-            ShowOptions("run"),
-        ),
+    for console, is_plain in (
+        (people(terminal=True), True),
+        (people(terminal=False), False),
+        (people(terminal=True, _environ={"TERM": "dumb"}), False),
     ):
-        show(blocks(20), options, console)
+        show(blocks(20), ShowOptions("run", plain=is_plain), console)
         assert "⠀" not in console.file.getvalue()
         assert " | " in console.file.getvalue()
 
@@ -140,7 +125,7 @@ def test_silence_is_shown_in_the_clock_of_the_person(capsys):
     assert frames[-1]["devices"][0]["state"] == "stale"
 
 
-def drawn_after(presses, footer="c channel", help_="c: shows the next channel"):
+def drawn_after(presses):
     """Return the last frame of a display on which keys were pressed, one a block."""
     script = iter(presses)
     keys = DisplayKeys(lambda: next(script, ""))
@@ -152,7 +137,7 @@ def drawn_after(presses, footer="c channel", help_="c: shows the next channel"):
             yield replace(one, columns=columns)
 
     console = people(terminal=True)
-    options = ShowOptions("run", footer=footer, help=help_, keys=keys)
+    options = ShowOptions("run", help="c: shows the next channel", keys=keys)
     summary = show(with_current(), options, console, steady_clock())
     assert summary.channel == GRIP
     return console.file.getvalue().split("\x1b[?2026h")[-1]
@@ -174,17 +159,12 @@ def test_keys_of_the_display_do_not_reach_the_rig():
     assert (keys.chosen, keys.helps) == (1, True)
 
 
-def swallowed() -> Iterator[SampleBlock]:
-    """Yield blocks for ever; the signal's exception is lost once, as in a compiled callback."""
-    with leaving_safely():
-        yield block(0, 1)
-        with suppress(KeyboardInterrupt):
-            os.kill(os.getpid(), signal.SIGTERM)
-        for k in range(1, 1000):
-            yield block(10 * k, 1)
-
-
 def test_a_request_that_was_lost_in_a_callback_ends_the_display():
-    console = Console(file=io.StringIO(), width=100)
-    summary = show(swallowed(), ShowOptions("x", plain=True), console)
-    assert summary.ended == "interrupted"
+    def swallowed():
+        with leaving_safely():
+            yield block(0, 1)
+            with suppress(KeyboardInterrupt):  # lost once, as in a compiled callback
+                os.kill(os.getpid(), signal.SIGTERM)
+            yield from (block(10 * k, 1) for k in range(1, 1000))
+
+    assert show(swallowed(), ShowOptions("x"), people()).ended == "interrupted"

@@ -45,12 +45,6 @@ def test_a_speed_staircase_holds_each_speed(speeds):
     assert angle[0] == angle[-1] == -1.0
 
 
-def write(tmp_path, text):
-    path = tmp_path / "p.toml"
-    path.write_text(text)
-    return str(path)
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -66,8 +60,10 @@ def write(tmp_path, text):
     ],
 )
 def test_a_wrong_file_is_refused_with_the_key(tmp_path, text, message):
+    path = tmp_path / "p.toml"
+    path.write_text(text)
     with pytest.raises(UsageError, match=message):
-        load_protocol(write(tmp_path, text))
+        load_protocol(str(path))
 
 
 def test_an_unknown_protocol_lists_the_shipped_ones():
