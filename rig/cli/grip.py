@@ -32,9 +32,8 @@ def grip(
     """
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
-    from rig.live.estimator import ModelEstimator
+    from rig.live.estimator import ModelEstimator, require_channels
     from rig.live.grip import SHARE, hold_grip
-    from rig.live.suits import require_channels
     from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
     require_number("--duration", duration, 8.0)

@@ -72,13 +72,12 @@ def live(
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
     from rig.live.block import Sink, through
-    from rig.live.estimator import estimators_of, half_widths, shown_channels
+    from rig.live.estimator import estimators_of, half_widths, require_channels, shown_channels
     from rig.live.keys import OF_SESSION, display_keys, no_keys
     from rig.live.options import ShowOptions
     from rig.live.session_blocks import session_blocks
     from rig.live.show import show
     from rig.live.status import model_steps
-    from rig.live.suits import require_channels
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
 

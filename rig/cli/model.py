@@ -70,8 +70,7 @@ def use(
     for recordings of this rig. --model of a command goes before it.
     """
     from rig.configuration.chosen import choose_rig
-    from rig.live.estimator import estimators_of
-    from rig.live.suits import require_channels, require_measured
+    from rig.live.estimator import estimators_of, require_channels, require_measured
 
     settings = choose_rig(config, sim)
     file = Path(model)
