@@ -6,7 +6,7 @@ from typing import Annotated
 from typer import Option
 
 from rig.cli.options import ConfigOption, SeedOption, SimFlag, chosen_rig, group, require_number
-from rig.output.console import JsonFlag, present, progress, remarks
+from rig.output.console import JsonFlag, counted, present, progress, remarks
 from rig.output.table import TextTable
 
 grasper_app = group(
@@ -89,14 +89,11 @@ def follow(
     # the simulated rig of this command is the simulated grasper
     settings = chosen_rig(Path("grasper") if sim and config is None else config, sim=False)
     refuse_problems(settings)
-    with progress() as bar:
-        task = bar.add_task("following", total=duration)
-
-        def show(time_s: float) -> None:
-            bar.update(task, completed=time_s)
-
+    with counted("following") as count:
         try:
-            axes, log = follow_master(settings, master, duration, scale, out, show)
+            axes, log = follow_master(
+                settings, master, duration, scale, out, lambda time_s: count(time_s, duration)
+            )
         except KeyboardInterrupt:
             remarks().print("Stopped; the grasper is safe.")
             raise

@@ -148,7 +148,7 @@ def described(what: str) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def counted(what: str) -> Iterator[Callable[[int, int], None]]:
+def counted(what: str) -> Iterator[Callable[[float, float], None]]:
     """Show how much of some work is done; yields what is called with that, and the total."""
     with progress() as bar:
         task = bar.add_task(what, total=None)
