@@ -12,8 +12,7 @@ from calibration.linear import CalibrationSet
 from drivers.teensy.protocol import TOP, SafeState
 from drivers.teensy.reference import Limits
 from rig.configuration.config import Config
-from rig.configuration.sections import PlausibilitySection
-from rig.configuration.sections import SafetySection
+from rig.configuration.sections import PlausibilitySection, SafetySection
 from rig.errors import SafetyTripError
 
 TICK_S = 1e-3
