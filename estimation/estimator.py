@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.campaign import Campaign
+from estimation.live_channels import CausalChannels
 from estimation.recording import FloatArray, Recording
 
 
 class Stepper:
-    """An estimator as it runs live; it holds the state of the filters.
+    """An estimator as it runs live, on the channels of a source, which holds the filters' state.
 
     Attributes:
         inside: Which of the last samples lay in the range fitted on, shape (n,); None where an
@@ -27,10 +28,13 @@ class Stepper:
     inside: NDArray[np.bool_] | None = None
     half_width: float | None = None
 
+    def __init__(self, source: CausalChannels) -> None:
+        self._source = source
+
     @property
     def channels(self) -> tuple[str, ...]:
         """Measured channels that `step` needs."""
-        raise NotImplementedError
+        return self._source.measured
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples, one or many, and return their estimates, shape (n,)."""

@@ -21,6 +21,10 @@ class FilterError(EstimationError):
 SHARE = 0.2
 """Usual cutoff, share of the sample rate."""
 
+POINTS, EXACT_DEGREE = 11, 4
+"""Of the derivative: the published counts of the measured data (308,117 and 962,936 closing
+samples) come out with them."""
+
 
 @dataclass(frozen=True, slots=True)
 class LowPass:
@@ -127,7 +131,7 @@ class CausalFilter:
         return filtered
 
 
-def holoborodko_coefficients(points: int = 11, exact_degree: int = 4) -> FloatArray:
+def holoborodko_coefficients(points: int, exact_degree: int) -> FloatArray:
     """Return the coefficients of Holoborodko's smooth noise-robust differentiator.
 
     The derivative of f at sample 0, sample period h, is sum c_k (f_k - f_-k) / h, k = 1..(N-1)/2.
@@ -141,8 +145,7 @@ def holoborodko_coefficients(points: int = 11, exact_degree: int = 4) -> FloatAr
 
     Args:
         points: Length N of the stencil, odd; at least 3, or 5 for degree 4.
-        exact_degree: 2 or 4. The published counts of the measured data (308,117 and 962,936
-            closing samples) come out with 11 points and degree 4.
+        exact_degree: 2 or 4.
 
     Returns:
         Coefficients c_1 .. c_((N-1)/2).
@@ -166,9 +169,7 @@ def holoborodko_coefficients(points: int = 11, exact_degree: int = 4) -> FloatAr
     return response[half + 1 :]
 
 
-def holoborodko_derivative(
-    values: ArrayLike, period_s: float, points: int = 11, exact_degree: int = 4
-) -> FloatArray:
+def holoborodko_derivative(values: ArrayLike, period_s: float) -> FloatArray:
     """Differentiate a uniformly sampled signal with the noise-robust differentiator.
 
     Edges: where the stencil does not fit, the longest shorter one of the same family does the
@@ -178,11 +179,9 @@ def holoborodko_derivative(
     Args:
         values: Shape (n,) or (n, k), n at least 3.
         period_s: Sample period, s.
-        points: Length of the stencil.
-        exact_degree: 2 or 4, see `holoborodko_coefficients`.
 
     Raises:
-        FilterError: Fewer than three samples, or no such differentiator.
+        FilterError: Fewer than three samples.
     """
     signal_values = np.asarray(values, dtype=np.float64)
     n = len(signal_values)
@@ -192,8 +191,8 @@ def holoborodko_derivative(
     derivative[0] = [-1.5, 2.0, -0.5] @ signal_values[:3]
     derivative[-1] = [0.5, -2.0, 1.5] @ signal_values[-3:]
     # each longer stencil overwrites the samples it reaches
-    for length in range(3, min(points, n if n % 2 else n - 1) + 1, 2):
-        degree = exact_degree if length > exact_degree else 2
+    for length in range(3, min(POINTS, n if n % 2 else n - 1) + 1, 2):
+        degree = EXACT_DEGREE if length > EXACT_DEGREE else 2
         half = (length - 1) // 2
         inner = np.zeros((n - 2 * half, *signal_values.shape[1:]))
         for k, c in enumerate(holoborodko_coefficients(length, degree), start=1):

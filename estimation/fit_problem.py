@@ -71,11 +71,13 @@ class Problem:
             blocks.append(last[1])
         return np.column_stack(blocks) * self.signs
 
+    def free_columns(self, run: FitRun, shape: Sequence[float]) -> FloatArray:
+        """Return the columns of a run that least squares solves for, shape (n, free)."""
+        return self.columns(run, shape)[:, self.free]
+
     def gram(self, run: FitRun, shape: Sequence[float]) -> FloatArray:
         """Return the cross-products of free columns and target of one run."""
-        table = np.column_stack(
-            [self.columns(run, shape)[:, self.free], run.thin[self.model.target]]
-        )
+        table = np.column_stack([self.free_columns(run, shape), run.thin[self.model.target]])
         if self.model.run_offsets:
             table -= table.mean(axis=0)
         product: FloatArray = table.T @ table

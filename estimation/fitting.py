@@ -64,31 +64,13 @@ def fit(
     )
 
 
-def evidence_of(fitted: Model, campaign: Campaign, seed: int = 0) -> Evidence:
-    """Return the evidence of a model that was fitted elsewhere, on the runs of its fit.
-
-    Args:
-        fitted: The model.
-        campaign: The runs, counted as `fit` counts them.
-        seed: Seed of the bootstrap behind its spreads.
-
-    Raises:
-        FitError: No valid sample.
-        MissingChannelError: A run lacks a channel of the model.
-    """
-    return _evidence(fitted, prepared(fitted, campaign, None), seed)
-
-
 def _mean_offset(problem: Problem, shape: Sequence[float], free: FloatArray) -> float:
     """Return the mean over the runs of the residual of the free columns."""
     if problem.offset is None:
         return 0.0
-    return float(np.mean([_run_offset(problem, run, shape, free) for run in problem.runs]))
-
-
-def _run_offset(problem: Problem, run: FitRun, shape: Sequence[float], free: FloatArray) -> float:
-    left = run.thin[problem.model.target] - problem.columns(run, shape)[:, problem.free] @ free
-    return float(left.mean() * problem.signs[problem.offset or 0])
+    target = problem.model.target
+    left = [run.thin[target] - problem.free_columns(run, shape) @ free for run in problem.runs]
+    return float(np.mean([each.mean() for each in left]) * problem.signs[problem.offset])
 
 
 def _bootstrap(
@@ -106,14 +88,9 @@ def _bootstrap(
     names = len(free)
     products, means = [], []
     for run in runs:
-        table = np.column_stack(
-            [
-                problem.columns(run, shape)[:, problem.free],
-                _slopes(problem, run, shape, free),
-                run.thin[problem.model.target]
-                - problem.columns(run, shape)[:, problem.free] @ free,
-            ]
-        )
+        columns = problem.free_columns(run, shape)
+        left = run.thin[problem.model.target] - columns @ free
+        table = np.column_stack([columns, _slopes(problem, run, shape, free), left])
         means.append(table.mean(axis=0))
         if problem.model.run_offsets:
             table = table - means[-1]
@@ -153,9 +130,7 @@ def _slopes(problem: Problem, run: FitRun, shape: list[float], free: FloatArray)
         ends = []
         for sign in (1, -1):
             moved = unscaled(parameter, scaled(parameter, shape[k]) + sign * SLOPE_STEP)
-            ends.append(
-                problem.columns(run, [*shape[:k], moved, *shape[k + 1 :]])[:, problem.free] @ free
-            )
+            ends.append(problem.free_columns(run, [*shape[:k], moved, *shape[k + 1 :]]) @ free)
         slopes[:, k] = (ends[0] - ends[1]) / (2 * SLOPE_STEP)
     return slopes
 

@@ -21,6 +21,7 @@ from estimation.recording import FloatArray
 
 HARMONICS = 5
 FUNDAMENTAL_HZ = 0.1
+PULSE = 2 * np.pi * FUNDAMENTAL_HZ * np.arange(1.0, HARMONICS + 1)
 GRID = 2000
 """Instants of a period at which limits are looked at; between them the series' slope bounds it."""
 
@@ -61,10 +62,19 @@ class Excitation:
 
 
 def _series(sine: FloatArray, cosine: FloatArray, time_s: FloatArray, order: int) -> FloatArray:
-    pulse = 2 * np.pi * FUNDAMENTAL_HZ * np.arange(1.0, HARMONICS + 1)
-    phase = np.outer(time_s, pulse) + order * np.pi / 2
-    scale = (pulse**order)[:, None]
+    phase = np.outer(time_s, PULSE) + order * np.pi / 2
+    scale = (PULSE**order)[:, None]
     return np.sin(phase) @ (scale * sine) + np.cos(phase) @ (scale * cosine)
+
+
+def _limits(arm: Arm) -> tuple[FloatArray, FloatArray]:
+    """Return the middle of each joint's range, and limits of position, velocity, acceleration.
+
+    Shape (joints,) and (3, joints); the first limit is half the range.
+    """
+    lower, upper, speed = arm.limits
+    limits = np.stack([(upper - lower) / 2, speed, ACCELERATION_PER_SPEED * speed])
+    return (lower + upper) / 2, limits
 
 
 def bounds(sine: FloatArray, cosine: FloatArray) -> FloatArray:
@@ -74,11 +84,10 @@ def bounds(sine: FloatArray, cosine: FloatArray) -> FloatArray:
     bound of its slope, the sum of its amplitudes.
     """
     time = np.arange(GRID) / (GRID * FUNDAMENTAL_HZ)
-    pulse = 2 * np.pi * FUNDAMENTAL_HZ * np.arange(1.0, HARMONICS + 1)
     amplitude = np.hypot(sine, cosine)
     rows = []
     for order in range(3):
-        slope = (pulse ** (order + 1)) @ amplitude
+        slope = (PULSE ** (order + 1)) @ amplitude
         seen = np.abs(_series(sine, cosine, time, order)).max(axis=0)
         rows.append(seen + slope * time[1] / 2)
     return np.stack(rows)
@@ -89,11 +98,9 @@ def reached(arm: Arm, excitation: Excitation) -> float:
 
     Up to 1 no limit of position, velocity or acceleration is passed, whatever the instant.
     """
-    lower, upper, speed = arm.limits
-    off_centre = np.abs(excitation.middle - (lower + upper) / 2)
+    middle, limits = _limits(arm)
     moved = bounds(excitation.sine, excitation.cosine)
-    moved[0] += off_centre
-    limits = np.stack([(upper - lower) / 2, speed, ACCELERATION_PER_SPEED * speed])
+    moved[0] += np.abs(excitation.middle - middle)
     return float((moved / limits).max())
 
 
@@ -108,12 +115,11 @@ def fitted(arm: Arm, raw: FloatArray) -> Excitation:
     joints = len(arm.joints)
     table = raw.reshape(2 * HARMONICS + 1, joints)
     sine, cosine = table[:HARMONICS], table[HARMONICS:-1]
-    lower, upper, speed = arm.limits
-    half = (upper - lower) / 2
-    off_centre = 0.5 * np.tanh(table[-1]) * half
-    limits = np.stack([half - np.abs(off_centre), speed, ACCELERATION_PER_SPEED * speed])
+    middle, limits = _limits(arm)
+    off_centre = 0.5 * np.tanh(table[-1]) * limits[0]
+    limits[0] -= np.abs(off_centre)
     factor = (limits / np.maximum(bounds(sine, cosine), 1e-12)).min(axis=0)
-    return Excitation((lower + upper) / 2 + off_centre, factor * sine, factor * cosine)
+    return Excitation(middle + off_centre, factor * sine, factor * cosine)
 
 
 def numbers_of(arm: Arm, excitation: Excitation) -> FloatArray:
@@ -121,8 +127,8 @@ def numbers_of(arm: Arm, excitation: Excitation) -> FloatArray:
 
     A middle more than a quarter of the range off the centre comes nearer to it.
     """
-    lower, upper, _ = arm.limits
-    off_centre = (excitation.middle - (lower + upper) / 2) / (0.25 * (upper - lower))
+    middle, limits = _limits(arm)
+    off_centre = (excitation.middle - middle) / (0.5 * limits[0])
     share = np.arctanh(np.clip(off_centre, -0.99, 0.99))
     return np.concatenate([excitation.sine, excitation.cosine, share[None]]).ravel()
 
@@ -154,24 +160,21 @@ def by_active_set(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
         first: The start, within the limits.
         evaluations: Condition numbers it may take, gradients by differences included.
     """
-    lower, upper, speed = arm.limits
-    half = (upper - lower) / 2
-    sizes = np.stack([half, speed, ACCELERATION_PER_SPEED * speed])
+    middle, limits = _limits(arm)
     time = np.arange(SAMPLED) / (SAMPLED * FUNDAMENTAL_HZ)
 
     def excitation(flat: FloatArray) -> Excitation:
-        table = flat.reshape(2 * HARMONICS + 1, -1) * half
+        table = flat.reshape(2 * HARMONICS + 1, -1) * limits[0]
         return Excitation(table[-1], table[:HARMONICS], table[HARMONICS:-1])
 
     def room(flat: FloatArray) -> FloatArray:
         """Return the margin to each limit, relative to it; not negative within the limits."""
         motion = excitation(flat).motion(time)
-        middle = (lower + upper) / 2
         moved = np.stack([motion.position - middle, motion.velocity, motion.acceleration])
-        share = moved / sizes[:, None]
+        share = moved / limits[:, None]
         return np.concatenate([(1 - share).ravel(), (1 + share).ravel()])
 
-    begin = np.concatenate([first.sine, first.cosine, first.middle[None]]) / half
+    begin = np.concatenate([first.sine, first.cosine, first.middle[None]]) / limits[0]
     nothing = room(np.zeros(begin.size))
     # the limits are linear in the coefficients
     linear = np.stack([room(unit) - nothing for unit in np.eye(begin.size)], axis=1)

@@ -76,18 +76,18 @@ def tip_pose(arm: Arm, position: FloatArray) -> FloatArray:
     Raises:
         ArmError: The number of positions is not the arm's.
     """
+    q = np.asarray(position, dtype=np.float64)
+    check_positions(arm, q[None])
     pin, model = pinocchio(), built(arm)
     data = model.createData()
-    q = _checked(arm, position)
     pin.framesForwardKinematics(model, data, arm.closure @ q if arm.loops else q)
     return np.asarray(data.oMf[model.getFrameId(TIP)].homogeneous)
 
 
-def _checked(arm: Arm, position: FloatArray) -> FloatArray:
-    q = np.asarray(position, dtype=np.float64)
-    if q.shape != (len(arm.joints),) or not np.isfinite(q).all():
+def check_positions(arm: Arm, position: FloatArray) -> None:
+    """Raise ArmError unless positions, shape (n, joints), are finite and of an arm's joints."""
+    if position.shape[1:] != (len(arm.joints),) or not np.isfinite(position).all():
         raise ArmError(
-            f"Positions of shape {q.shape} do not fit {arm.name}.",
+            f"Positions of shape {position.shape} do not fit {arm.name}.",
             f"It has {len(arm.joints)} joints; every position must be finite.",
         )
-    return q

@@ -80,7 +80,7 @@ def shared_fit(arm: ArmBalances, recordings: Sequence[Recording]) -> SharedFit:
 def laid_out(
     arm: ArmBalances, recordings: Sequence[Recording], train: Collection[str]
 ) -> list[Recording]:
-    """Return an arm's runs with the shared link torque, fitted on training runs.
+    """Return an arm's runs with the shared links' torque, fitted on training runs.
 
     Args:
         arm: The arm.
@@ -88,23 +88,11 @@ def laid_out(
         train: Names of the training runs; others are not used in the fit.
     """
     fitted = shared_fit(arm, [run for run in recordings if run.name in train])
-    return with_links(arm, recordings, fitted)
-
-
-def with_links(
-    arm: ArmBalances, recordings: Sequence[Recording], fitted: SharedFit
-) -> list[Recording]:
-    """Return recordings with each joint's links' torque and direction, and the motors' angles.
-
-    Args:
-        arm: The arm.
-        recordings: Its runs.
-        fitted: Declared parameters, from `shared_fit`.
-    """
     return [r.with_columns(**_added(arm, r, fitted)) for r in recordings]
 
 
 def _added(arm: ArmBalances, recording: Recording, fitted: SharedFit) -> Mapping[str, FloatArray]:
+    """Return each joint's links' torque and direction, and the motors' angles."""
     position, _, _ = joint_channels(recording)
     motion = motion_of(position, 1 / recording.sample_rate_hz, FINE)
     columns = arm.columns(motion)

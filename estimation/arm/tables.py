@@ -58,11 +58,6 @@ class Joint:
     link: Link = "full"
     spring: bool = False
 
-    @property
-    def torque_unit(self) -> str:
-        """Unit of the joint's torque or force."""
-        return "N m" if self.kind == "revolute" else "N"
-
 
 @dataclass(frozen=True, slots=True)
 class Body:

@@ -10,9 +10,16 @@ import numpy as np
 from scipy import signal
 from scipy.linalg import lapack
 
-from estimation.arm.kinematics import TIP, ArmError, built, pinocchio, tip_pose
+from estimation.arm.kinematics import (
+    TIP,
+    ArmError,
+    built,
+    check_positions,
+    pinocchio,
+    tip_pose,
+)
 from estimation.arm.recursion import LINK
-from estimation.arm.regressor import SIGN_WIDTH, names
+from estimation.arm.regressor import names, sign_width
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray
 
@@ -51,11 +58,7 @@ def body_jacobians(arm: Arm, position: FloatArray) -> FloatArray:
 
 
 def _jacobians(arm: Arm, position: FloatArray, frame: str) -> FloatArray:
-    if position.shape[1] != len(arm.joints) or not np.isfinite(position).all():
-        raise ArmError(
-            f"Positions of shape {position.shape} do not fit {arm.name}.",
-            f"It has {len(arm.joints)} joints; every position must be finite.",
-        )
+    check_positions(arm, position)
     pin, model = pinocchio(), built(arm)
     data, tip = model.createData(), model.getFrameId(TIP)
     reference = getattr(pin.ReferenceFrame, frame)
@@ -163,7 +166,7 @@ class LiveWrench:
         self._joints = len(arm.joints)
         self._window = np.zeros((2 * WINDOW, 2 * self._joints))
         self._seen = 0
-        self._width = SIGN_WIDTH * np.array([joint.speed for joint in arm.joints])
+        self._width = sign_width(arm)
         self._links, self._linear, self._coulomb, self._offset = _split(arm, values)
         self._inverse_variance = torque_error**-2.0
         self._prior = _likely()

@@ -19,8 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from estimation.bank.states import GEAR_RATIO, JUDGED, Bank
 from estimation.recording import FloatArray
@@ -73,10 +73,10 @@ class Beyond:
         Args:
             places: Conditions, shape (n, d).
         """
-        found = np.empty(len(places))
-        shape = np.array(self.values.shape)
-        _look_up((places - self.lowest) / self.step, shape, self.values.ravel(), found)
-        return found
+        at = (places - self.lowest) / self.step
+        at = np.where(np.isfinite(at), at, -1.0)
+        found = ndimage.map_coordinates(self.values, at.T, order=1, cval=np.nan, prefilter=False)
+        return np.asarray(found)
 
 
 def cut_to(table: Beyond, places: FloatArray) -> Beyond | None:
@@ -99,28 +99,6 @@ def cut_to(table: Beyond, places: FloatArray) -> Beyond | None:
     end = table.lowest + table.step * (nodes - 1)
     values = table.at(np.clip(grid, table.lowest, end))
     return Beyond(lowest, step, values.reshape(table.values.shape))
-
-
-@njit(cache=True)
-def _look_up(
-    places: FloatArray, shape: NDArray[np.int64], values: FloatArray, found: FloatArray
-) -> None:
-    """Interpolate linearly along each axis; the C header does the same."""
-    axes = len(shape)
-    for n in range(len(places)):
-        total = 0.0
-        for k in range(axes):
-            if not 0.0 <= places[n, k] <= shape[k] - 1:
-                total = np.nan
-        for corner in range(0 if np.isnan(total) else 1 << axes):
-            share, place = 1.0, 0
-            for k in range(axes):
-                low = min(int(places[n, k]), shape[k] - 2)
-                up = corner >> k & 1
-                share *= places[n, k] - low if up else 1.0 - (places[n, k] - low)
-                place = place * shape[k] + low + up
-            total += share * values[place]
-        found[n] = total
 
 
 class Visits:

@@ -210,16 +210,10 @@ class BankStepper(Stepper):
     """A state estimator as it runs live; its interval differs from sample to sample."""
 
     def __init__(self, estimator: BankEstimator, sample_rate_hz: float) -> None:
+        names, low_pass = estimator.bank.channels, estimator.low_pass
+        super().__init__(CausalChannels(names, sample_rate_hz, low_pass, tracked=True))
         self.inside = np.empty(0, np.bool_)
         self._estimator = estimator
-        self._source = CausalChannels(
-            estimator.bank.channels, sample_rate_hz, estimator.low_pass, tracked=True
-        )
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Measured channels that `step` needs."""
-        return self._source.measured
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""

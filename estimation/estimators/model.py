@@ -34,20 +34,14 @@ class Stream(Stepper):
             NotFittedError: A parameter has no value.
             FilterError: The model's filter does not fit the rate.
         """
+        channels, low_pass = model.channels, model.low_pass
+        super().__init__(CausalChannels(channels, sample_rate_hz, low_pass, signals=model.signals))
         self.model = model
-        self._source = CausalChannels(
-            model.channels, sample_rate_hz, model.low_pass, signals=model.signals
-        )
         self._weights = [np.array(term.weights) for term in model.terms]
         self._shapes = [term.numbers(term.effect.shape) for term in model.terms]
         self._states = [term.effect.start() for term in model.terms]
         self._rest = {k: v for k, v in model.signals.rest.items() if k in model.channels}
         self.half_width = usual_half_width(model)
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Measured channels that `step` needs."""
-        return self._source.measured
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples and return their estimates.

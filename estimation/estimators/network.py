@@ -12,6 +12,7 @@ from estimation.campaign import Campaign
 from estimation.closing import closing_samples, processed
 from estimation.derived import zero_phase_channels
 from estimation.estimator import Stepper
+from estimation.estimators.bank import EVERY
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.estimators.origin import Origin
 from estimation.filters import PAPER, LowPass
@@ -28,9 +29,6 @@ STATE_INPUTS = (
     "motor_travel_rad",
 )
 """Inputs of a network with physical states, in addition to the load."""
-
-EVERY = 4
-"""Of samples filtered at 50 Hz and taken at 1 kHz, every fourth one holds all there is to learn."""
 
 
 @dataclass(frozen=True)
@@ -120,14 +118,10 @@ class NetworkStepper(Stepper):
     """A network as it runs live; it has no interval."""
 
     def __init__(self, estimator: NetworkEstimator, sample_rate_hz: float) -> None:
+        inputs, low_pass = estimator.network.inputs, estimator.low_pass
+        super().__init__(CausalChannels(inputs, sample_rate_hz, low_pass))
         self.inside = np.empty(0, np.bool_)
         self._network = estimator.network
-        self._source = CausalChannels(estimator.network.inputs, sample_rate_hz, estimator.low_pass)
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Measured channels that `step` needs."""
-        return self._source.measured
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""

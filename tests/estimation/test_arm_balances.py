@@ -8,7 +8,7 @@ import pytest
 from estimation.arm.balances import balances_of
 from estimation.arm.kinematics import ArmError
 from estimation.arm.motion import motion_of
-from estimation.arm.shared import laid_out, shared_fit, with_links
+from estimation.arm.shared import laid_out, shared_fit
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
@@ -63,7 +63,7 @@ def test_an_arm_with_a_complete_model_gets_no_finding() -> None:
 def test_the_links_share_one_set_of_parameters_over_all_joints() -> None:
     (run,) = campaign(None, runs=1, seconds=30.0)
     arm = balances_of(run)
-    (whole,) = with_links(arm, [run], shared_fit(arm, [run]))
+    (whole,) = laid_out(arm, [run], {run.name})
     fitted = shared_fit(arm, [run])
     declared = arm.columns(motion_of(positions(run), 1 / RATE_HZ)) @ fitted.values
     for k, names in enumerate(arm.joints[:3]):

@@ -8,24 +8,15 @@ import pytest
 from estimation.arm.base import base_of
 from estimation.arm.identification import fit, thesis_weights
 from estimation.arm.kinematics import ArmError
-from estimation.arm.motion import joint_channels, motion_of
+from estimation.arm.motion import joint_channels
 from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM
 from estimation.recording import Recording
+from rig.arm.simulated import excitation
 
-PERIOD_S = 0.01
 
-
-def excitation(seed: int, seconds: float = 12.0) -> np.ndarray:
-    """Random finite Fourier series inside the joint limits, shape (n, 6)."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, seconds, PERIOD_S)[:, None]
-    parts = sum(
-        np.sin(2 * np.pi * 0.17 * k * time + rng.uniform(0, 6.28, 6)) * rng.uniform(0.3, 1, 6) / k
-        for k in range(1, 6)
-    )
-    lower, upper = (np.array([getattr(j, n) for j in PSM.joints]) for n in ("lower", "upper"))
-    return (lower + upper) / 2 + 0.35 * (upper - lower) * parts / np.abs(parts).max(axis=0)
+def columns_of(seed: int, seconds: float) -> np.ndarray:
+    return regressor(PSM, excitation(np.random.default_rng(seed), seconds))
 
 
 def test_the_thesis_68_parameters_have_48_identifiable_combinations():
@@ -40,7 +31,7 @@ def test_the_thesis_68_parameters_have_48_identifiable_combinations():
 
 def test_identification_finds_the_base_parameters_behind_the_torques():
     base = base_of(PSM)
-    columns = regressor(PSM, motion_of(excitation(3, 30.0), PERIOD_S))[:, :, base.columns]
+    columns = columns_of(3, 30.0)[:, :, base.columns]
     rng = np.random.default_rng(7)
     truth = rng.normal(size=48)
     torque = columns @ truth
@@ -57,7 +48,7 @@ def test_identification_finds_the_base_parameters_behind_the_torques():
 
 
 def test_dependent_columns_are_refused_without_damping():
-    columns = regressor(PSM, motion_of(excitation(4), PERIOD_S))
+    columns = columns_of(4, 12.0)
     torque = columns @ np.ones(68)
     with pytest.raises(ArmError, match="cannot be identified"):
         fit(columns, torque)
@@ -66,18 +57,12 @@ def test_dependent_columns_are_refused_without_damping():
 
 def test_joints_are_read_from_a_recordings_channels():
     time = np.arange(5) / 200
-    columns = {
-        "joint_1_angle_rad": time,
-        "joint_1_velocity_rad_s": 2 * time,
-        "joint_1_torque_n_m": 3 * time,
-        "joint_2_position_m": 4 * time,
-        "joint_2_velocity_m_s": 5 * time,
-        "joint_2_force_n": 6 * time,
-    }
-    run = Recording(name="arm", time_s=time, columns=columns)
-    position, velocity, torque = joint_channels(run)
-    np.testing.assert_array_equal(position, np.column_stack([time, 4 * time]))
-    np.testing.assert_array_equal(velocity, np.column_stack([2 * time, 5 * time]))
-    np.testing.assert_array_equal(torque, np.column_stack([3 * time, 6 * time]))
+    turning = ("joint_1_angle_rad", "joint_1_velocity_rad_s", "joint_1_torque_n_m")
+    sliding = ("joint_2_position_m", "joint_2_velocity_m_s", "joint_2_force_n")
+    columns = {name: k * time for k, name in enumerate((*turning, *sliding))}
+    run = Recording("arm", time, columns)
+    both = zip(turning, sliding, strict=True)
+    for found, channels in zip(joint_channels(run), both, strict=True):
+        np.testing.assert_array_equal(found, np.column_stack([run[name] for name in channels]))
     with pytest.raises(ArmError, match="no arm joints"):
         joint_channels(replace(run, columns={"motor_current_a": time}))
