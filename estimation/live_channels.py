@@ -96,12 +96,11 @@ class CausalChannels:
         return [part for part in parts if part.size]
 
     def _advance(self, time: FloatArray, rows: FloatArray) -> dict[str, FloatArray]:
-        if self._last_time_s is None or time[0] - self._last_time_s > self.LONGEST_GAP_S:
+        last = self._last_time_s
+        first = last is None or bool(time[0] - last > self.LONGEST_GAP_S)
+        if first:
             self._filter.restart()
             self._last_time_s, self._last_row = time[0] - 1.0 / self._rate_hz, rows[0]
-            first = True
-        else:
-            first = False
         steps = np.rint(np.diff(time, prepend=self._last_time_s) * self._rate_hz)
         ticks = np.concatenate([[0], np.cumsum(np.maximum(steps, 1))]).astype(np.int64)
         filled = fill_gaps(ticks, np.vstack([self._last_row, rows]))[1:]
@@ -109,11 +108,8 @@ class CausalChannels:
         if first:
             self._history = np.repeat(filtered[:1], self._kept, axis=0)
         lined = np.vstack([self._history, filtered])
-        self._history, self._last_row, self._last_time_s = (
-            lined[-self._kept :],
-            rows[-1],
-            float(time[-1]),
-        )
+        self._history = lined[-self._kept :]
+        self._last_row, self._last_time_s = rows[-1], float(time[-1])
         derived = derive(
             dict(zip(self.measured, lined.T, strict=True)),
             [name for name in self.names if name not in CLOCKS],
@@ -134,9 +130,7 @@ class CausalChannels:
         for name, column in self._tracked.items():
             angles = filled[:, column]
             if first:
-                self._motion[name] = np.repeat(
-                    self._tracker.start(angles[0])[None], self._kept, axis=0
-                )
+                self._motion[name] = np.tile(self._tracker.start(angles[0]), (self._kept, 1))
             before = self._motion[name]
             moved = self._tracker.track(angles, before[-1].copy())
             found[name] = np.vstack([before, moved])

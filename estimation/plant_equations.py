@@ -277,76 +277,59 @@ def _deflections(plant: Plant, chain: Chain) -> Iterator[Written]:
         yield Written(_bend_name(plant, joint), target, (*parts, OFFSET))
 
 
-def missing(plant: Plant) -> list[Missing]:
-    """Return the gaps of these sensors: quantities without an equation, and the sensor for each."""
-    found = []
+def missing(plant: Plant) -> Iterator[Missing]:
+    """Yield the gaps of these sensors: quantities without an equation, and the sensor for each."""
     efforts = [sensor.name for sensor in plant.sensors if sensor.reads == "effort"]
     if not plant.actuators and efforts and not equations(plant):
-        found.append(
-            Missing(
-                "No [[actuator]] drives the machine: no equation has an effort on its left.",
-                "An [[actuator]] in place of the [[sensor]] that reads the driving effort, such as"
-                f" {efforts[0]}.",
-            )
+        yield Missing(
+            "No [[actuator]] drives the machine: no equation has an effort on its left.",
+            "An [[actuator]] in place of the [[sensor]] that reads the driving effort, such as"
+            f" {efforts[0]}.",
         )
     if not plant.actuators and not efforts:
-        found.append(
-            Missing(
-                "Nothing drives the machine and no effort is read.",
-                "An [[actuator]], or a [[sensor]] that reads an effort (N or N m).",
-            )
+        yield Missing(
+            "Nothing drives the machine and no effort is read.",
+            "An [[actuator]], or a [[sensor]] that reads an effort (N or N m).",
         )
     for chain in chains(plant):
-        if not any(plant.effort(axis) for axis in chain.axes):
-            scale = unit_of(chain.actuator.name)
-            kind = EFFORT[plant.axis(chain.axes[-1]).unit]
-            if scale not in EFFORT.values():
-                found.append(
-                    Missing(
-                        f"What {chain.actuator.name} drives with is known in {scale} only:"
-                        f" inertia and friction come out in units of the drive.",
-                        f"A sensor of effort ({kind}) on one of {', '.join(chain.axes)}.",
-                    )
-                )
+        axes, drive = ", ".join(chain.axes), chain.actuator.name
+        scale, kind = unit_of(drive), EFFORT[plant.axis(chain.axes[-1]).unit]
+        if scale not in EFFORT.values() and not any(plant.effort(axis) for axis in chain.axes):
+            yield Missing(
+                f"What {drive} drives with is known in {scale} only:"
+                " inertia and friction come out in units of the drive.",
+                f"A sensor of effort ({kind}) on one of {axes}.",
+            )
         if not _driven(plant, chain.axes):
-            found.append(
-                Missing(
-                    f"No motion is measured behind {chain.actuator.name}: neither inertia nor"
-                    " friction can be identified.",
-                    f"A sensor of position or speed on one of {', '.join(chain.axes)}.",
-                )
+            yield Missing(
+                f"No motion is measured behind {drive}: neither inertia nor"
+                " friction can be identified.",
+                f"A sensor of position or speed on one of {axes}.",
             )
     axis_of = {sensor.name: sensor.axis for sensor in plant.sensors}
-    found += [
-        Missing(
+    for position, speed in plant.integrals.items():
+        yield Missing(
             f"{position} is the integral of {speed} and begins at 0 in each run: what depends on"
             " it cannot be compared between runs.",
             f"A sensor of position on {axis_of[speed]}.",
         )
-        for position, speed in plant.integrals.items()
-    ]
     for joint in plant.transmissions:
         ends = (joint.input, joint.output)
         absent = [f"of position on {axis}" for axis in ends if not plant.position(axis)]
-        if not plant.effort(joint.output) and not plant.effort(joint.input):
+        if not any(plant.effort(axis) for axis in ends):
             absent.append(f"of effort on {joint.output} or {joint.input}")
         if joint.compliant and absent:
-            found.append(
-                Missing(
-                    f"The bend of {joint.name} cannot be identified.",
-                    f"A sensor {' and one '.join(absent)}.",
-                )
+            yield Missing(
+                f"The bend of {joint.name} cannot be identified.",
+                f"A sensor {' and one '.join(absent)}.",
             )
-    driven = {chain_axis for chain in chains(plant) for chain_axis in chain.axes}
+    driven = {axis for chain in chains(plant) for axis in chain.axes}
     for axis in plant.axes:
         if axis.name not in driven and plant.actuators:
-            found.append(
-                Missing(
-                    f"Nothing drives the axis {axis.name}: no equation has it.",
-                    "An [[actuator]] on it, or a [[transmission]] that leads to it.",
-                )
+            yield Missing(
+                f"Nothing drives the axis {axis.name}: no equation has it.",
+                "An [[actuator]] on it, or a [[transmission]] that leads to it.",
             )
-    return found
 
 
 def unused(plant: Plant) -> list[str]:

@@ -67,15 +67,11 @@ def _term(part: Part, number: int) -> Term:
             nearest(part.id, list(known)),
             "`rig effects` lists them.",
         )
-    for channel in part.channels.values():
-        try:
-            unit_of(channel)
-        except EstimationError as error:
-            place = ("equation.effects", number, "channels")
-            raise PlantError(place, error.what, error.why, error.fix) from error
     try:
+        for channel in part.channels.values():
+            unit_of(channel)
         return Term(known[part.id], part.sign, part.channels)
-    except ModelError as error:
+    except EstimationError as error:
         place = ("equation.effects", number, "channels")
         raise PlantError(place, error.what, error.why, error.fix) from error
 

@@ -19,7 +19,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.bank.beyond import Visits, cut_to
 from estimation.bank.edges import other_levels
@@ -86,17 +85,6 @@ class Evidence:
         if isinstance(estimator, BankEstimator):
             return estimator.of_rows(self.rows).value
         return estimator.network(self.rows)[:, 0]
-
-    def covered(self, estimator: Adaptable) -> NDArray[np.bool_] | None:
-        """Return whether the interval covers the sensor, of the samples with one; None without."""
-        if not isinstance(estimator, BankEstimator):
-            return None
-        estimator = estimator.at(self.conditions)
-        if estimator.interval is None:
-            return None
-        found = estimator.of_rows(self.rows)
-        inside = np.abs(found.value - self.truth) <= found.half_width
-        return np.asarray(inside[np.isfinite(found.half_width)])
 
 
 def evidence(estimator: Adaptable, recording: Recording) -> Evidence | None:

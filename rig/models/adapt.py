@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from estimation.bank.interval import covered_share
 from estimation.campaign import Campaign, in_folds
 from estimation.estimator import Estimator
 from estimation.estimators.adaptation import (
@@ -180,8 +181,11 @@ def _score(estimator: Adaptable, runs: Sequence[Evidence]) -> Score:
 
 
 def _covered(estimator: Adaptable, runs: Sequence[Evidence]) -> float | None:
-    parts = [part for run in runs if (part := run.covered(estimator)) is not None]
-    return float(np.mean(np.concatenate(parts))) if parts else None
+    if not isinstance(estimator, BankEstimator):
+        return None
+    found = [estimator.at(run.conditions).of_rows(run.rows) for run in runs]
+    errors = [each.value - run.truth for each, run in zip(found, runs, strict=True)]
+    return covered_share(np.concatenate(errors), np.concatenate([e.half_width for e in found]))
 
 
 def _scratch(

@@ -17,6 +17,7 @@ from estimation.estimators.network import NetworkEstimator
 from estimation.estimators.origin import Origin, data_hash
 from estimation.filters import FilterError
 from estimation.recording import Recording
+from estimation.scores import rmse
 from rig.errors import DataError, UsageError
 from rig.models.origins import file_hash
 from rig.output.provenance import Provenance
@@ -163,7 +164,7 @@ def _on_run(estimators: Iterable[Estimator], recording: Recording, target: str) 
     if not kept.any():
         return None
     truth = run[target][kept]
-    rmse, mean, covered = [], [], []
+    rmses, mean, covered = [], [], []
     for own in estimators:
         estimator, share = _allowed(own, recording), None
         if isinstance(estimator, BankEstimator):
@@ -172,14 +173,14 @@ def _on_run(estimators: Iterable[Estimator], recording: Recording, target: str) 
             share = covered_share(error, whole.half_width[kept])
         else:
             error = estimator.predict(recording)[kept] - truth
-        rmse.append(float(np.sqrt(np.mean(error**2))))
+        rmses.append(rmse(error, 0.0))
         mean.append(float(error.mean()))
         covered.append(share)
     conditions = {k: v for k, v in recording.conditions.items() if isinstance(v, float)}
     return RunErrors(
         recording.name,
         int(kept.sum()),
-        (rmse[0], rmse[1]),
+        (rmses[0], rmses[1]),
         (mean[0], mean[1]),
         (covered[0], covered[1]),
         conditions,

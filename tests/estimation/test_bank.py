@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.bank.fitting import Normal, Pool, Settings, Shape, solve
+from estimation.bank.interval import covered_share
 from estimation.bank.states import STATES, Bank
 from estimation.campaign import Campaign
 from estimation.closing import closing_samples, processed
@@ -184,7 +185,8 @@ def test_one_run_adapts_it_to_an_instrument_of_another_zero_and_spring(fitted, r
     # a run of one load does not make it surer of itself, and less so at the other loads
     assert (new.interval.beyond.values >= fitted.interval.beyond.values).all()
     assert new.interval.least >= fitted.interval.least
-    assert one.covered(new).mean() > 0.99
+    found = new.of_rows(one.rows)
+    assert covered_share(found.value - one.truth, found.half_width) > 0.99
     width = closing_error(new, other(runs[6]))[1]
     assert np.isfinite(width).mean() > 0.8
     assert np.nanmin(width) > 0
