@@ -171,9 +171,7 @@ def in_folds(runs: int, count: int, seed: int = 0) -> list[NDArray[np.int_]]:
 def with_campaign_time(recording: Recording, began_ns: int) -> Recording:
     """Return a run with the channel `campaign_time_s`, if its start is known and it has none yet.
 
-    Args:
-        recording: The run.
-        began_ns: Start of the campaign's first run, ns since the Unix epoch.
+    The campaign began at `began_ns`, ns since the Unix epoch.
     """
     if recording.started_at_ns is None or CAMPAIGN_TIME in recording:
         return recording

@@ -59,14 +59,7 @@ class UnknownUnitError(EstimationError):
 
 
 def unit_of(name: str) -> str:
-    """Return the SI unit symbol a channel name ends in.
-
-    Args:
-        name: Channel, parameter or condition name such as `motor_current_a`.
-
-    Raises:
-        UnknownUnitError: The name has no known unit suffix.
-    """
+    """Return the SI unit symbol that a name such as `motor_current_a` ends in; see `ending_of`."""
     return UNIT_BY_SUFFIX[ending_of(name)]
 
 

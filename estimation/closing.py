@@ -34,12 +34,9 @@ def is_closing(run: Recording) -> NDArray[np.bool_]:
 
 
 def closing_samples(run: Recording, keep_flagged: bool = True) -> Recording:
-    """Return the closing samples of a processed run.
+    """Return the closing samples of a run from `processed`.
 
-    Args:
-        run: A run from `processed`.
-        keep_flagged: Keep samples that carry a flag. The paper knows no flags, so its counts and
-            its errors come out only with them.
+    The paper knows no flags, so its counts and its errors come out only with flagged samples.
     """
     kept = is_closing(run)
     if not keep_flagged:

@@ -37,11 +37,7 @@ class HeldOutError:
 def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 0) -> HeldOutError:
     """Fit a model on all folds but one and score it on that one, for every fold.
 
-    Args:
-        declared: The model; values it may have are starting points only.
-        campaign: The runs.
-        folds: Number of folds.
-        seed: Seed of the folds.
+    Values that the model has are starting points only.
 
     Raises:
         CampaignError: Fewer runs than folds, or fewer than two.
@@ -70,12 +66,7 @@ def closing_score(
 ) -> Score:
     """Return the error of a recipe's estimators on closing samples, each run held out once.
 
-    Args:
-        recipe: The estimator to fit.
-        campaign: The runs.
-        folds: Number of folds.
-        seed: Seed of the folds.
-        on_fold: Called when a fold is done.
+    `on_fold` is called when a fold is done.
 
     Raises:
         CampaignError: Fewer runs than folds, or fewer than two.
@@ -103,12 +94,6 @@ def closing_pairs(
 
 def held_out_score(recipe: BankRecipe, campaign: Campaign, folds: int, seed: int) -> Score:
     """Return the error of a state estimator on runs not fitted; flagged samples are left out.
-
-    Args:
-        recipe: What is fitted.
-        campaign: The runs; excluded ones are left out.
-        folds: Number of folds, at least 2.
-        seed: Seed of the folds.
 
     Raises:
         NetworkError: No sample is a closing one.

@@ -58,9 +58,7 @@ Operator = Callable[[FloatArray], FloatArray]
 def measured_channels(names: Iterable[str], signals: Signals | None = None) -> tuple[str, ...]:
     """Return the measured channels that the named channels are computed from, sorted.
 
-    Args:
-        names: Channels, measured or derived.
-        signals: The machine's derived channels; the reference rig's when None.
+    Without signals of a machine they are the reference rig's, here and in the functions below.
     """
     needed: set[str] = set()
     known = signals or reference()
@@ -138,7 +136,7 @@ def derive(
     signals: Signals,
     tracked: Mapping[str, FloatArray] | None = None,
 ) -> dict[str, FloatArray]:
-    """Return the named channels, from filtered ones without gaps.
+    """Return the named channels, from filtered measured ones without gaps.
 
     Args:
         filtered: Measured channels.
@@ -208,16 +206,10 @@ def settled_places(
     samples: Samples = "all",
     signals: Signals | None = None,
 ) -> NDArray[np.intp]:
-    """Return the places of every n-th sample that is valid and away from the ends of its run.
+    """Return the places of every `step`-th sample that is valid and away from the ends of its run.
 
-    At the ends the filter works on a reflection of the run, and a second derivative shows it.
-
-    Args:
-        channels: Filtered channels of one whole run.
-        low_pass: The filter applied to them.
-        step: Keep every n-th sample.
-        samples: Which samples; motion is determined from the speeds among the channels.
-        signals: The machine's speeds of standstill; the reference rig's when None.
+    At the ends the filter works on a reflection of the run, and a second derivative shows it. The
+    channels are those of one whole run, filtered; motion is determined from the speeds among them.
     """
     edge = int(np.ceil(2 * low_pass.reach_s * channels.sample_rate_hz))
     inner = channels.valid.copy()
@@ -241,11 +233,7 @@ def zero_phase_channels(
 ) -> Recording:
     """Return a recording of the named channels, filtered without lag and differentiated.
 
-    Args:
-        recording: Measured channels.
-        names: Channels wanted, measured or derived; `time_s` is always there.
-        low_pass: Filter of every measured channel.
-        signals: The machine's derived channels; the reference rig's when None.
+    Channels are measured or derived; `time_s` is always there.
 
     Raises:
         MissingChannelError: A measured channel is not in the recording.

@@ -18,24 +18,12 @@ class OutputError(EstimationError):
 
 
 def write_text_atomic(path: Path, text: str) -> None:
-    """Write a text file under a temporary name in the target's folder and rename it.
-
-    Args:
-        path: Target; its folder is made when it is missing.
-        text: Content, written as UTF-8.
-
-    Raises:
-        OutputError: The folder cannot be made or written, or a file of another kind is there.
-    """
+    """Write a text file as UTF-8, see `write_bytes_atomic`."""
     write_bytes_atomic(path, text.encode("utf-8"))
 
 
 def write_bytes_atomic(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name in the target's folder and rename it.
-
-    Args:
-        path: Target; its folder is made when it is missing.
-        content: All of it.
+    """Write a file under a temporary name in the target's folder, which is made, and rename it.
 
     Raises:
         OutputError: The folder cannot be made or written, or a file of another kind is there.
@@ -60,9 +48,8 @@ def write_bytes_atomic(path: Path, content: bytes) -> None:
 def check_output(path: Path | None, kind: str) -> None:
     """Refuse an output that could not be written, before the work whose result it is to hold.
 
-    Args:
-        path: Target; None if nothing is to be written. Its folder is made when it is missing.
-        kind: What will be written, from `estimation.file_kinds`.
+    Its folder is made; the kind is one of `estimation.file_kinds`. Nothing is checked without a
+    path.
 
     Raises:
         OutputError: The folder cannot be made or written, or a file of another kind is there.

@@ -116,11 +116,7 @@ class CausalFilter:
         self._state = None
 
     def step(self, values: FloatArray) -> FloatArray:
-        """Filter the next samples.
-
-        Args:
-            values: Shape (n, channels).
-        """
+        """Filter the next samples, shape (n, channels)."""
         if len(values) == 0:
             return np.empty_like(values)
         if self._state is None:

@@ -87,10 +87,7 @@ class Problem:
 def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list[FitRun]:
     """Read the runs and find every n-th valid sample of them that a fit counts.
 
-    Args:
-        model: The model.
-        campaign: The runs.
-        every: Keep every n-th sample; by default as many as four times the filter's cutoff needs.
+    By default n is as large as four times the filter's cutoff allows.
 
     Raises:
         FitError: No valid sample.

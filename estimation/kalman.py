@@ -49,11 +49,9 @@ class Tracker:
         return np.array([angle_rad, 0.0, 0.0])
 
     def track(self, angles_rad: ArrayLike, state: FloatArray) -> FloatArray:
-        """Take the next angles and return angle, speed and acceleration for each, shape (n, 3).
+        """Return angle, speed and acceleration for the next angles, shape (n, 3).
 
-        Args:
-            angles_rad: Shape (n,), one sample period apart, finite.
-            state: State before them; it is updated in place.
+        The angles, shape (n,), are finite and one sample period apart; `state` is updated in place.
         """
         return _track(np.asarray(angles_rad, np.float64), self.gain, self.period_s, state)
 

@@ -61,15 +61,11 @@ class CausalChannels:
         self._motion: dict[str, FloatArray] = {}  # the last angles, speeds and accelerations
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
-        """Take the next samples and return the channels for them.
+        """Take the next samples and return the channels for them, NaN where a needed value is lost.
 
-        Args:
-            time_s: Device time, shape (n,), increasing across batches.
-            measured: Measured channels in SI units, each of shape (n,); others are ignored.
-                Campaign time may be among them; else it counts from the first sample.
-
-        Returns:
-            Channel name to values, each of shape (n,); NaN where a needed value is not finite.
+        Times increase across batches. Measured channels are in SI units, others are ignored;
+        campaign time may be among them, else it counts from the first sample. All are of shape
+        (n,).
         """
         time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
         columns = [np.atleast_1d(np.asarray(measured[n], np.float64)) for n in self.measured]
@@ -149,14 +145,7 @@ def causal_channels(
     tracked: bool = False,
     signals: Signals | None = None,
 ) -> Recording:
-    """Return a recording of the named channels as they would have come live.
-
-    Args:
-        recording: Measured channels.
-        names: Channels wanted, measured or derived.
-        low_pass: Filter of every measured channel.
-        tracked: Take speeds and accelerations from a Kalman filter, see `CausalChannels`.
-        signals: The machine's derived channels; the reference rig's when None.
+    """Return a recording of the named channels as they would have come live, see `CausalChannels`.
 
     Raises:
         MissingChannelError: A measured channel is not in the recording.

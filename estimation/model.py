@@ -96,11 +96,7 @@ class Term:
         return evaluate(parameter.unit, {"target": unit_of(target), **roles})
 
     def numbers(self, parameters: Sequence[Parameter]) -> list[float]:
-        """Return the values of some of the parameters.
-
-        Raises:
-            NotFittedError: One of them has no value.
-        """
+        """Return the values of parameters; NotFittedError where one has none."""
         missing = [p.name for p in parameters if p.name not in self.values]
         if missing:
             raise NotFittedError(
@@ -228,10 +224,6 @@ class Model:
 def balance_channels(model: Model, recording: Recording) -> Recording:
     """Return the model's channels and its target, filtered alike and without lag.
 
-    Args:
-        model: The model.
-        recording: Measured channels.
-
     Raises:
         MissingChannelError: The recording lacks a channel.
         FilterError: The run cannot be filtered.
@@ -253,7 +245,7 @@ def settled(model: Model, channels: Recording, step: int = 1) -> NDArray[np.intp
 
 
 def estimate(model: Model, channels: Mapping[str, FloatArray] | Recording) -> FloatArray:
-    """Return the estimate from channels that are filtered already, shape (n,), in `model.unit`.
+    """Return the estimate from filtered channels, shape (n,), in `model.unit`.
 
     Raises:
         NotFittedError: A parameter has no value.
@@ -279,16 +271,10 @@ def counted_error(model: Model, recording: Recording) -> FloatArray:
 
 
 def predict(model: Model, recording: Recording, causal: bool = False) -> FloatArray:
-    """Estimate the target of one run.
+    """Estimate the target of one run, which need not have it: shape (n,), in `model.unit`.
 
-    Args:
-        model: A fitted model.
-        recording: Measured channels; the target itself is not needed.
-        causal: Filter as live, with its lag, so that the result is the live one to rounding; a
-            sample with a channel that is not finite then gives NaN. Else without lag.
-
-    Returns:
-        Shape (n,), in `model.unit`.
+    With `causal` the channels are filtered as live, with lag, so that the result is the live one to
+    rounding; a sample with a channel that is not finite then gives NaN.
 
     Raises:
         NotFittedError: A parameter has no value.

@@ -73,19 +73,12 @@ def reference_rig() -> list[Model]:
 
 
 def read(path: Path) -> Model:
-    """Read a model file; of several equations the first one.
-
-    Raises:
-        ModelFileError: As for `read_all`.
-    """
+    """Read a model file, of several equations the first one; see `read_all`."""
     return read_all(path)[0]
 
 
 def read_all(path: Path) -> list[Model]:
-    """Read every model of a model file.
-
-    Args:
-        path: The file, or the name of a model from `names`.
+    """Read every model of a model file, or of a name from `names`.
 
     Raises:
         NoModelError: No such file and no such name; it is a ModelFileError, too.
@@ -113,20 +106,12 @@ def read_all(path: Path) -> list[Model]:
 
 
 def parse(text: str, where: str = "model") -> Model:
-    """Read a model from TOML text; of several equations the first one.
-
-    Raises:
-        ModelFileError: As for `parse_all`.
-    """
+    """Read a model from TOML text, of several equations the first one; see `parse_all`."""
     return parse_all(text, where)[0]
 
 
 def parse_all(text: str, where: str = "model") -> list[Model]:
-    """Read every model from TOML text.
-
-    Args:
-        text: TOML.
-        where: Name of the file for messages.
+    """Read every model from TOML text; `where` names the file in messages.
 
     Raises:
         ModelFileError: The text is not TOML, or a key is unknown, missing or wrong.
@@ -187,20 +172,12 @@ def _signals(top: Table) -> Signals:
 
 
 def write(model: Model, path: Path) -> None:
-    """Write a model file; an existing one is replaced in one step.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
+    """Write a model file; an existing one is replaced in one step."""
     write_text_atomic(path, to_toml(model))
 
 
 def write_all(models: Sequence[Model], path: Path) -> None:
-    """Write one or more models to a file; an existing one is replaced in one step.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
+    """Write one or more models to a file; an existing one is replaced in one step."""
     write_text_atomic(path, to_toml(*models))
 
 

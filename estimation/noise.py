@@ -13,14 +13,9 @@ WHOLE = 0.05
 
 
 def white_noise(recording: Recording, measured: Sequence[str], signals: Signals) -> Recording:
-    """Return a recording of white noise, as wide in each channel as that channel's own.
+    """Return a recording of white noise, as wide in each measured channel as that channel's own.
 
     A sensor that is slower than the recording holds each value, and so its noise.
-
-    Args:
-        recording: One run.
-        measured: Channels of it.
-        signals: What the machine states of its sensors.
     """
     random = np.random.default_rng(0)
     made = {}
@@ -39,10 +34,6 @@ def noise_width(values: FloatArray, known: Reading) -> float:
     Unless stated: third differences hold noise and nearly no motion; a tenth of the blocks, in
     which a contact or a reversal may show, is left out. At rest counts stand still, in motion they
     are noise.
-
-    Args:
-        values: The reading, shape (n,).
-        known: What is stated of it.
     """
     if known.noise is None:
         squared = np.diff(values, 3) ** 2 / 20.0

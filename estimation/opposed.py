@@ -21,14 +21,10 @@ MOTION = ("rad", "m", "rad/s", "m/s", "rad/s^2", "m/s^2")
 
 
 def opposed(fitted: Model, campaign: Campaign) -> str:
-    """Return a sentence where a channel of an equation has the opposite sign, else nothing.
+    """Return a sentence where a channel of a fitted equation has the opposite sign, else nothing.
 
     An actuator that is mounted or counted the other way gives a motion that gains energy from
     friction. Inertia and friction then stay at zero.
-
-    Args:
-        fitted: The equation, fitted on the campaign.
-        campaign: The recordings.
     """
     evidence = fitted.evidence
     at_zero = [

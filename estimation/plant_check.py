@@ -100,12 +100,9 @@ class CheckedPlant:
 
 
 def check(plant: Plant, campaign: Campaign | None = None, file: Path | None = None) -> CheckedPlant:
-    """Check which parameters of a machine can be identified.
+    """Check which parameters of a machine can be identified, and fitted on recordings of it.
 
-    Args:
-        plant: The machine.
-        campaign: Recordings of it, or None.
-        file: Its file, for sentences that say what to change.
+    Its file is named in sentences that state what to change.
 
     Raises:
         PlantError: An equation of its owner's has an unknown effect, role or channel.

@@ -109,11 +109,7 @@ def _in_order(plant: Plant, found: list[Written]) -> list[Written]:
 
 
 def signals(plant: Plant) -> Signals:
-    """Return the machine's derived channels and its speeds of standstill.
-
-    Raises:
-        PlantError: Two equations have the same name.
-    """
+    """Return the machine's derived channels and its speeds of standstill; see `equations`."""
     bends = [c for joint in plant.transmissions if (c := bend_channel(plant, joint)) is not None]
     speeds = {
         channel

@@ -87,15 +87,7 @@ def read(path: Path) -> Plant:
 
 
 def parse(text: str, where: str = "machine") -> Plant:
-    """Read a machine from TOML text.
-
-    Args:
-        text: TOML.
-        where: Name of the file for messages.
-
-    Raises:
-        PlantFileError: As for `read`.
-    """
+    """Read a machine from TOML text; `where` names the file in messages. Errors as of `read`."""
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -158,12 +150,7 @@ def _equation(table: Table) -> Written:
 
 
 def write(plant: Plant, path: Path, more: str = "") -> None:
-    """Write a machine file; an existing one is replaced in one step.
-
-    Args:
-        plant: The machine.
-        path: The file.
-        more: TOML that follows, such as `[data]`.
+    """Write a machine file, and TOML that follows, such as `[data]`; it is replaced in one step.
 
     Raises:
         OutputError: The file cannot be written.

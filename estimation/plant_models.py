@@ -24,9 +24,6 @@ WORDS = {
 def declared(plant: Plant) -> list[Model]:
     """Return the machine's equations as models without values.
 
-    Args:
-        plant: The machine.
-
     Raises:
         PlantError: An equation of its owner's has an unknown effect, role or channel.
     """

@@ -14,13 +14,9 @@ from estimation.signals import Combination, Direction, Share
 
 
 def predicted_of(channel: str, target: str) -> str:
-    """Return the name of a prediction, of a target or a derivative of it.
+    """Return the name of a prediction, of a target or of a channel that is differentiated from it.
 
     That of `jaw_angle_rad` is `jaw_predicted_angle_rad`.
-
-    Args:
-        channel: The target, or a channel that is differentiated from it.
-        target: The target.
     """
     motion = (kind for kind in ("angle_rad", "position_m") if target.endswith(kind))
     stem = target.removesuffix(f"_{next(motion, ending_of(target))}")

@@ -34,11 +34,8 @@ def in_motion(
 ) -> NDArray[np.bool_]:
     """Return which samples of a run are away from rest, shape (n,).
 
-    Args:
-        speed: Filtered speed, shape (n,).
-        valid: Samples whose speed can be trusted, shape (n,).
-        sample_rate_hz: Rate of the samples.
-        slowest: Speed below which it is at rest, in the unit of the speed.
+    The filtered speed is to be trusted at `valid` samples; it is at rest below `slowest`, in its
+    unit.
     """
     size = np.abs(speed)
     usual = float(np.percentile(size[valid], 95)) if valid.any() else 0.0
@@ -48,12 +45,7 @@ def in_motion(
 
 
 def closing(spindle_speed: FloatArray, sample_rate_hz: float) -> NDArray[np.bool_]:
-    """Return which samples of a whole run close the jaw, away from the run's ends, shape (n,).
-
-    Args:
-        spindle_speed: Filtered speed, rad/s, shape (n,).
-        sample_rate_hz: Rate of the samples.
-    """
+    """Return which samples of a whole run close the jaw, away from the run's ends, shape (n,)."""
     trim = round(TRIM_S * sample_rate_hz)
     kept = spindle_speed >= CLOSING_RAD_S
     kept[:trim] = False

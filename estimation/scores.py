@@ -40,11 +40,7 @@ def rmse(estimate: ArrayLike, truth: ArrayLike) -> float:
 
 
 def score(estimate: ArrayLike, truth: ArrayLike) -> Score:
-    """Score an estimate against the truth.
-
-    Args:
-        estimate: Estimated values, shape (n,).
-        truth: Measured values in the same unit, shape (n,).
+    """Score an estimate, shape (n,), against the measured truth in the same unit.
 
     Raises:
         ScoreError: The shapes differ, the arrays are empty, or a value is not finite.

@@ -69,18 +69,13 @@ def descended(
     reach: Sequence[float],
     bounds: Sequence[tuple[float, float]],
 ) -> list[float]:
-    """Return the minimum near the best point of the grid.
+    """Return the minimum near the best point of the grid, within bounds.
 
     A line search over all of a parameter's range steps over a narrow valley, such as an order's, so
-    each descent moves by at most one step of the grid; it restarts from its end while that improves
-    the result, since a valley of two shapes is curved. Where the error changes by less than its
-    rounding, `scipy` ends without a direction to move in: the point is as good as any then.
-
-    Args:
-        error: To lower.
-        point: Where it begins, moved within the bounds.
-        reach: Longest step of each coordinate in one descent.
-        bounds: Lowest and highest value of each coordinate.
+    each descent moves by at most `reach`, one step of the grid; it restarts from its end while that
+    improves the result, since a valley of two shapes is curved. Where the error changes by less
+    than its rounding, `scipy` ends without a direction to move in: the point is as good as any
+    then.
     """
     point = [min(max(x, low), high) for x, (low, high) in zip(point, bounds, strict=True)]
     left = error(point)

@@ -129,11 +129,7 @@ def reference() -> Signals:
 
 
 def read_combinations(tables: Iterable[Table]) -> tuple[Combination, ...]:
-    """Read `[[derived]]` tables.
-
-    Raises:
-        EstimationError: The tables' own error: a key is unknown, missing or wrong.
-    """
+    """Read `[[derived]]` tables; what is unknown, missing or wrong is the tables' own error."""
     return tuple(_combination(table) for table in tables)
 
 

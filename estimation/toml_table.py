@@ -122,13 +122,10 @@ class Table:
         return word
 
     def made(self, kind: type[T], **known: Any) -> T:
-        """Return a dataclass whose fields are keys of this table, read as they are annotated.
+        """Return a dataclass whose fields are keys of this table, or of known values.
 
+        A field is read as it is annotated: str, bool, int, float, float | None or one of few words.
         A key of a field with a default may be left out. An unknown key is an error.
-
-        Args:
-            kind: The dataclass; its fields are str, bool, int, float, float | None or of few words.
-            known: Values of its other fields.
         """
         types = get_type_hints(kind)
         for each in fields(kind):
@@ -178,18 +175,15 @@ class Table:
 def entries(content: Mapping[str, Any], within: str = "") -> list[str]:
     """Return the lines of a table's keys, without those whose value is None.
 
-    Args:
-        content: The keys and their values.
-        within: What stands before each key, such as `channels.`.
+    `within` is what stands before each key, such as `channels.`.
     """
     return [f"{within}{key} = {value_text(v)}" for key, v in content.items() if v is not None]
 
 
 def value_text(value: Any) -> str:
-    """Return a value as TOML; a JSON string is a TOML basic string but for DEL.
+    """Return a value as TOML; TableError for a number that is not finite.
 
-    Raises:
-        TableError: A number is not finite.
+    A JSON string is a TOML basic string but for DEL.
     """
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

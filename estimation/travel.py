@@ -14,13 +14,10 @@ FOLLOWS = 0.02
 def slope(
     recordings: Sequence[Recording], x: str, y: str, besides: Sequence[str] = ()
 ) -> float | None:
-    """Return the change of one channel per change of another; None where the other never moves.
+    """Return the change of channel y per change of x; None where x never moves.
 
-    Args:
-        recordings: Runs; those without a channel are left out, and so is each run's mean.
-        x: Channel whose change is given.
-        y: Channel that changes with it.
-        besides: Other channels that it changes with, such as the torque that winds up a gearbox.
+    Runs without a channel are left out, and so is each run's mean. `besides` are other channels
+    that y changes with, such as the torque that winds up a gearbox.
     """
     products = np.zeros((2 + len(besides), 2 + len(besides)))
     for recording in recordings:
@@ -37,14 +34,10 @@ def slope(
 
 
 def off_ratio(model: Model, recordings: Sequence[Recording]) -> str:
-    """Return a sentence where an equation's deflection is none of its stated ratio, else nothing.
+    """Return a sentence where a declared equation's deflection is none of its ratio, else nothing.
 
     A deflection is the difference of two readings, one of them over a stated ratio. With another
     ratio it is mostly travel, and a cause that explains it is none of the machine's.
-
-    Args:
-        model: Declared equation.
-        recordings: Runs that may be fitted on.
     """
     combination = model.signals.combination(model.target)
     if combination is None or len(combination.shares) != 2 or combination.direction:

@@ -40,11 +40,7 @@ def _symbol(powers: Powers) -> str:
 
 
 def evaluate(expression: str, symbols: Mapping[str, str]) -> str:
-    """Return the unit symbol of an expression such as `target / speed`.
-
-    Args:
-        expression: Names joined by `*` and `/`, read from left to right, or `1`.
-        symbols: Unit symbol of each name.
+    """Return the unit symbol of an expression such as `target / speed`: names, `*`, `/` and `1`.
 
     Raises:
         UnitError: The expression uses a name without a unit, or a symbol cannot be read.

@@ -64,11 +64,9 @@ class ResidualWatch:
     """Evaluates runs in sequence and reports when a model no longer fits."""
 
     def __init__(self, model: Model, least_spread: float = LEAST_SPREAD) -> None:
-        """Start before the first run.
+        """Start before the first run of a fitted model.
 
-        Args:
-            model: A fitted model.
-            least_spread: Least spread of the log error; more for pieces of runs than for runs.
+        The least spread of the log error is more for pieces of runs than for runs.
         """
         self.model = model
         self._least_spread = least_spread

@@ -12,16 +12,10 @@ LEAST_SHARE = 1e-12
 def solve_within(
     normal: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """Return the x within bounds that has the least squared error.
+    """Return the x, shape (n,), between `low` and `high` that has the least squared error.
 
-    Args:
-        normal: Products of the columns with one another, shape (n, n).
-        right: Products of the columns with the target, shape (n,).
-        low: Lower bounds, shape (n,).
-        high: Upper bounds, above the lower ones, shape (n,).
-
-    Returns:
-        Shape (n,). Where bounds are active the others are optimal conditional on them.
+    `normal`, shape (n, n), holds the products of the columns with one another, `right` those with
+    the target. Where bounds are active the others are optimal conditional on them.
     """
     scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
     scaled, aim = normal / np.outer(scale, scale), right / scale

@@ -81,14 +81,10 @@ def declared_arm(models: Sequence[Model], recordings: Sequence[Recording]) -> Ar
 
 
 def equations(arm: Arm, names: Sequence[JointNames]) -> ArmBalances:
-    """Return the torque equations of an arm's joints.
+    """Return the torque equations of an arm's joints; others, such as a gripper's, may follow them.
 
     Of a hydraulic arm the first bodies are those of the actuated joints: their frictions belong to
     the joints, those of the loops' bodies are shared.
-
-    Args:
-        arm: The arm.
-        names: Channels of a recording's joints; others, such as a gripper's, may follow.
     """
     base, joints = base_of(arm), names[: len(arm.joints)]
     frictions = tuple(f"{kind}{joint.number}" for kind in FRICTION for joint in joints)

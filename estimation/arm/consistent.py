@@ -46,11 +46,8 @@ def consistent_fit(
 ) -> Consistent:
     """Fit an arm's parameters by weighted least squares over those that a real arm can have.
 
-    Args:
-        arm: The arm.
-        base_columns: Columns of its base parameters, shape (n, joints, base).
-        torque: Shape (n, joints).
-        weights: Weight of each joint, shape (joints,).
+    The columns of its base parameters are of shape (n, joints, base), torque and weights of (n,
+    joints) and (joints,).
 
     Raises:
         MissingExtraError: Clarabel is not installed.

@@ -15,10 +15,8 @@ from estimation.recording import FloatArray
 def slip(position: FloatArray, threshold: float) -> FloatArray:
     """Return the deflection of elastic-slip elements, relative to that at which they slip.
 
-    Args:
-        position: Shape (n, drives); the elements start relaxed, so what they give is history-free
-            only after each has slipped once.
-        threshold: Stretch at which they slip, in the unit of position.
+    Positions are of shape (n, drives), the threshold is in their unit. The elements start relaxed,
+    so what they give is history-free only after each has slipped once.
     """
     return np.asarray(_stretch(np.ascontiguousarray(position), threshold) / threshold)
 
@@ -36,23 +34,16 @@ def _stretch(position, threshold):  # type: ignore[no-untyped-def]
 def creep(velocity: FloatArray, time_constant_s: float, period_s: float) -> FloatArray:
     """Return the velocity of a damper in series with a spring (a Maxwell element), 0 at the start.
 
-    Args:
-        velocity: Shape (n, ...).
-        time_constant_s: Damping over stiffness, s.
-        period_s: Sample period, s.
+    Its time constant is damping over stiffness; the velocity is of shape (n, ...).
     """
     kept = np.exp(-period_s / time_constant_s)
     return signal.lfilter([1 - kept], [1, -kept], velocity, axis=0)
 
 
 def hats(position: FloatArray, lower: float, upper: float, count: int) -> FloatArray:
-    """Return a piecewise linear function's columns, shape (n, count); the ends go on flat.
+    """Return a piecewise linear function's columns at positions (n,), shape (n, count).
 
-    Args:
-        position: Shape (n,).
-        lower: Position of the first knot.
-        upper: Position of the last knot.
-        count: Number of knots, evenly spaced.
+    Its knots are evenly spaced from `lower` to `upper`; the ends go on flat.
     """
     knots = np.linspace(lower, upper, count)
     inside = np.clip(position, lower, upper)[:, None]

@@ -107,10 +107,8 @@ def reached(arm: Arm, excitation: Excitation) -> float:
 def fitted(arm: Arm, raw: FloatArray) -> Excitation:
     """Scale numbers without limits into an excitation within the arm's limits.
 
-    Args:
-        arm: The arm.
-        raw: Shape (joints x (2 harmonics + 1),): sines, cosines, and how the range is shared
-            between middle and swing.
+    They are sines, cosines, and how the range is shared between middle and swing: shape (joints x
+    (2 harmonics + 1),).
     """
     joints = len(arm.joints)
     table = raw.reshape(2 * HARMONICS + 1, joints)
@@ -153,12 +151,9 @@ def start(arm: Arm, seed: int) -> FloatArray:
 
 
 def by_active_set(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
-    """Improve an excitation under limits at sampled instants.
+    """Improve an excitation within the limits, which hold at sampled instants.
 
-    Args:
-        arm: The arm.
-        first: The start, within the limits.
-        evaluations: Condition numbers it may take, gradients by differences included.
+    `evaluations` is how many condition numbers it may take, gradients by differences included.
     """
     middle, limits = _limits(arm)
     time = np.arange(SAMPLED) / (SAMPLED * FUNDAMENTAL_HZ)
@@ -194,12 +189,9 @@ def by_active_set(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
 
 
 def improved(arm: Arm, first: Excitation, evaluations: int) -> Excitation:
-    """Improve an excitation within limits at every instant.
+    """Improve an excitation, within the limits or not, to one within them at every instant.
 
-    Args:
-        arm: The arm.
-        first: The start, within the limits or not.
-        evaluations: Condition numbers it may take, gradients by differences included.
+    `evaluations` are those of `by_active_set`.
     """
     raw = numbers_of(arm, first)
     lowest, best = np.inf, raw

@@ -38,15 +38,10 @@ class Fit:
 def smoothed(
     columns: FloatArray, sample_rate_hz: float, low_pass: LowPass = LOW_PASS
 ) -> FloatArray:
-    """Filter the columns of a regressor as the torque is filtered.
+    """Filter the columns of a regressor, shape (n, joints, parameters), as the torque is filtered.
 
     A filter does not commute with friction's sign: columns made from barely filtered motion and
     then filtered belong to the filtered torque, columns made from filtered motion do not.
-
-    Args:
-        columns: Shape (n, joints, parameters).
-        sample_rate_hz: Sample rate, Hz.
-        low_pass: Filter, run forwards and backwards.
     """
     flat = zero_phase(columns.reshape(len(columns), -1), sample_rate_hz, low_pass)
     return flat.reshape(columns.shape)
@@ -55,8 +50,7 @@ def smoothed(
 def thesis_weights(torque: FloatArray) -> FloatArray:
     """Return the thesis' weight of each joint, equation 2.11: one over its largest torque.
 
-    Args:
-        torque: Shape (n, joints).
+    The torque is of shape (n, joints).
     """
     return np.asarray(1 / np.abs(torque).max(axis=0))
 
@@ -113,14 +107,10 @@ def damped_around(
 ) -> FloatArray:
     """Return parameters by damped least squares around a first guess (del Sol et al. 2014).
 
-    theta = theta_0 + (A^T A + lambda^2 I)^-1 A^T (tau - A theta_0). The paper's equation 17 omits
-    the first theta_0, without which a perfect guess would give zero.
-
-    Args:
-        columns: A, shape (n, joints, parameters).
-        torque: tau, shape (n, joints).
-        prior: theta_0, shape (parameters,).
-        damping: lambda, in the unit of the columns; positive.
+    theta = theta_0 + (A^T A + lambda^2 I)^-1 A^T (tau - A theta_0), with columns A, (n, joints,
+    parameters), torque tau, (n, joints), prior theta_0 and damping lambda, in the unit of the
+    columns. The paper's equation 17 omits the first theta_0, without which a perfect guess would
+    give zero.
 
     Raises:
         ArmError: The damping is not positive.
@@ -136,9 +126,7 @@ def damped_around(
 def nrmsd_percent(estimate: FloatArray, torque: FloatArray) -> FloatArray:
     """Return the error of each joint, equation 3.2 of the thesis: RMS over the torque's range, %.
 
-    Args:
-        estimate: Shape (n, joints).
-        torque: Shape (n, joints).
+    Estimate and torque are of shape (n, joints).
 
     Raises:
         ArmError: A joint's torque does not change.

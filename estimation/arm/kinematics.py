@@ -18,15 +18,7 @@ class ArmError(EstimationError):
 
 
 def optional(module: str, need: str) -> Any:
-    """Return a module of the extra `arm`, imported when first needed.
-
-    Args:
-        module: Its name.
-        need: What needs it, in words.
-
-    Raises:
-        MissingExtraError: It is not installed.
-    """
+    """Return a module of the extra `arm`, for a need in words; MissingExtraError without it."""
     try:
         return import_module(module)
     except ImportError as error:
@@ -64,17 +56,9 @@ def _placement(pin: Any, row: DhRow) -> Any:
 
 
 def tip_pose(arm: Arm, position: FloatArray) -> FloatArray:
-    """Return where the tip is, in the base frame.
+    """Return where the tip is in the base frame, a homogeneous transform, shape (4, 4), m.
 
-    Args:
-        arm: The arm.
-        position: Joint positions, shape (joints,), rad or m.
-
-    Returns:
-        Homogeneous transform, shape (4, 4), m.
-
-    Raises:
-        ArmError: The number of positions is not the arm's.
+    The joints' positions, shape (joints,), are in rad or m; see `check_positions`.
     """
     q = np.asarray(position, dtype=np.float64)
     check_positions(arm, q[None])

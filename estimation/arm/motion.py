@@ -124,15 +124,10 @@ def joint_channels(recording: Recording) -> tuple[FloatArray, FloatArray, FloatA
 
 
 def motion_of(position: FloatArray, period_s: float, low_pass: LowPass = LOW_PASS) -> Motion:
-    """Filter positions and differentiate them twice.
+    """Filter positions, shape (n, joints), forwards and backwards and differentiate them twice.
 
     Velocity comes from the positions, not from a velocity channel, so that position, velocity and
     acceleration are of one motion.
-
-    Args:
-        position: Measured joint positions, shape (n, joints).
-        period_s: Sample period, s.
-        low_pass: Filter, run forwards and backwards.
     """
     smooth = zero_phase(position, 1 / period_s, low_pass)
     velocity = np.gradient(smooth, period_s, axis=0)
@@ -140,16 +135,11 @@ def motion_of(position: FloatArray, period_s: float, low_pass: LowPass = LOW_PAS
 
 
 def periodic_motion(position: FloatArray, period_s: float, highest_hz: float) -> Motion:
-    """Return a whole number of periods, differentiated in the frequency domain.
+    """Return a whole number of periods, differentiated in the frequency domain, up to a frequency.
 
-    As E. del Sol et al. 2014 do it: bin k of a transform over P samples is multiplied by
-    j 2 pi k f_s / P, k counting negative frequencies in the upper half. The paper's printed factor
-    lacks the imaginary unit.
-
-    Args:
-        position: Shape (n, joints): whole periods, the last sample one before the first again.
-        period_s: Sample period, s.
-        highest_hz: Frequencies above it are left out, on all three alike, Hz.
+    As E. del Sol et al. 2014 do it: bin k of a transform over P samples is multiplied by j 2 pi k
+    f_s / P, k counting negative frequencies in the upper half. The paper's printed factor lacks the
+    imaginary unit. The last position is one sample before the first again.
 
     Raises:
         ArmError: Too few samples, or the frequency is not within half the sample rate.

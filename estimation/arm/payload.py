@@ -51,14 +51,10 @@ class AddedMass:
 def point_mass(arm: Arm, motion: Motion, link: int, point_m: FloatArray) -> FloatArray:
     """Return the joint torques of one kilogram at a point of a link, shape (n, joints).
 
-    Args:
-        arm: The arm.
-        motion: Its motion.
-        link: The link, from 1; all of its ten parameters must count.
-        point_m: The point in the link's frame, shape (3,), m.
+    The point is in the frame of the link, which counts from 1, m.
 
     Raises:
-        ArmError: The link's parameters do not all count.
+        ArmError: Not all of the link's parameters count.
     """
     every = names(arm)
     if f"m{link}" not in every:
@@ -78,10 +74,6 @@ def carried_torque(arm: Arm, motion: Motion) -> FloatArray:
     """Return the joint torques of what an arm carries, shape (n, joints); zero where it is nothing.
 
     An arm identified without its payload or with another tool estimates its torque with this added.
-
-    Args:
-        arm: The arm, with `carried`.
-        motion: Its motion.
 
     Raises:
         ArmError: A mass sits on a link whose parameters do not all count.

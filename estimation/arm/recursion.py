@@ -69,13 +69,10 @@ def fill_links(
     to: NDArray[np.int64],
     table: FloatArray,
 ) -> None:
-    """Write the links' columns of a motion into a table.
+    """Write the links' columns of a motion into a table of zeros, shape (n, bodies, columns).
 
-    Args:
-        tree: The bodies.
-        motion: Positions, velocities and accelerations of the bodies' joints, (n, bodies) each.
-        to: Of each body and parameter of `LINK` the column that takes it, -1 for none.
-        table: Shape (n, bodies, columns), zero where it is written.
+    The motion is positions, velocities and accelerations of the bodies' joints, (n, bodies) each;
+    `to` is the column of each body and parameter of `LINK`, -1 for none.
     """
     q, v, a = (np.ascontiguousarray(x, dtype=np.float64) for x in motion)
     frames = tree.parents, tree.prismatic, tree.turns, tree.places

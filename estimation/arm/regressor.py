@@ -43,14 +43,9 @@ def names(arm: Arm) -> tuple[str, ...]:
 
 
 def regressor(arm: Arm, motion: Motion) -> FloatArray:
-    """Return the torque regressor of an arm along a motion.
+    """Return the torque regressor along a motion, (n, joints, columns), columns as in `names`.
 
-    Args:
-        arm: The arm.
-        motion: Its motion; joints beyond the arm's own, such as a jaw, are not looked at.
-
-    Returns:
-        Shape (n, joints, columns), columns as in `names`.
+    Joints beyond the arm's own, such as a jaw, are not looked at.
 
     Raises:
         ArmError: The motion has fewer joints than the arm, or is not finite.

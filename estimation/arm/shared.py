@@ -41,11 +41,7 @@ class SharedFit:
 
 
 def shared_fit(arm: ArmBalances, recordings: Sequence[Recording]) -> SharedFit:
-    """Fit the declared parameters to all joints of all runs together.
-
-    Args:
-        arm: The arm.
-        recordings: The training runs; others are not used.
+    """Fit the declared parameters to all joints of the training runs together.
 
     Raises:
         ArmError: They are too short.
@@ -80,13 +76,7 @@ def shared_fit(arm: ArmBalances, recordings: Sequence[Recording]) -> SharedFit:
 def laid_out(
     arm: ArmBalances, recordings: Sequence[Recording], train: Collection[str]
 ) -> list[Recording]:
-    """Return an arm's runs with the shared links' torque, fitted on training runs.
-
-    Args:
-        arm: The arm.
-        recordings: Its runs.
-        train: Names of the training runs; others are not used in the fit.
-    """
+    """Return an arm's runs with the shared links' torque, fitted on the training runs of them."""
     fitted = shared_fit(arm, [run for run in recordings if run.name in train])
     return [r.with_columns(**_added(arm, r, fitted)) for r in recordings]
 

@@ -86,12 +86,7 @@ class Normal:
 
 
 def solve(normal: Normal, blocks: Sequence[Block]) -> FloatArray:
-    """Return the parameters of some blocks, in their order.
-
-    Args:
-        normal: Of the path to fit.
-        blocks: The columns in use.
-    """
+    """Return the parameters of some blocks, in their order, that fit a path."""
     at = np.concatenate([block.at for block in blocks])
     gram, right = normal.gram[at[:, None], at], normal.right[at]
     length = _lengths(np.sqrt(np.diag(gram)), blocks)

@@ -72,13 +72,10 @@ def _jacobians(arm: Arm, position: FloatArray, frame: str) -> FloatArray:
 
 
 def by_pseudo_inverse(jacobians: FloatArray, external_torque: FloatArray) -> FloatArray:
-    """Return wrenches by the pseudo-inverse of the transposed Jacobian, equation 3.6.
+    """Return wrenches by the pseudo-inverse of the transposed Jacobian, equation 3.6, shape (n, 6).
 
-    Near a singularity the result grows without bound; see `most_likely`.
-
-    Args:
-        jacobians: Shape (n, 6, joints).
-        external_torque: Shape (n, joints).
+    Jacobians are of shape (n, 6, joints), external torques of (n, joints). Near a singularity the
+    result grows without bound; see `most_likely`.
     """
     inverse = np.linalg.pinv(jacobians.transpose(0, 2, 1))
     return np.asarray(np.einsum("nij,nj->ni", inverse, external_torque))
@@ -89,16 +86,12 @@ def most_likely(
 ) -> Wrench:
     """Return the most likely wrenches, joints weighed by their errors.
 
-    Gaussian: w = (J S^-1 J^T + P^-1)^-1 J S^-1 tau, with S the joints' variances and P that of
-    likely wrenches; the bracket's inverse is the covariance.
-
-    Args:
-        jacobians: Shape (n, 6, joints).
-        external_torque: Shape (n, joints).
-        torque_error: Standard error of each joint's torque, shape (joints,), all positive.
+    Gaussian: w = (J S^-1 J^T + P^-1)^-1 J S^-1 tau, with Jacobians J, (n, 6, joints), external
+    torques tau, (n, joints), S the joints' variances and P that of likely wrenches; the bracket's
+    inverse is the covariance.
 
     Raises:
-        ArmError: An error is not positive.
+        ArmError: A joint's standard error of torque is not positive.
     """
     if not np.all(torque_error > 0):
         raise ArmError("A joint's torque has no positive error.", f"They are {torque_error}.")
@@ -114,12 +107,9 @@ def _likely() -> FloatArray:
 
 
 def in_tip_frame(arm: Arm, wrench: FloatArray, position: FloatArray) -> FloatArray:
-    """Return spatial wrenches about the tip in the tip's frame, shape (n, 6).
+    """Return wrenches about the tip in its frame, shape (n, 6).
 
-    Args:
-        arm: The arm.
-        wrench: In the base frame about its origin, shape (n, 6).
-        position: Joint positions, shape (n, joints).
+    They are given in the base frame about its origin, at joint positions of shape (n, joints).
     """
     poses = np.array([tip_pose(arm, q) for q in position])
     force = wrench[:, :3]
@@ -141,13 +131,9 @@ class LiveWrench:
     def __init__(
         self, arm: Arm, values: FloatArray, torque_error: FloatArray, period_s: float
     ) -> None:
-        """Set up.
+        """Set up with all parameters, in the order of `estimation.arm.regressor.names`.
 
-        Args:
-            arm: The arm.
-            values: All parameters in the order of `estimation.arm.regressor.names`.
-            torque_error: Standard error of each joint's torque, shape (joints,).
-            period_s: Sample period, s.
+        The standard error of each joint's torque is of shape (joints,).
 
         Raises:
             ArmError: The number of parameters is not the arm's.
@@ -174,9 +160,7 @@ class LiveWrench:
     def step(self, position: FloatArray, torque: FloatArray) -> FloatArray | None:
         """Take one sample; return the wrench half a window ago, or None while the window fills.
 
-        Args:
-            position: Shape (joints,).
-            torque: Shape (joints,).
+        Position and torque are of shape (joints,).
 
         Raises:
             ArmError: The sample is not finite.

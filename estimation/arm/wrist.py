@@ -37,8 +37,7 @@ def candidates(arm: Arm) -> tuple[ArmEffect, ...]:
 def gripper(arm: Arm, motion: Motion) -> FloatArray:
     """Return the columns of the gripper's own offset, inertia, viscous and Coulomb friction.
 
-    Returns:
-        Shape (n, rows, 4), the last two columns being frictions; no columns without a gripper.
+    Shape (n, rows, 4), the last two columns being frictions; no columns without a gripper.
     """
     rows = row_count(arm)
     if rows == len(arm.joints):
@@ -153,15 +152,9 @@ def _of_cables(arm: Arm) -> list[ArmEffect]:
 
 
 def through_coupling(arm: Arm, motion: Motion, values: Values) -> FloatArray:
-    """Return columns of the wrist's motors, as torques on the joints they drive.
+    """Return columns of the wrist's motors, as torques on the joints they drive, gripper included.
 
-    Args:
-        arm: The arm, with a wrist.
-        motion: Its motion, gripper included.
-        values: Torque per parameter of each motor.
-
-    Returns:
-        Shape (n, rows, motors x len(values)).
+    Shape (n, rows, motors x values), of the torques per parameter of each motor.
     """
     first = arm.wrist or 0
     inverse = np.linalg.inv(np.array(arm.wrist_coupling))

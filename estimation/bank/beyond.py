@@ -42,12 +42,7 @@ LEAST_SPAN = 1e-6
 
 
 def coordinates(bank: Bank, rows: FloatArray) -> FloatArray:
-    """Return the conditions of rows of channels, shape (n, 3), or (n, 4) with a pose.
-
-    Args:
-        bank: The bank that reads the rows.
-        rows: Filtered channels, shape (n, channels).
-    """
+    """Return the conditions of rows of filtered channels, shape (n, 3), or (n, 4) with a pose."""
     speed = np.log2(np.maximum(rows[:, 2] / GEAR_RATIO, STANDING_RAD_S))
     columns = [rows[:, 0], rows[:, 1], speed]
     return np.column_stack(columns + ([rows[:, JUDGED]] if bank.pose else []))
@@ -68,11 +63,7 @@ class Beyond:
     values: FloatArray
 
     def at(self, places: FloatArray) -> FloatArray:
-        """Return the value between the nodes, shape (n,); NaN beyond them.
-
-        Args:
-            places: Conditions, shape (n, d).
-        """
+        """Return the values at conditions, (n, d), between nodes: shape (n,), NaN beyond them."""
         at = (places - self.lowest) / self.step
         at = np.where(np.isfinite(at), at, -1.0)
         found = ndimage.map_coordinates(self.values, at.T, order=1, cval=np.nan, prefilter=False)
@@ -82,9 +73,7 @@ class Beyond:
 def cut_to(table: Beyond, places: FloatArray) -> Beyond | None:
     """Return a table of the angles and poses that places have too; None where it has none of them.
 
-    Args:
-        table: The table.
-        places: Conditions, shape (n, d).
+    Places are conditions, shape (n, d).
     """
     lowest, step, nodes = table.lowest.copy(), table.step.copy(), np.array(table.values.shape)
     for axis in (axis for axis in HELD if axis < len(lowest)):
@@ -105,11 +94,9 @@ class Visits:
     """Where runs were: the scores of any of them by the others."""
 
     def __init__(self, runs: Sequence[FloatArray], like: Beyond | None = None) -> None:
-        """Count the runs at each node.
+        """Count the runs at each node, of a grid that holds them or of that of a table.
 
-        Args:
-            runs: Conditions of each run's samples, shape (n, d).
-            like: A table with the grid to use; by default one that holds the runs.
+        Each run is the conditions of its samples, shape (n, d).
         """
         if like is None:
             self.lowest, self.step, nodes = _grid(np.concatenate(runs))

@@ -26,11 +26,7 @@ def edges(
     """Return the runs at each extreme level of each condition that was varied on purpose.
 
     A condition counts if every run states a number and its levels repeat: an encoder's zero, which
-    is another number in each run, does not.
-
-    Args:
-        conditions: Conditions of each run.
-        least_left: Runs that must be left when those at a level are left out.
+    is another number in each run, does not. At least `least_left` runs are left without a level's.
     """
     found = []
     names = set.intersection(*(set(held) for held in conditions)) if conditions else set()
@@ -52,9 +48,6 @@ def only_levels(conditions: Sequence[Mapping[str, float | str]]) -> dict[str, fl
     """Return the level of each condition that all runs have alike.
 
     Nothing in such runs shows what another level changes.
-
-    Args:
-        conditions: Conditions of each run.
     """
     first = conditions[0] if conditions else {}
     stated = {name: float(v) for name, v in first.items() if not isinstance(v, str)}
@@ -70,9 +63,7 @@ def other_levels(
 ) -> dict[str, float]:
     """Return the conditions of a run that differ from the only level fitted, with the run's level.
 
-    Args:
-        only: Level of each condition, from `only_levels`.
-        conditions: Conditions of the run; one that it does not state does not differ.
+    A condition that the run does not state does not differ.
     """
     stated = {k: float(v) for k, v in conditions.items() if k in only and not isinstance(v, str)}
     return {

@@ -159,11 +159,6 @@ def solve(pool: Pool, shape: Shape, settings: Settings) -> FloatArray:
     """Return the weights, shape (p, targets); the first column of the design is the constant.
 
     A nearly constant column gets no weight.
-
-    Args:
-        pool: The runs to fit.
-        shape: Properties of the columns.
-        settings: How.
     """
     share, scale = settings.offset_share, pool.spread
     penalty = settings.ridge * pool.count * shape.stiffness
@@ -187,15 +182,10 @@ def _ridge(
 
 
 def chosen(whole: Pool, folds: Sequence[Pool], shape: Shape) -> Settings:
-    """Return the settings of the least error on runs left out of the fit in turn.
+    """Return the settings of the least error on runs of one target, left out in turn in folds.
 
     Among those that are as good as the best, it is the one that uses the runs' means least: runs
     left out at random contain little information about runs that are unlike all others.
-
-    Args:
-        whole: The runs to fit, of one target; nothing else is looked at.
-        folds: The same runs in parts.
-        shape: Properties of the columns.
     """
 
     def loss(settings: Settings) -> float:
@@ -218,14 +208,11 @@ def pull(
     stiffness: FloatArray,
     more: tuple[FloatArray, FloatArray] | None = None,
 ) -> FloatArray:
-    """Return weights that fit the runs and stay near the prior, shape (p,).
+    """Return weights that fit runs of one target and stay near the prior, shape (p,).
 
-    Args:
-        runs: The runs to fit, of one target.
-        prior: Weights to stay near, shape (p,).
-        scale: Spread of each column where the prior was found, shape (p,).
-        stiffness: Penalty on a weight's change in units of `scale`, a sample, shape (p,).
-        more: Normal equations that also count, a sample: of shape (p, p) and (p,).
+    `scale` is the spread of each column where the prior was found, `stiffness` the penalty on a
+    weight's change in units of it, a sample. `more` are normal equations, (p, p) and (p,), that
+    also count, a sample.
     """
     gram = np.sum([run.gram for run in runs], axis=0)
     cross = np.sum([run.cross for run in runs], axis=0)[:, 0]

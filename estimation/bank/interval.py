@@ -63,9 +63,7 @@ class Interval:
     def half_width(self, design: FloatArray, places: FloatArray) -> FloatArray:
         """Return half the interval's width for each row of a design, shape (n,); NaN if unknown.
 
-        Args:
-            design: The bank's products, shape (n, size).
-            places: Conditions of the rows, from `estimation.bank.beyond.coordinates`.
+        Its places are their conditions, from `estimation.bank.beyond.coordinates`.
         """
         return np.asarray(np.sqrt(self.usual(design) ** 2 + self.beyond.at(places)))
 
@@ -105,11 +103,8 @@ def calibrate(
 ) -> Interval:
     """Return the interval of the errors on left-out runs, with nothing added anywhere.
 
-    Args:
-        bank: The bank of the designs.
-        designs: Design of each run, shape (n, size).
-        residuals: Error of each run by weights that it was not fitted with, shape (n,).
-        grid: A table whose nodes are those of the conditions.
+    Each run has a design of the bank, shape (n, size), and residuals by weights that it was not
+    fitted with, shape (n,). The nodes of the grid are those of the conditions.
     """
     columns = np.array([bank.products.index(p) for p in SHAPE if p in bank.products])
     sizes = [np.abs(residual) for residual in residuals]
@@ -125,12 +120,9 @@ def calibrate(
 
 
 def with_scores(interval: Interval, scores: FloatArray, doubt: float = 1.0) -> Interval:
-    """Return an interval whose squared half width also grows by a score of each node.
+    """Return an interval whose squared half width also grows by a score of each node of its grid.
 
-    Args:
-        interval: The interval before, with its price and usual score.
-        scores: The scores, on the interval's grid.
-        doubt: Factor on the price.
+    `doubt` is a factor on its price.
     """
     added = doubt * interval.price * np.maximum(scores - interval.usual_score, 0.0)
     beyond = replace(interval.beyond, values=interval.beyond.values + added)

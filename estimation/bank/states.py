@@ -228,12 +228,8 @@ class Bank:
 def held_within(bank: Bank, rows: FloatArray, ranges: FloatArray) -> FloatArray:
     """Return rows with the angle, and the pose, moved to the nearest ones fitted, (n, channels).
 
-    A polynomial of the angle carried beyond them grows to many times the largest torque.
-
-    Args:
-        bank: The bank that reads the rows.
-        rows: Filtered channels, shape (n, channels).
-        ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
+    A polynomial of the angle carried beyond them grows to many times the largest torque. `ranges`
+    are the lowest and highest value of each judged channel fitted on, shape (2, judged).
     """
     held = rows.copy()
     for channel in (0, *range(JUDGED, bank.judged)):

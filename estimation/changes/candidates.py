@@ -38,9 +38,7 @@ class Changed(Moved):
 def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
     """Yield everything that may have changed, each acting in the runs of one campaign.
 
-    Args:
-        layout: The runs of both campaigns.
-        is_b: Whether each is of the second campaign.
+    The layout has the runs of both; `is_b` states of each whether it is of the second one.
     """
     places = places_of(layout)
     later, earlier = (tuple(b is side for b in is_b) for side in (True, False))

@@ -169,9 +169,7 @@ def _folds_of_one_campaign(layout: Layout, is_b: Sequence[bool]) -> list[list[li
 def _in_one_alone(plain: Joint, reach: float = 7.0) -> Rank:
     """Return the ranking of changes that the campaigns do not share, next to others found.
 
-    Args:
-        plain: The regression without changes.
-        reach: Log odds below the best change from which another one is not tried.
+    Another change is not tried from log odds of `reach` below the best one.
     """
 
     def ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:

@@ -45,14 +45,10 @@ def stated(
     causes: Sequence[Scored],
     random: np.random.Generator,
 ) -> Change:
-    """Return a change as it is reported, next to all others.
+    """Return a change as it is reported, next to all others that were found.
 
-    Args:
-        one: The change.
-        probability: Name to probability of what competes in its place, the likeliest first.
-        joint: The regression without changes.
-        causes: All changes that were found.
-        random: Draws the runs of its interval.
+    `probability` is that of each name that competes in its place, the likeliest first; `joint` is
+    the regression without changes. The runs of its interval are random.
     """
     source, acts = _source(one), one.candidate.acts
     assert acts is not None  # noqa: S101 - every candidate acts in the runs of one campaign
@@ -90,13 +86,9 @@ def stated(
 
 
 def _before(source: Source, joint: Joint, base: FloatArray, shared: float) -> float | None:
-    """Return a moved parameter in the first campaign; None of an effect.
+    """Return a moved parameter in the first campaign, from all of them; None of an effect.
 
-    Args:
-        source: The change.
-        joint: The regression with it.
-        base: All parameters.
-        shared: What an offset of all runs has of one of some, which are laid out apart.
+    `shared` is what an offset of all runs has of one of some, which are laid out apart.
     """
     if not isinstance(source, Changed):
         return None

@@ -106,13 +106,9 @@ def evidence(estimator: Adaptable, recording: Recording) -> Evidence | None:
 
 
 def adapted(source: Adaptable, runs: Sequence[Evidence]) -> Adaptable:
-    """Return the source's estimator adapted to the runs of another instrument.
+    """Return the source's estimator adapted to some runs of another instrument.
 
     Its interval is the source's, wider away from the conditions of the runs; a network has none.
-
-    Args:
-        source: Fitted on another instrument.
-        runs: Runs of the new one.
 
     Raises:
         NetworkError: The campaign is empty.
@@ -239,14 +235,10 @@ def _interval(
 
 
 def spread_out(runs: Sequence[RunEvidence], count: int) -> list[int]:
-    """Return the runs to adapt with: those that are closest to all the others.
+    """Return which runs to adapt with, at most `count`: those that are closest to all the others.
 
     One after another, the run is taken after which the mean score of all runs by those taken is
     least. Only the conditions of the samples are used, not the target.
-
-    Args:
-        runs: Runs of the new instrument to choose from.
-        count: How many, at most all.
     """
     visits = Visits([run.places for run in runs])
     taken: list[int] = []

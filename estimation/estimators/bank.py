@@ -95,13 +95,7 @@ class BankEstimator:
             object.__setattr__(self, name, values)
 
     def predict(self, recording: Recording, causal: bool = False) -> FloatArray:
-        """Return the estimate for each sample, shape (n,).
-
-        Raises:
-            InstrumentError: The recording is of another instrument.
-            MissingChannelError: The recording lacks a channel.
-            FilterError: The run cannot be filtered.
-        """
+        """Return the value of `estimate` for each sample, shape (n,)."""
         return self.estimate(recording, causal).value
 
     def estimate(self, recording: Recording, causal: bool = False) -> Estimates:
@@ -109,6 +103,8 @@ class BankEstimator:
 
         Raises:
             InstrumentError: The recording is of another instrument.
+            MissingChannelError: The recording lacks a channel.
+            FilterError: The run cannot be filtered.
         """
         require_own(self.instrument, recording)
         names = self.bank.channels
@@ -134,11 +130,7 @@ class BankEstimator:
         return Estimates(design @ self.weights, width, np.asarray(inside))
 
     def at(self, conditions: Mapping[str, float | str]) -> "BankEstimator":
-        """Return the estimator for a run: without an interval if it was fitted at one other level.
-
-        Args:
-            conditions: Conditions of the run.
-        """
+        """Return the estimator for a run; one fitted at another single level has no interval."""
         return replace(self, interval=None) if other_levels(self.only, conditions) else self
 
     def for_any_instrument(self) -> "BankEstimator":
@@ -232,10 +224,7 @@ def rows_of(channels: Mapping[str, FloatArray] | Recording, bank: Bank) -> Float
 def fit_runs(runs: Sequence[RunEvidence], bank: Bank, target: str) -> BankEstimator:
     """Fit weights and, from runs left out in turn, how they are found and the interval.
 
-    Args:
-        runs: The runs.
-        bank: The bank they were reduced with.
-        target: Channel that is estimated.
+    The runs were reduced with the bank; the target is the channel that is estimated.
 
     Raises:
         NetworkError: The campaign is empty.

@@ -37,12 +37,9 @@ Exported = BankEstimator | NetworkEstimator | ModelEstimator
 
 
 def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
-    """Return the header's text.
+    """Return the text of a header whose step is called at a sample rate.
 
-    Args:
-        estimator: What is written.
-        name: Prefix of everything in the header; a C identifier.
-        sample_rate_hz: Rate at which the step is called.
+    Everything in it begins with `name`, a C identifier.
 
     Raises:
         ExportError: The name is not a C identifier, or a channel cannot be computed in C.

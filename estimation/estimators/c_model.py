@@ -64,11 +64,9 @@ def text_of(value: Any) -> str:
 
 
 def model_text(model: Model, place: Callable[[str], int]) -> str:
-    """Return the C function that estimates a model's target from a row of channels.
+    """Return the C function that estimates a fitted model's target from a row of channels.
 
-    Args:
-        model: A fitted model.
-        place: Channel to its place in the row.
+    `place` returns a channel's place in the row.
 
     Raises:
         NotInCError: An effect has memory, or uses a function that is not written as C.

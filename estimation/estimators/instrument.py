@@ -21,11 +21,7 @@ def is_own(instrument: str, recording: Recording) -> bool:
 
 
 def require_own(instrument: str, recording: Recording) -> None:
-    """Refuse a recording of another instrument; an instrument that is not known is not refused.
-
-    Args:
-        instrument: The instrument of the fit; empty where it does not matter.
-        recording: The recording to be estimated.
+    """Refuse a recording of another instrument than that of the fit, as far as both are known.
 
     Raises:
         InstrumentError: The recording is of another instrument.

@@ -22,13 +22,9 @@ LEAST_SCORE = 0.02
 def interval_of(
     runs: Sequence[RunEvidence], whole: Pool, bank: Bank, settings: Settings
 ) -> Interval:
-    """Return the interval of a fit.
+    """Return the interval of a fit of at least `INNER_FOLDS` runs, reduced with the bank.
 
-    Args:
-        runs: The runs fitted, at least `INNER_FOLDS`.
-        whole: Their sums.
-        bank: The bank they were reduced with.
-        settings: How the weights are found.
+    `whole` are their sums, the settings how the weights are found.
     """
 
     def errors(left_out: NDArray[np.int_]) -> list[FloatArray]:

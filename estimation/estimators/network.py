@@ -163,9 +163,7 @@ class NetworkRecipe:
     ) -> NetworkEstimator:
         """Train on the residual of another estimate of the target.
 
-        Args:
-            campaign: The runs.
-            known: Returns the other estimate for each sample of a recording, shape (n,).
+        `known` returns the other estimate for each sample of a recording, shape (n,).
         """
         rows, rest = [], []
         instruments = set()

@@ -43,11 +43,8 @@ class RunEvidence:
     ) -> "list[RunEvidence]":
         """Return the evidence for each target; they share what is made of the rows.
 
-        Args:
-            bank: The states and products.
-            rows: Filtered channels of the samples to fit, shape (n, channels).
-            truths: The targets, shape (n, targets).
-            conditions: Conditions of the run, if it states any.
+        Rows are filtered channels of the samples to fit, shape (n, channels); the targets are
+        `truths`, shape (n, targets).
         """
         design = bank.design(rows)
         judged = rows[:, : bank.judged]
@@ -72,13 +69,10 @@ def ranges_of(ranges: Sequence[FloatArray]) -> FloatArray:
 def within_ranges(
     bank: Bank, design: FloatArray, rows: FloatArray, ranges: FloatArray
 ) -> FloatArray:
-    """Return a design as at the nearest angle and pose fitted, shape (n, size).
+    """Return a design, shape (n, size), as at the nearest angle and pose fitted.
 
-    Args:
-        bank: The states and products.
-        design: Its products of the rows, shape (n, size).
-        rows: Filtered channels, shape (n, channels).
-        ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
+    It is made of rows of filtered channels, (n, channels); `ranges` are the lowest and highest
+    value of each judged channel fitted on, shape (2, judged).
     """
     held = held_within(bank, rows, ranges)
     moved = np.flatnonzero((held != rows).any(axis=1) & np.isfinite(rows).all(axis=1))

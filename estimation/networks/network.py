@@ -63,10 +63,7 @@ class Network:
     def __call__(self, rows: ArrayLike) -> FloatArray:
         """Return the outputs, shape (n, o), for inputs of shape (n, d) in their own units.
 
-        An input that is not finite gives outputs that are not.
-
-        Raises:
-            NetworkError: The rows have another number of columns.
+        An input that is not finite gives outputs that are not; errors are those of `nodes`.
         """
         nodes = self.nodes(rows)
         return from_unit(nodes @ self.output[:, :-1].T + self.output[:, -1], self.output_range)
@@ -117,11 +114,7 @@ def to_arrays(network: Network) -> dict[str, np.ndarray]:
 
 
 def from_arrays(arrays: dict[str, np.ndarray]) -> Network:
-    """Return the network of named arrays.
-
-    Raises:
-        NetworkError: An array is missing, or the shapes do not fit.
-    """
+    """Return the network of named arrays; NetworkError where one is missing or does not fit."""
     try:
         return Network(
             tuple(str(name) for name in arrays["inputs"]),
@@ -133,11 +126,7 @@ def from_arrays(arrays: dict[str, np.ndarray]) -> Network:
 
 
 def write_arrays(path: Path, schema: str, arrays: dict[str, np.ndarray]) -> None:
-    """Write named arrays and the name of their layout as NPZ.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
+    """Write named arrays and the name of their layout as NPZ."""
     content = io.BytesIO()
     np.savez(content, allow_pickle=False, schema=np.array(schema), **arrays)
     write_bytes_atomic(path, content.getvalue())
@@ -160,11 +149,7 @@ def read_arrays(path: Path, schema: str) -> dict[str, np.ndarray]:
 
 
 def schema_of(path: Path) -> str:
-    """Return the name of the layout that `write_arrays` wrote.
-
-    Raises:
-        NetworkError: The file is missing or damaged.
-    """
+    """Return the name of the layout that `write_arrays` wrote; NetworkError where it is damaged."""
     return _content(path)[1]
 
 

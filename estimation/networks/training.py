@@ -79,11 +79,7 @@ def has_torch() -> bool:
 
 
 def require_torch() -> None:
-    """Refuse to go on without torch.
-
-    Raises:
-        MissingExtraError: It is not installed.
-    """
+    """Raise MissingExtraError without torch."""
     if not has_torch():
         raise MissingExtraError(
             "Training a network needs torch, which is not installed.",
@@ -107,10 +103,8 @@ def train(
         targets: Shape (n, o).
         names: Names of the inputs and of the outputs.
         settings: How to train; `Settings()` if None.
-        validation: Further inputs and targets, which are not trained on: the weights of the step
-            with the least error on them are kept.
-        start: A network to train on, all its weights, as in transfer learning; it keeps its ranges
-            and its number of nodes.
+        validation: Further inputs and targets; the weights of the least error on them are kept.
+        start: A network to train on, as in transfer learning; it keeps its ranges and its nodes.
 
     Raises:
         MissingExtraError: torch is not installed.

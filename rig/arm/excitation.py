@@ -83,12 +83,10 @@ class ExcitationStudy:
 def run_excitation(
     starts: int, evaluations: int, on_start: Callable[[int, int], None] = lambda done, total: None
 ) -> tuple[ExcitationStudy, Excitation]:
-    """Search from several starts by both ways.
+    """Search from so many starts, of seeds from 0, by both ways.
 
-    Args:
-        starts: Number of starts; from seed 0.
-        evaluations: Condition numbers each search may take of each start.
-        on_start: Called with the number of starts done and their total.
+    Each search may take `evaluations` condition numbers of each start; `on_start` is called with
+    the number of starts done and their total.
 
     Returns:
         The comparison, and our excitation of the lowest condition number.
@@ -143,11 +141,7 @@ def _cells(found: Outcome) -> tuple[str, str, str]:
 
 
 def write_trajectory(excitation: Excitation, path: Path) -> None:
-    """Write one period of an excitation as text: time, s, and positions, rad or m, at 200 Hz.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
+    """Write one period of an excitation as text: time, s, and positions, rad or m, at 200 Hz."""
     instants = np.arange(round(RATE_HZ / FUNDAMENTAL_HZ)) / RATE_HZ
     position = excitation.motion(instants).position
     units = ["position_m" if j.kind == "prismatic" else "angle_rad" for j in PSM.joints]

@@ -188,13 +188,9 @@ class HiddenTorque:
 
 
 def draw_hidden(family: str, rng: Random, motion: Motion, rms: FloatArray) -> HiddenTorque:
-    """Draw a hidden torque.
+    """Draw a hidden torque of one of `FAMILIES` but `OWN`, laid out over the ranges of a motion.
 
-    Args:
-        family: One of `FAMILIES` but `OWN`.
-        rng: Source of the forms.
-        motion: A motion; the forms are laid out over its ranges.
-        rms: Standard deviation of each joint's torque along that motion, shape (joints,).
+    `rms` is the standard deviation of each joint's torque along that motion, shape (joints,).
     """
     drawer = IN_CATALOGUE[family][1] if family in IN_CATALOGUE else NOT_IN_CATALOGUE[family]
     joints = motion.position.shape[1]
@@ -225,14 +221,11 @@ def _relays(x: FloatArray, on: FloatArray, off: FloatArray) -> FloatArray:
 def bouc_wen(
     position: FloatArray, reach: FloatArray, sharpness: float = 1.0, loads: float = 1.0
 ) -> FloatArray:
-    """Return loops after Bouc and Wen, between -1 and 1; by default Dahl's friction.
+    """Return loops after Bouc and Wen, between -1 and 1, of positions (n, joints).
 
-    Args:
-        position: Shape (n, joints).
-        reach: Displacement of the turn, shape (joints,).
-        sharpness: Exponent.
-        loads: Share of the loop that differs by direction; with 1 the loop is Dahl's
-            ("Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976).
+    By default they are Dahl's friction ("Solid friction damping of mechanical vibrations", AIAA
+    Journal 14(12), 1976). `reach` is each joint's displacement of the turn, `sharpness` the
+    exponent, `loads` the share of the loop that differs by direction.
     """
     return np.asarray(_bouc_wen(np.ascontiguousarray(position), reach, sharpness, loads))
 

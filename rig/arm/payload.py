@@ -68,14 +68,10 @@ def find_payload(
     height_error_m: float,
     on_run: Callable[[str], None] = lambda name: None,
 ) -> Payload:
-    """Fit a model on one run and find what was added on others.
+    """Fit a model on a run without the mass and find what was added on others.
 
-    Args:
-        model: A run without the mass.
-        runs: Runs to look at.
-        height_m: Height of the mass above the remote centre, m.
-        height_error_m: Its standard error, m.
-        on_run: Called with the name of each run before its turn.
+    The mass is at a height above the remote centre, with a standard error. `on_run` is called with
+    the name of each run before its turn.
 
     Raises:
         DataError: A run is too short, lacks a joint, or is named after another mounting.

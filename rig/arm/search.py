@@ -164,12 +164,9 @@ class Prepared:
 def prepare(
     recording: Recording, tried: Sequence[ArmEffect] | None = None, damping: float = DAMPING
 ) -> Prepared:
-    """Filter one path and make its columns.
+    """Filter one path and make its columns, of all effects worth trying unless some are given.
 
-    Args:
-        recording: The path.
-        tried: Effects to make columns of; None takes all that are worth trying.
-        damping: Of its fits, as a share of a column's squared length.
+    The damping of its fits is a share of a column's squared length.
 
     Raises:
         DataError: The run is too short, or lacks a joint.
@@ -211,9 +208,7 @@ def prepare(
 def base_block(damping: float, further: Sequence[bool] = ()) -> Block:
     """Return the block of an arm's base columns, frictions bounded.
 
-    Args:
-        damping: Of its fits, as a share of a column's squared length.
-        further: Of each column behind those of the arm, whether it is a friction.
+    `further` states of each column behind those of the arm whether it is a friction.
     """
     friction = [name.startswith("F") and len(name) == 3 for name in base_of(PSM).names]
     bounded = np.array([*friction, *further])
@@ -239,12 +234,8 @@ def of_columns(
 ) -> Prepared:
     """Return a path of columns that were made elsewhere, ready to be fitted or searched.
 
-    Args:
-        name: Name of the path.
-        torque: Shape (n, rows).
-        table: The base, then every candidate, shape (n, rows, columns).
-        blocks: Which columns belong to what; the base first.
-        joints: Rows that are scored.
+    Torque is of shape (n, rows), of which the first `joints` are scored; the table, (n, rows,
+    columns), holds the base, then every candidate, as in the blocks.
     """
     none = table[:, :joints, :0]
     return Prepared(name, torque, none, none, table, blocks, 1.0)
@@ -258,11 +249,8 @@ def search(
 ) -> tuple[list[Trial], list[str]]:
     """Add effects one by one, while one helps on the path that was not fitted.
 
-    Args:
-        there: Path to fit and path to test on: what is chosen on.
-        back: The other direction: an effect that does not help there is left out.
-        tried: The candidates.
-        on_round: Called with the number of each round.
+    Effects are chosen `there`, from a path to fit to a path to test on; one that does not help in
+    the other direction is left out. `on_round` is called with the number of each round.
 
     Returns:
         What became of each candidate, kept ones first, and the names of those kept in order.
@@ -320,13 +308,7 @@ def period_of(run: Recording) -> float | None:
 
 
 def chosen_within(path: Prepared, run: Recording, tried: Sequence[ArmEffect]) -> list[str]:
-    """Return the effects that help from some stretches of a path to the others and back.
-
-    Args:
-        path: The path, prepared with these effects.
-        run: The original run.
-        tried: The candidates.
-    """
+    """Return the effects that help from some stretches of a run's path to the others and back."""
     samples = np.arange(len(path.torque))
     period = period_of(run) or len(samples)
     first = np.floor(samples / period * STRETCHES) % 2 == 0

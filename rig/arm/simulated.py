@@ -60,13 +60,9 @@ class SimulatedArm:
 
 
 def recorded(name: str, position: FloatArray, torque: FloatArray, rate_hz: float) -> Recording:
-    """Return an arm's sensor readings as a recording; six joints are the PSM's, others turn.
+    """Return an arm's positions and torques, (n, joints) each, as a recording.
 
-    Args:
-        name: Name of the run.
-        position: Shape (n, joints).
-        torque: Shape (n, joints).
-        rate_hz: Sample rate, Hz.
+    Six joints are the PSM's, others turn.
     """
     slides = position.shape[1] == len(PSM.joints)
     columns = {}
@@ -203,13 +199,9 @@ def pin(
     largest_n: tuple[float, float, float],
     torsion_n_m: float,
 ) -> FloatArray:
-    """Return spatial wrenches of touching a pin in turns, each axis with its own largest force.
+    """Return spatial wrenches of touching a pin in turns.
 
-    Args:
-        rng: Draws the forces.
-        motion: Motion of the arm.
-        largest_n: Largest force along each axis of the base, N.
-        torsion_n_m: Largest torsion about the shaft, N m.
+    They have a largest force along each axis of the base, and a largest torsion about the shaft.
     """
     waves, touching = _touching(rng, motion)
     force = waves * touching[:, None] * np.array(largest_n) / np.abs(waves).max(axis=0)

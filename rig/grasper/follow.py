@@ -41,19 +41,12 @@ def setpoints(
 ) -> Iterator[tuple[FloatArray, ...]]:
     """Yield what `rig.bench.session.Session.follow` plays, so that the grasper follows its master.
 
-    However the master is held at first, the motors start where they stand and go as far as it goes
-    from there. Each sample of the master is one setpoint: both run at 2 kHz. A master that is ahead
-    is followed where it is now, and what it did meanwhile is left out.
-
-    Args:
-        master: The master's potentiometers, started.
-        chief: What their counts mean.
-        here: Where yaw, jaw 1 and jaw 2 stand, closing positive, rad.
-        duration_s: Time to follow, s.
-        scale: Joint angle per angle of the master.
+    However the master is held at first, the motors start where they stand (`here`) and go as far as
+    it goes from there, times `scale`. Each sample of the master is one setpoint: both run at 2 kHz.
+    A master that is ahead is followed where it is now, and what it did meanwhile is left out.
 
     Yields:
-        Angles of yaw, jaw 1 and jaw 2, rad, each of shape (n,).
+        Angles of yaw, jaw 1 and jaw 2, closing positive, rad, each of shape (n,).
 
     Raises:
         GrasperError: A potentiometer is at its rail.
@@ -120,20 +113,11 @@ def follow_master(
     folder: Path,
     on_time: Callable[[float], None] = lambda time_s: None,
 ) -> tuple[list[Followed], Path]:
-    """Let the grasper follow its master for a while, into a log.
+    """Let the grasper follow its master into a log; return what its motors did, and the log.
 
-    Whatever ends it, the rig is disarmed and the log closed.
-
-    Args:
-        config: Of a grasper.
-        url: URL of the master; from the configuration if None.
-        duration_s: Duration.
-        scale: Joint angle per angle of the master.
-        folder: Folder of the logs.
-        on_time: Told how long it has followed, s.
-
-    Returns:
-        What yaw, jaw 1 and jaw 2 did, and the log.
+    Whatever ends it, the rig is disarmed and the log closed. The master's URL is that of the
+    configuration if None; `scale` is the joint angle per angle of the master. `on_time` is called
+    with the time it has followed, s.
 
     Raises:
         UsageError: The configuration is of another kind of rig, or the master's URL is missing.

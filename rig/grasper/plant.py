@@ -110,10 +110,7 @@ HIDDEN = (
 def vary(axis: AxisParameters, seed: int, spread: float) -> AxisParameters:
     """Return an axis as another grasper of the same make would have it.
 
-    Args:
-        axis: Parameters to start from.
-        seed: Seed of the draw.
-        spread: Standard deviation of each hidden parameter's logarithm.
+    `spread` is the standard deviation of each hidden parameter's logarithm.
     """
     random = np.random.default_rng(seed)
     factors = np.exp(spread * np.clip(random.standard_normal(len(HIDDEN)), -3, 3))
@@ -197,16 +194,9 @@ def _run(p: Any, variable: int, high: float, table: Any, target: Any) -> Any:
 
 
 def play_axis(axis: AxisParameters, target_rad: FloatArray, seed: int) -> dict[str, FloatArray]:
-    """Return the measurements of one axis while its motor follows the master.
+    """Return the measurements of one axis whose motor follows the master's angle at 2 kHz, (n,).
 
-    Args:
-        axis: Parameters.
-        target_rad: Master's angle at 2 kHz, shape (n,).
-        seed: Seed of the noise.
-
-    Returns:
-        `motor_current_a`, `motor_angle_rad` (of the shaft), `joint_angle_rad` and `force_n`, each
-        of shape (n,).
+    They are `motor_current_a`, `motor_angle_rad` (of the shaft), `joint_angle_rad` and `force_n`.
     """
     form = axis.form
     target = np.ascontiguousarray(target_rad, np.float64)

@@ -94,11 +94,7 @@ SETTINGS = MachineSettings(GrasperLimits, GrasperDrift, ("teensy",), GrasperSect
 
 
 def master_section(config: Config) -> MasterSection:
-    """The master a configuration describes.
-
-    Raises:
-        UsageError: The configuration is of another kind of rig.
-    """
+    """Return the master of a grasper's configuration; UsageError for another kind of rig."""
     if not isinstance(config.machine, GrasperSection):
         raise UsageError(
             f"{config.name} is not a grasper: its profile is {config.logger.profile!r}.",

@@ -153,15 +153,12 @@ class Design:
 
 
 def designs(gear_ratios: tuple[float, ...] = GEAR_RATIOS) -> list[Design]:
-    """Return all combinations of Table 1's three steps, 27 for three gear ratios.
+    """Return all combinations of Table 1's steps, 27 for three ratios of planet over sun diameter.
 
-    The paper does not define compactness. Here the smallest gear and the smallest
-    pulley have diameter 1, gears mesh, pulleys do not touch, and the area is that of the rectangle
-    around them. A sun that is not fixed needs a stage that ties it to the carrier; driving the
-    planet needs one that reaches its moving axis.
-
-    Args:
-        gear_ratios: Planet over sun diameters.
+    The paper does not define compactness. Here the smallest gear and the smallest pulley have
+    diameter 1, gears mesh, pulleys do not touch, and the area is that of the rectangle around them.
+    A sun that is not fixed needs a stage that ties it to the carrier; driving the planet needs one
+    that reaches its moving axis.
     """
     return [
         _design(Planetary(ratio, sun), drive)

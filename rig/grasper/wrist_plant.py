@@ -67,10 +67,7 @@ RUN_S = 10.0  # Length of each run
 def wrist_campaign(wrist: Wrist, seed: int = 0, runs: int = 12) -> Iterator[Recording]:
     """Yield runs in which all joints move at once and press against springs, one after the other.
 
-    Args:
-        wrist: The grasper.
-        seed: Seed of motions, springs and noise.
-        runs: Number of runs.
+    The seed is that of motions, springs and noise.
     """
     random = np.random.default_rng(seed)
     for number in range(runs):
@@ -86,14 +83,9 @@ def play_wrist(
     spring_n_m_rad: FloatArray,
     random: np.random.Generator,
 ) -> Recording:
-    """Return a run in which the joints are sent along a path.
+    """Return a run along a path of yaw, pitch and grasp, rad at 1 kHz, shape (n, 3).
 
-    Args:
-        name: Name of the run.
-        wrist: The grasper.
-        joint_rad: Yaw, pitch and grasp that are asked for at 1 kHz, shape (n, 3).
-        spring_n_m_rad: Stiffness of what each joint presses against from its zero on, shape (3,).
-        random: Source of the noise.
+    From its zero on each joint presses against a spring.
     """
     designed, built = wrist.designed, wrist.built
     sent = designed.actuator_position(joint_rad) / RATIO

@@ -78,14 +78,9 @@ def open_source(estimator: Estimator) -> Adaptable:
 
 
 def runs_by_rule(source: Adaptable, campaign: Campaign, count: int) -> list[str]:
-    """Return the names of the runs to adapt with, by their conditions alone.
+    """Return the names of `count` runs to adapt with, by their conditions alone.
 
     The rule is that of `estimation.estimators.adaptation.spread_out`; flagged runs are left out.
-
-    Args:
-        source: The estimator to be adapted.
-        campaign: Runs of the new instrument.
-        count: How many.
 
     Raises:
         UsageError: It is a network, whose runs must be named, or too few runs are there.
@@ -112,7 +107,7 @@ def run_adaptation(
     seed: int = 0,
     on_run: Callable[[str], None] = lambda run: None,
 ) -> tuple[Adaptation, Adaptable]:
-    """Adapt, and report the errors on the runs not used.
+    """Adapt the source's estimator, and report the errors on the runs not used.
 
     Args:
         source: The source's estimator.

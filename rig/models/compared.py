@@ -102,15 +102,10 @@ def compare(
     campaign: Campaign,
     on_run: Callable[[str], None] = lambda name: None,
 ) -> Comparison:
-    """Compare two estimators of one channel on the closing samples of every run.
+    """Compare two estimators of one channel on the closing samples of every run of evidence.
 
-    Both are asked whatever the instrument, since the runs state the error.
-
-    Args:
-        files: Their files.
-        estimators: What the files hold.
-        campaign: Runs with the target measured; excluded ones are left out.
-        on_run: Called with each run's name when it has been compared.
+    Both are asked whatever the instrument, since the runs state the error. `files` hold the
+    estimators; `on_run` is called with each run's name when it has been compared.
 
     Raises:
         UsageError: They estimate different channels.

@@ -20,11 +20,8 @@ def with_origin(
 ) -> Adaptable:
     """Return an estimator that carries the hashes of its data, the code and its errors.
 
-    Args:
-        estimator: A state estimator or a network.
-        campaign: The runs it was fitted on or adapted with; excluded ones are left out.
-        figures: Errors it was reported with, in SI units, by name.
-        source: File of the estimator it was adapted from, if any.
+    The campaign is that of its fit or adaptation, excluded runs left out; figures are errors in SI
+    units. `source` is the file of the estimator it was adapted from, if any.
     """
     origin = Origin(
         made_at=now_utc(),
@@ -38,9 +35,5 @@ def with_origin(
 
 
 def file_hash(path: Path) -> str:
-    """Return the hash of a file.
-
-    Raises:
-        OSError: It cannot be read.
-    """
+    """Return the hash of a file."""
     return sha256(path.read_bytes()).hexdigest()[:HASH_DIGITS]
