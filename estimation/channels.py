@@ -41,13 +41,7 @@ lack values in samples that are valid."""
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One column of a recording.
-
-    Attributes:
-        name: Column name, ends in the unit's suffix.
-        unit: SI unit symbol.
-        description: Quantity and place of the measurement.
-    """
+    """One column of a recording, with its SI unit symbol and, in words, its quantity and place."""
 
     name: str
     unit: str

@@ -92,14 +92,13 @@ class CausalChannels:
         return [part for part in parts if part.size]
 
     def _advance(self, time: FloatArray, rows: FloatArray) -> dict[str, FloatArray]:
-        last = self._last_time_s
-        first = last is None or bool(time[0] - last > self.LONGEST_GAP_S)
-        if first:
+        last_time_s, last_row, first = self._last_time_s, self._last_row, False
+        if last_time_s is None or time[0] - last_time_s > self.LONGEST_GAP_S:
             self._filter.restart()
-            self._last_time_s, self._last_row = time[0] - 1.0 / self._rate_hz, rows[0]
-        steps = np.rint(np.diff(time, prepend=self._last_time_s) * self._rate_hz)
+            last_time_s, last_row, first = time[0] - 1.0 / self._rate_hz, rows[0], True
+        steps = np.rint(np.diff(time, prepend=last_time_s) * self._rate_hz)
         ticks = np.concatenate([[0], np.cumsum(np.maximum(steps, 1))]).astype(np.int64)
-        filled = fill_gaps(ticks, np.vstack([self._last_row, rows]))[1:]
+        filled = fill_gaps(ticks, np.vstack([last_row, rows]))[1:]
         filtered = self._filter.step(filled)
         if first:
             self._history = np.repeat(filtered[:1], self._kept, axis=0)

@@ -51,7 +51,6 @@ class Term:
     """One effect in a model.
 
     Attributes:
-        effect: The effect.
         sign: Side of the equation: 1 adds to the target, -1 subtracts from it.
         channels: Role to channel name.
         values: Parameter name to estimate; what is missing is not fitted. The value of a shape

@@ -128,10 +128,7 @@ class Sensor:
 class Load:
     """A known force or torque that an axis carries, such as the weight of a pendulum.
 
-    Attributes:
-        name: Channel of it, recorded or computed when a recording is read.
-        axis: Axis that carries it.
-        description: In words.
+    Its name is that of a channel, recorded or computed when a recording is read.
     """
 
     name: str

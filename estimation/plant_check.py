@@ -28,13 +28,9 @@ ALIKE = 3.0
 
 @dataclass(frozen=True)
 class Identified:
-    """A parameter of an equation.
+    """A parameter of an equation, by its effect.
 
     Attributes:
-        effect: Id of its effect.
-        name: Its name.
-        unit: Its unit.
-        description: In words.
         value: Fitted on the recordings; None without them.
         at_bound: Whether that is the least or the largest value that makes sense.
     """
@@ -52,10 +48,8 @@ class CheckedEquation:
     """One equation of a machine.
 
     Attributes:
-        name: Its name.
         sentence: The equation in words.
         parameters: What it identifies.
-        target: Channel on its left-hand side.
         unit: Unit of the target.
         relative_error: Root mean square of what the fit does not explain over that of the target;
             None without recordings.
@@ -83,7 +77,7 @@ class CheckedPlant:
         missing: What they do not identify.
         unused: Channels that no equation reads.
         contradictions: Where the recordings contradict the file, sentences.
-        runs: Runs checked.
+        runs: Number of runs checked.
     """
 
     equations: tuple[CheckedEquation, ...]

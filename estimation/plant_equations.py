@@ -40,12 +40,7 @@ RATE = {"N m": "_rate_n_m_s"}
 
 @dataclass(frozen=True)
 class Missing:
-    """What cannot be identified, and the sensor that would change it.
-
-    Attributes:
-        what: What cannot be identified, a sentence.
-        needed: What to add, a sentence.
-    """
+    """What cannot be identified, and the sensor that would change it, a sentence each."""
 
     what: str
     needed: str
@@ -53,12 +48,9 @@ class Missing:
 
 @dataclass(frozen=True)
 class Chain:
-    """The axes that an actuator drives, one after the other.
+    """The axes that an actuator drives, one after the other, and the transmissions between them.
 
     Attributes:
-        actuator: What drives the first.
-        axes: Names of the axes.
-        joints: The transmissions between them, one fewer.
         also: Further actuators of the first axis, such as the second motor of a gantry.
     """
 

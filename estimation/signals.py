@@ -13,13 +13,7 @@ Samples = Literal["all", "motion", "closing"]
 
 @dataclass(frozen=True)
 class Share:
-    """What one channel adds to a combination: value x times / over.
-
-    Attributes:
-        channel: A measured channel.
-        times: Factor.
-        over: Divisor, such as a gear ratio.
-    """
+    """What a measured channel adds to a combination: value x times / over, such as a gear ratio."""
 
     channel: str
     times: float = 1.0
@@ -35,10 +29,7 @@ class Share:
 class Direction:
     """A constant with the sign of a speed in a combination: size x tanh(speed / width).
 
-    Attributes:
-        speed: Channel of the speed.
-        size: The constant, in the unit of the combination.
-        width: Speed over which the sign changes.
+    The speed is the name of a channel; the size is in the unit of the combination.
     """
 
     speed: str

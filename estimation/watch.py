@@ -41,7 +41,6 @@ class Sight:
     """The verdict of one run on the model.
 
     Attributes:
-        name: Name of the run.
         rmse: Its error, in the unit of the target, its mean removed where offsets are a nuisance.
         usual: The error of the model's own fit; None while it is still being learnt.
         statistic: The cumulative sum, in spreads.

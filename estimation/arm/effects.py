@@ -43,10 +43,9 @@ TRACK_DAMPING = 100.0
 
 @dataclass(frozen=True)
 class ArmEffect:
-    """One effect, as further columns of the torque regressor.
+    """One effect on a joint, as further columns of the torque regressor.
 
     Attributes:
-        name: Name, with its joint.
         what: Description in one line.
         columns: Columns along a motion, shape (n, rows, parameters).
         dissipative: Whether physics forbids negative parameters.

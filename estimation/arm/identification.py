@@ -16,12 +16,9 @@ UNTOLD = 1e-10
 
 @dataclass(frozen=True)
 class Fit:
-    """Identified parameters.
+    """Identified parameters, in the units of torque over column, and their covariance.
 
-    Attributes:
-        values: Shape (parameters,), in the units of torque over column.
-        covariance: Of the values, shape (parameters, parameters).
-        condition: Condition number of the weighted columns, each scaled to unit length.
+    The condition number is that of the weighted columns, each scaled to unit length.
     """
 
     values: FloatArray

@@ -17,12 +17,7 @@ FINE = LowPass(cutoff_hz=20.0, order=3)
 
 @dataclass(frozen=True, slots=True)
 class JointNames:
-    """The channels of one joint.
-
-    Attributes:
-        number: Its number, from 1.
-        prismatic: Whether it slides.
-    """
+    """The channels of one joint, numbered from 1."""
 
     number: int
     prismatic: bool
@@ -71,14 +66,7 @@ class JointNames:
 
 @dataclass(frozen=True)
 class Motion:
-    """Joint motion, shape (n, joints) each; rad and N m, or m and N where prismatic.
-
-    Attributes:
-        position: Positions.
-        velocity: Velocities.
-        acceleration: Accelerations.
-        period_s: Sample period, s.
-    """
+    """Joint motion, shape (n, joints) each; rad and N m, or m and N where prismatic."""
 
     position: FloatArray
     velocity: FloatArray

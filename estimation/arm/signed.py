@@ -70,9 +70,7 @@ class Products:
 class Normal:
     """Cross-products summed over the rows, each with its weight squared.
 
-    Attributes:
-        gram: Shape (columns, columns).
-        right: Shape (columns,).
+    Of shape (columns, columns) and, with the torque on the right, (columns,).
     """
 
     gram: FloatArray

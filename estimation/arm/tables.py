@@ -39,8 +39,6 @@ class Joint:
     """One joint of an arm. Limits are in rad and rad/s, or in m and m/s where prismatic.
 
     Attributes:
-        name: Name.
-        kind: How it moves.
         row: Where it sits.
         lower: Lower end of its range.
         upper: Upper end of its range.
@@ -64,7 +62,6 @@ class Body:
     """One body of an arm's spanning tree, on a joint along or about its z axis.
 
     Attributes:
-        name: Name.
         parent: Number of the parent body, from 1; 0 is the base.
         row: Position of its joint on that body.
         closure: How far its joint moves with each actuated joint: its row of G.
@@ -86,11 +83,7 @@ class Body:
 class PointMass:
     """A mass fixed to a link, in addition to the link's own parameters.
 
-    Attributes:
-        name: Name.
-        link: The link it is fixed to, from 1.
-        point_m: Where, in the link's frame, m.
-        mass_kg: How much.
+    Links are numbered from 1; the point is in the link's frame.
     """
 
     name: str
@@ -101,13 +94,7 @@ class PointMass:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A tool mounted on the last link: its tip and its masses.
-
-    Attributes:
-        name: Name.
-        tip: The fixed row from the last joint's frame to the tool's tip.
-        masses: Its masses.
-    """
+    """A tool on the last link: its masses, and the row from the last joint's frame to its tip."""
 
     name: str
     tip: DhRow

@@ -21,11 +21,7 @@ class SensorGain(Proportional):
 
 @dataclass(frozen=True)
 class Changed(Moved):
-    """A parameter that may have moved: of a declared term, or a sensor's gain.
-
-    Attributes:
-        key: What a report calls it.
-    """
+    """A parameter that may have moved, of a declared term or a sensor's gain; `key` is its name."""
 
     key: str = ""
 

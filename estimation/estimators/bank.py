@@ -19,9 +19,14 @@ from estimation.closing import is_closing, processed
 from estimation.derived import zero_phase_channels
 from estimation.estimator import Stepper
 from estimation.estimators.instrument import instrument_of, only_one, require_own
-from estimation.estimators.left_out_runs import INNER_FOLDS, interval_of
 from estimation.estimators.origin import Origin
-from estimation.estimators.run_evidence import RunEvidence, ranges_of, within_ranges
+from estimation.estimators.run_evidence import (
+    INNER_FOLDS,
+    RunEvidence,
+    interval_of,
+    ranges_of,
+    within_ranges,
+)
 from estimation.filters import PAPER, LowPass
 from estimation.live_channels import CausalChannels, causal_channels
 from estimation.networks.network import NetworkError, read_arrays, write_arrays
@@ -251,10 +256,9 @@ def fit_runs(runs: Sequence[RunEvidence], bank: Bank, target: str) -> BankEstima
 
 @dataclass(frozen=True)
 class BankRecipe:
-    """Fits a state estimator on the closing samples of a campaign.
+    """Fits a state estimator of a target on the closing samples of a campaign.
 
     Attributes:
-        target: Channel to estimate.
         bank: The states and products.
         causal: Fit on channels filtered as live, for use as live; the target has no lag anyway.
         low_pass: Filter of every channel.

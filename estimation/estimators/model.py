@@ -24,11 +24,7 @@ class Stream(Stepper):
     """
 
     def __init__(self, model: Model, sample_rate_hz: float) -> None:
-        """Start before the first sample.
-
-        Args:
-            model: A fitted model.
-            sample_rate_hz: Nominal rate of the device's clock, Hz.
+        """Start a fitted model before the first sample, at a nominal rate of the device's clock.
 
         Raises:
             NotFittedError: A parameter has no value.
@@ -44,14 +40,10 @@ class Stream(Stepper):
         self.half_width = usual_half_width(model)
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
-        """Take the next samples and return their estimates.
+        """Take the next samples and return their estimates, shape (n,), in `model.unit`.
 
-        Args:
-            time_s: Device time, shape (n,) or one number, increasing across batches.
-            measured: Measured channels in SI units, each of the same shape; others are ignored.
-
-        Returns:
-            Shape (n,), in `model.unit`; NaN where a needed channel is not finite.
+        Device times increase across batches; measured channels are in SI units, others are ignored.
+        The estimate is NaN where a needed channel is not finite.
         """
         channels = self._source.step(time_s, measured)
         if np.size(time_s):  # an empty batch changes nothing
@@ -84,11 +76,7 @@ def usual_half_width(model: Model) -> float | None:
 
 @dataclass(frozen=True)
 class ModelEstimator:
-    """A fitted model as an estimator.
-
-    Attributes:
-        model: The fitted model.
-    """
+    """A fitted model as an estimator."""
 
     model: Model
 
@@ -112,11 +100,7 @@ class ModelEstimator:
 
 @dataclass(frozen=True)
 class ModelRecipe:
-    """Fits a declared model; the paper's straight line is the shipped model `linear`.
-
-    Attributes:
-        declared: The model without values.
-    """
+    """Fits a declared model; the paper's straight line is the shipped model `linear`."""
 
     declared: Model
 

@@ -133,14 +133,9 @@ class NetworkStepper(Stepper):
 
 @dataclass(frozen=True)
 class NetworkRecipe:
-    """Trains a network on the closing samples of a campaign, as the paper does.
+    """Trains a network on every n-th closing sample of a campaign, as the paper does.
 
-    Attributes:
-        inputs: Channels, measured or derived.
-        target: Channel to estimate.
-        settings: How to train.
-        low_pass: Filter of every channel.
-        every: Train on every n-th closing sample.
+    Its inputs are channels, measured or derived; every channel has the same filter.
     """
 
     inputs: tuple[str, ...]

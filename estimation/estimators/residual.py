@@ -19,12 +19,7 @@ from estimation.recording import FloatArray, Recording
 
 @dataclass(frozen=True)
 class ResidualEstimator:
-    """The sum of a fitted model and of a network trained on its residual.
-
-    Attributes:
-        model: The fitted model.
-        rest: The network.
-    """
+    """The sum of a fitted model and of a network (`rest`) trained on its residual."""
 
     model: Model
     rest: NetworkEstimator
@@ -91,12 +86,7 @@ class ResidualStepper(Stepper):
 
 @dataclass(frozen=True)
 class ResidualRecipe:
-    """Fits a model, then a network on its residual.
-
-    Attributes:
-        model: The declared model.
-        network: The network; its target is the model's.
-    """
+    """Fits a model, then a network on its residual; the network's target is the model's."""
 
     model: ModelRecipe
     network: NetworkRecipe

@@ -53,12 +53,10 @@ class Training:
     """Result of a training.
 
     Attributes:
-        network: The trained network.
         iterations: Accepted steps.
         converged: Whether it stopped because nothing changed any more.
         reason: Why it stopped.
-        effective_parameters: gamma, the number of weights the data determines.
-        parameters: Number of weights.
+        effective_parameters: gamma, the number of weights the data determines, of all parameters.
         rmse: Error on the training rows in units of half the range of the outputs.
     """
 

@@ -44,10 +44,9 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Start:
-    """One start and what the searches made of it.
+    """One start and the results of the searches.
 
     Attributes:
-        seed: Its seed.
         condition: Condition number there.
         thesis: By the thesis' search.
         shrunk: Condition number of the thesis' result once it is scaled into the limits.
@@ -63,15 +62,7 @@ class Start:
 
 @dataclass(frozen=True)
 class ExcitationStudy:
-    """Results of the comparison.
-
-    Attributes:
-        schema: Name of this layout.
-        arm: The arm.
-        evaluations: Condition numbers each search may take of each start.
-        starts: Each start.
-        provenance: When and from what this was made.
-    """
+    """The comparison; each search may take so many evaluations of the condition of each start."""
 
     schema: str
     arm: str

@@ -37,14 +37,9 @@ LOOPS = ("hysteresis.presliding", "hysteresis.bouc_wen")
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """What a joint's hidden torque may depend on, along a motion; each of shape (n,).
+    """The variables of a joint's hidden torque along a motion; each of shape (n,).
 
-    Attributes:
-        angle: Its angle or position.
-        speed: Its velocity.
-        acceleration: Its acceleration.
-        other: Angle of the next joint.
-        time_s: Time since the start of the run.
+    `other` is the angle of the next joint.
     """
 
     angle: FloatArray

@@ -40,16 +40,9 @@ which at another speed looks like a mass: 13 g of 80 g on a simulated arm."""
 
 @dataclass(frozen=True)
 class Payload:
-    """Added masses of some runs.
+    """Added masses of some runs, by a model fitted on another one.
 
-    Attributes:
-        schema: Name of this layout.
-        model: Run that the model was fitted on.
-        height_m: Height of the mass above the remote centre, m.
-        height_error_m: Its standard error, m.
-        runs: Names of the runs.
-        masses: Estimated mass on each.
-        provenance: When and from what this was made.
+    The height is that of the mass above the remote centre, with its standard error.
     """
 
     schema: str

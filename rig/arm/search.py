@@ -75,8 +75,6 @@ class Trial:
     """One effect that the search tried.
 
     Attributes:
-        effect: Its name.
-        what: Description.
         kept_in_round: Round of the search that kept it, from 1; None if dropped.
         gain_percent: Mean relative gain over the joints, on the test path of the search: in the
             round that kept it, else in the last round.

@@ -76,12 +76,9 @@ def recorded(name: str, position: FloatArray, torque: FloatArray, rate_hz: float
 
 @dataclass(frozen=True)
 class ArmRun:
-    """The readings of the arm's own sensors in a run, and the true values.
+    """The readings of the arm's own sensors in a run, (n, joints), and the true wrench, (n, 6).
 
-    Attributes:
-        position: Measured positions, shape (n, joints).
-        torque: Measured torque, shape (n, joints).
-        wrench: True spatial wrench of the tip on its surroundings, shape (n, 6).
+    It is the spatial wrench of the tip on its surroundings.
     """
 
     position: FloatArray

@@ -93,10 +93,8 @@ _run_with_controllers, _run_with_board = _build_loops(
 class GrasperBench:
     """A grasper in virtual time: the same seed gives the same counts however the calls are cut.
 
-    Args:
-        prototype: The grasper; its yaw and its two jaws are the three axes.
-        seed: Seed of noise and of what differs from grasper to grasper.
-        spread: Standard deviation of the logarithm of each hidden parameter.
+    Its yaw and its two jaws are the three axes. `spread` is the standard deviation of the logarithm
+    of each hidden parameter, which differ from grasper to grasper.
     """
 
     def __init__(

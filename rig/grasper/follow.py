@@ -78,14 +78,9 @@ def _counts(master: Device) -> FloatArray:
 
 @dataclass(slots=True)
 class Followed:
-    """Motion of one motor.
+    """Motion of one motor: `yaw`, `jaw_1` or `jaw_2`.
 
-    Attributes:
-        axis: `yaw`, `jaw_1` or `jaw_2`.
-        lowest_rad: Least angle it was at.
-        highest_rad: Greatest.
-        largest_error_rad: Greatest size of its angle less its setpoint.
-        largest_force_n: Greatest force at its tip.
+    The errors are those of its angle to its setpoint, the force is that at its tip.
     """
 
     axis: str

@@ -217,9 +217,7 @@ def play_axis(axis: AxisParameters, target_rad: FloatArray, seed: int) -> dict[s
 class Prototype:
     """A simulated grasper: the axes whose mean current gives each degree of freedom's force.
 
-    Attributes:
-        name: Name.
-        axes: Degree of freedom to its axes: both jaws for grasp, the touching jaw for pitch.
+    They are both jaws for grasp, the touching jaw for pitch.
     """
 
     name: str

@@ -42,11 +42,7 @@ DESIGN = CablePath(0.004, 0.004, 0.005, 0.006, 0.008)
 
 @dataclass(frozen=True)
 class Wrist:
-    """A grasper as it was designed and as it was built.
-
-    Attributes:
-        pulley_ratio: d2 / d1 of the pulleys it was built with; 1 decouples it.
-    """
+    """A grasper as designed, and as built with a pulley ratio d2 / d1, of which 1 decouples it."""
 
     pulley_ratio: float = 1.0
 

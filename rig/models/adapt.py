@@ -32,10 +32,8 @@ class Adaptation:
     """Errors on the closing samples of the runs not used, in the target's SI unit.
 
     Attributes:
-        schema: Name of this layout.
         source: File of the source's estimator.
         kind: `states` or `network`.
-        target: Channel that is estimated.
         used: Runs adapted with.
         unused: Runs reported on.
         left_out: Runs with flagged closing samples or without any, not reported on.
@@ -44,7 +42,6 @@ class Adaptation:
         scratch: The same kind fitted on the target's other runs, in folds; None where not done.
         covered: Share of the samples inside the adapted estimator's interval; None without one.
         rmse_by_run: Error of the adapted estimator by run.
-        provenance: When and from what this was made.
     """
 
     schema: str

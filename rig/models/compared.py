@@ -29,12 +29,10 @@ CERTAIN = 0.05
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two estimators.
+    """One of the two estimators, by its file and the file's hash.
 
     Attributes:
-        file: Its file's name.
-        hash: Hash of the file.
-        origin: What the file states of where it comes from; None where it states nothing.
+        origin: Where it comes from, as its file states; None where it states nothing.
         seen: Runs compared on that it was fitted on, by the hash of their samples.
     """
 
@@ -49,9 +47,7 @@ class RunErrors:
     """Errors on the valid closing samples of one run, SI units, of the first and the second.
 
     Attributes:
-        run: The run.
         samples: Samples compared on.
-        rmse: Root mean square errors.
         mean: Mean errors, estimate less truth.
         covered: Share of the samples inside the interval of 95 %, of those with one; None without.
         conditions: The run's conditions that are numbers.
@@ -67,18 +63,14 @@ class RunErrors:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Result.
+    """Result for the channel that both sides estimate.
 
     Attributes:
-        schema: Name of this layout.
-        target: Channel that both estimate.
-        sides: The two estimators.
         runs: Errors by run.
         left_out: Runs without a valid closing sample.
         rmse: Root mean square errors over all samples.
         p: Chance of runs' errors at least this different if neither were better (Wilcoxon's
             signed-rank test); 1 for fewer than two runs.
-        provenance: When and from what this was made.
     """
 
     schema: str
