@@ -61,6 +61,14 @@ def compiled(estimator, run: Recording, folder) -> np.ndarray:
     return np.frombuffer(done.stdout, np.float32).reshape(-1, 3)
 
 
+def checked(model: Model, run: Recording, folder) -> np.ndarray:
+    """Return a model's estimates, which its compiled header gives as well."""
+    found, wanted = compiled(ModelEstimator(model), run, folder), predict(model, run, causal=True)
+    assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
+    np.testing.assert_allclose(found[:, 1], 2 * model.evidence.rmse_with_means, rtol=1e-6)
+    return wanted
+
+
 @pytest.fixture(scope="module")
 def bank(runs) -> BankEstimator:
     return BankRecipe(TARGET, Bank("motor_current_a"), causal=True).fit(Campaign.of(runs[1:]))
@@ -85,18 +93,12 @@ def test_a_compiled_model_of_any_machine_gives_the_same(tmp_path):
         {"speed": "carriage_velocity_m_s"},
         {p.name: Estimate(30.0) for p in effect("friction.viscous_asymmetry").amplitudes},
     )
-    model = replace(fitted, terms=(*fitted.terms, asymmetric))
-    found = compiled(ModelEstimator(model), runs[0], tmp_path)
-    wanted = predict(model, runs[0], causal=True)
-    assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
-    np.testing.assert_allclose(found[:, 1], 2 * model.evidence.rmse_with_means, rtol=1e-6)
+    checked(replace(fitted, terms=(*fitted.terms, asymmetric)), runs[0], tmp_path)
 
 
 def test_a_model_with_a_gear_is_written_with_its_ratio(runs, tmp_path):
-    model = fit(model_file.read(Path("gearbox")), Campaign.of(runs), bootstrap=0)
-    found = compiled(ModelEstimator(model), runs[0], tmp_path)
-    wanted = predict(model, runs[0], causal=True)
-    assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
+    gearbox = model_file.read(Path("gearbox"))
+    checked(fit(gearbox, Campaign.of(runs), bootstrap=0), runs[0], tmp_path)
 
 
 def test_a_friction_under_load_reads_the_targets_prediction_in_c_and_live(runs, tmp_path):
@@ -107,11 +109,8 @@ def test_a_friction_under_load_reads_the_targets_prediction_in_c_and_live(runs, 
         {"load": predicted_of(fitted.target, fitted.target)},
         {"friction": Estimate(0.2), "width": Estimate(1.0)},
     )
-    model = replace(fitted, terms=(*fitted.terms, load))
-    found = compiled(ModelEstimator(model), runs[0], tmp_path)
-    wanted = predict(model, runs[0], causal=True)
+    wanted = checked(replace(fitted, terms=(*fitted.terms, load)), runs[0], tmp_path)
     assert np.abs(wanted - predict(fitted, runs[0], causal=True)).max() > 1e-3
-    assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
 
 
 def test_an_effect_with_memory_is_refused_by_name():
@@ -142,17 +141,15 @@ def test_an_unknown_interval_and_a_pose_come_through(bank, runs, tmp_path):
 
 def test_the_compiled_network_gives_the_same(runs, tmp_path):
     draw = np.random.default_rng(1)
-    inputs = (
-        "spindle_angle_rad",
-        "motor_acceleration_rad_s2",
-        "motor_travel_rad",
-        "gearbox_differential_rad",
-    )
-    ranges = np.array([[-0.7, -2000.0, 0.0, -0.1], [0.7, 2000.0, 20.0, 0.1]])
-    network = Network(
-        inputs, (TARGET,), ranges, np.array([[0.0], [0.2]]), draw.normal(size=(8, 5)),
-        draw.normal(size=(1, 9)),
-    )  # fmt: skip
+    highest = {
+        "spindle_angle_rad": 0.7,
+        "motor_acceleration_rad_s2": 2000.0,
+        "motor_travel_rad": 20.0,
+        "gearbox_differential_rad": 0.1,
+    }
+    ranges = np.outer([-1.0, 1.0], list(highest.values()))
+    hidden, output = draw.normal(size=(8, 5)), draw.normal(size=(1, 9))
+    network = Network(tuple(highest), (TARGET,), ranges, np.array([[0.0], [0.2]]), hidden, output)
     estimator = NetworkEstimator(network)
     found = compiled(estimator, runs[0], tmp_path)
     wanted = estimator.predict(runs[0], causal=True)
@@ -163,14 +160,7 @@ def test_the_compiled_network_gives_the_same(runs, tmp_path):
 def test_what_cannot_be_written_is_refused(bank, runs):
     with pytest.raises(ExportError, match="cannot name things"):
         header(bank, "grip-torque", 1000.0)
-    odd = replace(
-        NetworkEstimator(
-            Network(
-                ("spindle_turned_s",), (TARGET,),
-                np.array([[0.0], [1.0]]), np.array([[0.0], [1.0]]),
-                np.ones((2, 2)), np.ones((1, 3)),
-            )
-        )
-    )  # fmt: skip
+    unit = np.array([[0.0], [1.0]])
+    odd = Network(("spindle_turned_s",), (TARGET,), unit, unit, np.ones((2, 2)), np.ones((1, 3)))
     with pytest.raises(ExportError, match="spindle_turned_s"):
-        header(odd, "grip", 1000.0)
+        header(NetworkEstimator(odd), "grip", 1000.0)

@@ -91,7 +91,7 @@ DECLARED = to_toml(read(Path("motor")))
         ("run_offsets = true", "run_offsets = 1", "is not bool"),
         ("order = 3", "order = true", "is not int"),
         ("cutoff_hz = 50.0", "cutoff_hz = nan", "not a finite number"),
-        ("rig.model/1", "rig.model/2", "not a model of schema"),
+        ("rig.model/1", "rig.model/2", "not a model of schema.*version of rig"),
         ("[processing]", "[processing", "is not TOML"),
         (
             'channels.speed = "motor_velocity_rad_s"',
@@ -108,12 +108,6 @@ DECLARED = to_toml(read(Path("motor")))
 def test_what_is_wrong_is_named(old, new, message):
     with pytest.raises(ModelFileError, match=message):
         parse(DECLARED.replace(old, new, 1), "mine.toml")
-
-
-def test_a_file_of_another_schema_is_refused_with_what_to_do():
-    with pytest.raises(ModelFileError, match="not a model of schema") as refused:
-        parse(DECLARED.replace("rig.model/1", "rig.model/9", 1), "mine.toml")
-    assert "version of rig" in refused.value.fix
 
 
 def test_a_missing_file_names_the_shipped_ones_and_one_without_a_model_is_refused(tmp_path):
