@@ -40,12 +40,9 @@ def test_rounding_does_not_move_it_on_a_drive_at_rest(steps, window, random):
 
 def test_closing_samples_are_fast_enough_and_away_from_the_ends():
     done = processed(run("a", 0.3, 0.1, seed=1), ["motor_current_a"])
-    kept = closing_samples(done)
-    assert kept["spindle_velocity_rad_s"].min() >= 0.25
-    assert kept.time_s.min() >= 1.0
-    assert kept.time_s.max() < 7.0
-    inner = slice(1000, -1000)
-    assert len(kept) == np.count_nonzero(done["spindle_velocity_rad_s"][inner] >= 0.25)
+    fast = done["spindle_velocity_rad_s"] >= 0.25
+    inner = (done.time_s >= 1.0) & (done.time_s < 7.0)
+    np.testing.assert_array_equal(closing_samples(done).time_s, done.time_s[fast & inner])
 
 
 def test_flagged_samples_count_unless_excluded():
@@ -70,17 +67,9 @@ def test_torque_that_friction_holds_at_rest_does_not_move_the_torque_constant():
     current_a = 0.2 + 0.1 * np.sin(2 * np.pi * 0.31 * time_s)
     friction = 0.03 * np.tanh(velocity / 0.5)
     held = np.where(np.abs(velocity) < 1e-6, 0.03 * np.sign(current_a - 0.2), friction)
-    torque = 0.9 * current_a - held
-    recording = Recording(
-        "a",
-        time_s,
-        {
-            "motor_angle_rad": motor_rad,
-            "motor_current_a": current_a,
-            "proximal_torque_n_m": torque,
-        },
-    )
-    declared = model_file.read(Path("motor"))
-    fitted = fit(declared, Campaign.of([recording]), bootstrap=0)
+    columns = {"motor_angle_rad": motor_rad, "motor_current_a": current_a}
+    columns["proximal_torque_n_m"] = 0.9 * current_a - held
+    campaign = Campaign.of([Recording("a", time_s, columns)])
+    fitted = fit(model_file.read(Path("motor")), campaign, bootstrap=0)
     gain = next(t for t in fitted.terms if t.effect.id == "motor.torque_constant").values["gain"]
     assert gain.value == pytest.approx(0.9, rel=0.03)

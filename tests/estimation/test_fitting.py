@@ -13,13 +13,13 @@ from estimation.fit_problem import FitError
 from estimation.fitting import fit
 from estimation.model import Model, NotFittedError, Term, predict
 from estimation.model_file import read
-from estimation.plant_file import parse
 from estimation.plant_models import declared
 from estimation.recording import Flag, MissingChannelError, Recording, Stretch
 from estimation.shape_search import descended
 from estimation.within_bounds import solve_within
 from tests.estimation import campaigns
 from tests.estimation.synthetic import TRUE, campaign, run
+from tests.estimation.test_plant import SLIDE
 
 
 def numbers(model: Model) -> dict[str, float]:
@@ -74,12 +74,8 @@ def test_excluded_runs_and_flagged_samples_do_not_count(motor):
 
 
 def test_collinear_columns_are_named():
-    twice = Model(
-        "twice",
-        "motor",
-        "proximal_torque_n_m",
-        (Term(effect("motor.torque_constant")), Term(effect("motor.torque_constant"))),
-    )
+    constant = Term(effect("motor.torque_constant"))
+    twice = Model("twice", "motor", "proximal_torque_n_m", (constant, constant))
     with pytest.raises(FitError, match=r"motor\.torque_constant\.gain.* cannot be identified"):
         fit(twice, campaign())
     still = run("still", 0.3, 0.1, seed=1).with_columns(motor_current_a=np.zeros(8000))
@@ -92,23 +88,16 @@ def test_a_model_reports_what_is_missing(motor):
     with pytest.raises(NotFittedError, match="declared but not fitted"):
         predict(read(Path("motor")), recording)
     with pytest.raises(MissingChannelError, match="motor_angle_rad"):
-        predict(
-            motor, type(recording)("b", recording.time_s, {"motor_current_a": recording.time_s})
-        )
+        predict(motor, replace(recording, columns={"motor_current_a": recording.time_s}))
 
 
 def test_prediction_needs_no_target_and_finds_the_torque(motor):
     recording = run("new", 0.27, 0.12, seed=99, noise_n_m=0.0, offset_n_m=0.02)
     truth = recording["proximal_torque_n_m"]
-    blind = type(recording)(
-        "blind",
-        recording.time_s,
-        {name: recording[name] for name in ("motor_current_a", "motor_angle_rad")},
-    )
-    error = predict(motor, blind) - truth
-    assert np.abs(error)[100:-100].max() < 2e-3
-    lagging = predict(motor, blind, causal=True) - truth
-    assert np.abs(lagging)[100:].max() < 2e-2
+    seen = {name: recording[name] for name in ("motor_current_a", "motor_angle_rad")}
+    blind = replace(recording, columns=seen)
+    assert np.abs(predict(motor, blind) - truth)[100:-100].max() < 2e-3
+    assert np.abs(predict(motor, blind, causal=True) - truth)[100:].max() < 2e-2
 
 
 def test_live_takes_single_samples_and_gives_nan_where_an_input_is_lost(motor):
@@ -177,12 +166,11 @@ def test_every_interval_of_a_fit_holds_its_value(recordings) -> None:
 @pytest.mark.parametrize("speed_m_s", [1e-3, 1.0])
 def test_the_change_of_sign_of_friction_is_narrow_next_to_the_speeds_of_the_axis(speed_m_s):
     time_s = np.arange(2000) / 500
-    turns = 2 * np.pi * time_s
-    position = speed_m_s * np.sin(0.7 * turns)
+    position = speed_m_s * np.sin(0.7 * 2 * np.pi * time_s)
     speed = np.gradient(position, time_s)
     force = 5 * speed / speed_m_s + np.tanh(speed / (0.02 * speed_m_s))
-    recording = Recording("x", time_s, {"stage_position_m": position, "drive_force_n": force})
-    (model,) = declared(parse(STAGE))
+    recording = Recording("x", time_s, {"carriage_position_m": position, "drive_force_n": force})
+    (model,) = declared(SLIDE)
     values = numbers(fit(model, Campaign.of([recording]), bootstrap=0))
     assert values["width"] < 0.06 * speed_m_s
 
@@ -191,26 +179,8 @@ def test_friction_has_the_form_of_its_change_of_sign_where_no_viscous_friction_i
     time_s = np.arange(4000) / 500
     position = np.cumsum(1.5 + np.sin(0.7 * 2 * np.pi * time_s)) / 500
     force = np.tanh(np.gradient(position, time_s) / 1.2)
-    recording = Recording("x", time_s, {"stage_position_m": position, "drive_force_n": force})
-    (model,) = declared(parse(STAGE))
+    recording = Recording("x", time_s, {"carriage_position_m": position, "drive_force_n": force})
+    (model,) = declared(SLIDE)
     terms = tuple(term for term in model.terms if term.effect.id != "friction.viscous")
     found = fit(replace(model, terms=terms), Campaign.of([recording]), bootstrap=0)
     assert numbers(found)["width"] == pytest.approx(1.2, rel=0.05)
-
-
-STAGE = """
-schema = "rig.machine/1"
-[machine]
-name = "stage"
-run_offsets = false
-[[axis]]
-name = "stage"
-unit = "m"
-[[actuator]]
-name = "drive_force_n"
-axis = "stage"
-[[sensor]]
-name = "stage_position_m"
-axis = "stage"
-reads = "position"
-"""

@@ -1,7 +1,5 @@
 """A drive whose sign contradicts the motion is named before its parameters are believed."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,21 +9,17 @@ from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.fitting import fit
 from estimation.opposed import opposed
-from estimation.recording import FloatArray, Recording
+from estimation.recording import Recording
 from tests.estimation.causes.synthetic import axis, turning
-
-
-def _nothing(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-    return np.zeros(len(angle))
 
 
 @pytest.fixture(scope="module")
 def sound() -> list[Recording]:
-    return turning(_nothing)
+    return turning(lambda angle, speed, acceleration: np.zeros(len(angle)))
 
 
 def _negated(runs: list[Recording], channel: str) -> list[Recording]:
-    return [replace(run, columns={**run.columns, channel: -run[channel]}) for run in runs]
+    return [run.with_columns(**{channel: -run[channel]}) for run in runs]
 
 
 def _opposed(runs: list[Recording]) -> str:

@@ -1,5 +1,6 @@
 """The residual watch on the analytic rig: quiet while the model fits, and the right run after."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from estimation.fitting import fit
 from estimation.model import Model
 from estimation.recording import Recording
 from estimation.watch import FIRST, ResidualWatch
-from tests.estimation import synthetic
+from tests.estimation.synthetic import run
 
 
 def rough(motor_rad, speed_rad_s, load_n_m):
@@ -21,15 +22,7 @@ def rough(motor_rad, speed_rad_s, load_n_m):
 
 def runs(first: int, count: int, extra=None) -> list[Recording]:
     return [
-        synthetic.run(
-            f"run {k}",
-            0.25 + 0.1 * (k % 3),
-            0.05 * (1 + k % 4),
-            seed=k,
-            seconds=4.0,
-            noise_n_m=1e-3,
-            extra=extra,
-        )
+        run(f"run {k}", 0.25 + 0.1 * (k % 3), 0.05 * (1 + k % 4), seed=k, seconds=4.0, extra=extra)
         for k in range(first, first + count)
     ]
 
@@ -48,34 +41,29 @@ def test_the_fit_estimates_the_spread_of_runs_and_the_file_keeps_it(fitted: Mode
 
 def test_runs_that_the_model_fits_raise_no_alarm(fitted: Model) -> None:
     watch = ResidualWatch(fitted)
-    sights = [watch.see(run) for run in runs(0, 24)]
+    sights = [watch.see(one) for one in runs(0, 24)]
     assert all(sight is not None and sight.fits for sight in sights)
 
 
 def test_an_effect_that_begins_is_dated_to_its_run(fitted: Model) -> None:
     watch = ResidualWatch(fitted)
-    for run in runs(0, 6):
-        assert watch.see(run).fits
-    later = [watch.see(run) for run in runs(6, 6, rough)]
+    assert all(watch.see(one).fits for one in runs(0, 6))
+    later = [watch.see(one) for one in runs(6, 6, rough)]
     assert later[-1].since in ("run 6", "run 7")
     assert later[-1].rmse > later[-1].usual
 
 
 def test_one_odd_run_is_no_change(fitted: Model) -> None:
     watch = ResidualWatch(fitted)
-    odd = synthetic.run("odd", 0.3, 0.1, seed=5, seconds=4.0, noise_n_m=50e-3)
-    for run in [*runs(0, 3), odd, *runs(3, 8)]:
-        assert watch.see(run).fits
+    odd = run("odd", 0.3, 0.1, seed=5, seconds=4.0, noise_n_m=50e-3)
+    assert all(watch.see(one).fits for one in [*runs(0, 3), odd, *runs(3, 8)])
 
 
 def test_a_model_without_evidence_learns_from_the_first_runs(fitted: Model) -> None:
-    bare = Model(
-        fitted.name, fitted.balance, fitted.target, fitted.terms, "", fitted.low_pass, True, None
-    )
-    watch = ResidualWatch(bare)
-    learning = [watch.see(run) for run in runs(0, FIRST)]
+    watch = ResidualWatch(replace(fitted, evidence=None))
+    learning = [watch.see(one) for one in runs(0, FIRST)]
     assert all(sight.usual is None for sight in learning)
-    later = [watch.see(run) for run in runs(FIRST, 6, rough)]
+    later = [watch.see(one) for one in runs(FIRST, 6, rough)]
     assert later[-1].since == f"run {FIRST}"
 
 

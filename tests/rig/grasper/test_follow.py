@@ -160,27 +160,18 @@ def test_a_silent_master_is_reported(potentiometers):
         next(setpoints(potentiometers, CHIEF, HERE, 1.0))
 
 
-def configured(**master):
-    return GRASPER_CONFIG.changed(machine={"master": master})
-
-
 def test_zero_and_turn_of_each_potentiometer_are_the_configurations():
-    chief = master_section(
-        configured(zero_counts=(2000, 2048, 2100), rad_per_count=(1e-3, -1e-3, 2e-3))
-    )
+    by_default = np.degrees(CHIEF.joint_rad([4094, 2048, 1]))
+    np.testing.assert_allclose(by_default, [149.89, 0.0, -149.96], atol=0.01)  # of 300 degrees
+    own = {"zero_counts": (2000, 2048, 2100), "rad_per_count": (1e-3, -1e-3, 2e-3)}
+    chief = master_section(GRASPER_CONFIG.changed(machine={"master": own}))
     np.testing.assert_allclose(chief.joint_rad([2100, 2148, 2000]), [0.1, -0.1, -0.2])
-
-
-def test_a_turn_of_300_degrees_is_the_default():
-    assert np.degrees(master_section(configured()).joint_rad([4094, 2048, 1])).tolist() == (
-        pytest.approx([149.89, 0.0, -149.96], abs=0.01)
-    )
 
 
 @pytest.mark.parametrize("counts", [[0, 2048, 2048], [2048, 4095, 2048], [2048, 2048, np.nan]])
 def test_a_potentiometer_at_its_rail_commands_nothing(counts):
     with pytest.raises(GrasperError, match="rail"):
-        master_section(configured()).joint_rad(counts)
+        CHIEF.joint_rad(counts)
 
 
 @pytest.mark.parametrize("turn", ["0", "nan", "1.0"])
