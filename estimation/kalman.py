@@ -29,15 +29,10 @@ UPDATES = 5000
 
 @dataclass(frozen=True, eq=False)
 class Tracker:
-    """The filter's constant gain.
-
-    Attributes:
-        period_s: Sample period.
-        gain: Correction of angle, speed and acceleration for an innovation of 1 rad, shape (3,).
-    """
+    """The filter's constant gain."""
 
     period_s: float
-    gain: FloatArray
+    gain: FloatArray  # of angle, speed and acceleration, for an innovation of 1 rad, (3,)
 
     @property
     def acceleration_lag_s(self) -> float:

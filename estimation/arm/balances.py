@@ -38,27 +38,16 @@ Columns = Callable[[Motion], FloatArray]
 
 @dataclass(frozen=True)
 class ArmBalances:
-    """The torque equations of an arm's joints.
+    """The torque equations of an arm's joints."""
 
-    Attributes:
-        name: The arm.
-        models: Declared model of each joint, without values.
-        joints: Channels of each joint.
-        columns: Motion to the columns of the declared parameters, shape (n, joints, parameters).
-        shared: Of each parameter, whether it is the links' and not a joint's own.
-        sign_width: Speed over which each joint's Coulomb friction changes sign, shape (joints,).
-        motors: Positions of a wrist's joints to those of its motors, or None; see `wrist`.
-        wrist: First joint, from 0, that motors behind a coupling drive.
-    """
-
-    name: str
-    models: tuple[Model, ...]
-    joints: tuple[JointNames, ...]
-    columns: Columns
-    shared: NDArray[np.bool_]
-    sign_width: FloatArray
-    motors: FloatArray | None = None
-    wrist: int = 0
+    name: str  # the arm
+    models: tuple[Model, ...]  # declared, of each joint, without values
+    joints: tuple[JointNames, ...]  # channels of each joint
+    columns: Columns  # of the declared parameters, shape (n, joints, parameters)
+    shared: NDArray[np.bool_]  # of each parameter, whether it is the links' and not a joint's own
+    sign_width: FloatArray  # speed over which Coulomb friction changes sign, (joints,)
+    motors: FloatArray | None = None  # positions of a wrist's joints to its motors'; see `wrist`
+    wrist: int = 0  # first joint, from 0, that motors behind a coupling drive
 
 
 def balances_of(recording: Recording) -> ArmBalances | None:

@@ -23,17 +23,11 @@ DEPENDENT = 1e-9
 
 @dataclass(frozen=True)
 class Base:
-    """A base of an arm's parameters.
+    """A base of an arm's parameters."""
 
-    Attributes:
-        columns: The regressor's columns of the base.
-        mapping: Base parameters of all parameters, shape (base, parameters).
-        names: The combinations in words, such as `ly1 + lz2`.
-    """
-
-    columns: NDArray[np.intp]
-    mapping: FloatArray
-    names: tuple[str, ...]
+    columns: NDArray[np.intp]  # the regressor's columns of the base
+    mapping: FloatArray  # base parameters of all parameters, shape (base, parameters)
+    names: tuple[str, ...]  # the combinations in words, such as `ly1 + lz2`
 
 
 @lru_cache(maxsize=8)

@@ -40,17 +40,11 @@ ACCELERATION_PER_SPEED = 4.0
 
 @dataclass(frozen=True)
 class Excitation:
-    """A periodic motion of every joint.
+    """A periodic motion of every joint."""
 
-    Attributes:
-        middle: Shape (joints,), rad or m.
-        sine: Amplitudes of position's sines, shape (harmonics, joints).
-        cosine: Of its cosines.
-    """
-
-    middle: FloatArray
-    sine: FloatArray
-    cosine: FloatArray
+    middle: FloatArray  # shape (joints,), rad or m
+    sine: FloatArray  # amplitudes of position's sines, shape (harmonics, joints)
+    cosine: FloatArray  # of its cosines
 
     def motion(self, time_s: FloatArray) -> Motion:
         """Return the motion at instants that are evenly spaced."""

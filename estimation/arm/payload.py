@@ -23,21 +23,13 @@ LEAST_PERIODS = 3
 
 @dataclass(frozen=True)
 class AddedMass:
-    """An added mass with what is known of its error.
-
-    Attributes:
-        mass_kg: The mass.
-        by_joint_kg: From each joint's torque alone.
-        from_periods_kg: Standard error from the scatter over periods of the motion.
-        from_joints_kg: Half the difference between the joints: what the model lacks.
-        from_lever_kg: What one standard error of the height does.
-    """
+    """An added mass with what is known of its error."""
 
     mass_kg: float
-    by_joint_kg: tuple[float, ...]
-    from_periods_kg: float
-    from_joints_kg: float
-    from_lever_kg: float
+    by_joint_kg: tuple[float, ...]  # from each joint's torque alone
+    from_periods_kg: float  # standard error from the scatter over periods of the motion
+    from_joints_kg: float  # half the difference between the joints: what the model lacks
+    from_lever_kg: float  # what one standard error of the height does
 
     @property
     def interval_kg(self) -> tuple[float, float]:

@@ -26,21 +26,13 @@ COUNTING = {"full": slice(0, 10), "first moments": slice(1, 4), "thin": slice(0,
 
 @dataclass(frozen=True)
 class Tree:
-    """A tree of bodies, each on one joint along or about its own z axis.
+    """A tree of bodies, each on one joint along or about its own z axis."""
 
-    Attributes:
-        parents: Number of the parent body of each body, -1 for the base; parents first.
-        prismatic: Whether the joint of each body is prismatic.
-        turns: Rotation of each joint's frame in its parent's at q = 0, shape (bodies, 3, 3).
-        places: Its origin there, shape (bodies, 3), m.
-        gravity: In the base frame, shape (3,), m/s^2.
-    """
-
-    parents: NDArray[np.int64]
-    prismatic: NDArray[np.bool_]
-    turns: FloatArray
-    places: FloatArray
-    gravity: FloatArray
+    parents: NDArray[np.int64]  # parent of each body, -1 for the base; parents first
+    prismatic: NDArray[np.bool_]  # whether the joint of each body is prismatic
+    turns: FloatArray  # each joint's frame in its parent's at q = 0, (bodies, 3, 3)
+    places: FloatArray  # its origin there, shape (bodies, 3), m
+    gravity: FloatArray  # in the base frame, shape (3,), m/s^2
 
     @classmethod
     def of(cls, bodies: Sequence[Body], gravity_m_s2: tuple[float, float, float]) -> "Tree":

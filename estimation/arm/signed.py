@@ -17,39 +17,23 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True)
 class Block:
-    """Columns that belong together: the base, or one effect.
-
-    Attributes:
-        name: Name.
-        at: Their places among all columns.
-        dissipative: Of each, whether it cannot be negative.
-        damping: Damping relative to the squared length of the block's columns: of each column
-            where `own_length`, else of the longest, so that rarely visited columns stay small.
-        own_length: See `damping`.
-    """
+    """Columns that belong together: the base, or one effect."""
 
     name: str
-    at: NDArray[np.intp]
-    dissipative: NDArray[np.bool_]
-    damping: float
-    own_length: bool = False
+    at: NDArray[np.intp]  # their places among all columns
+    dissipative: NDArray[np.bool_]  # of each, whether it cannot be negative
+    damping: float  # over the squared length of each of its columns, or of the longest of them
+    own_length: bool = False  # of each; else rarely visited columns stay small
 
 
 @dataclass(frozen=True)
 class Products:
-    """Cross-products of weighted columns with one another and with the torque, by row.
+    """Cross-products of weighted columns with one another and with the torque, by row."""
 
-    Attributes:
-        gram: Shape (rows, columns, columns).
-        right: Shape (rows, columns).
-        square: Sum of squares of the torque, shape (rows,).
-        samples: Number of samples.
-    """
-
-    gram: FloatArray
-    right: FloatArray
-    square: FloatArray
-    samples: int
+    gram: FloatArray  # shape (rows, columns, columns)
+    right: FloatArray  # shape (rows, columns)
+    square: FloatArray  # sum of squares of the torque, shape (rows,)
+    samples: int  # number of samples
 
     @classmethod
     def of(cls, columns: FloatArray, torque: FloatArray) -> "Products":

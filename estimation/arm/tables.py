@@ -19,19 +19,12 @@ moment along the own x axis only, of a thin bar."""
 
 @dataclass(frozen=True, slots=True)
 class DhRow:
-    """One row of a modified Denavit-Hartenberg table: m and rad.
+    """One row of a modified Denavit-Hartenberg table: m and rad."""
 
-    Attributes:
-        a_m: Distance along the previous x axis.
-        alpha_rad: Angle about the previous x axis.
-        d_m: Distance along the own z axis at q = 0.
-        theta_rad: Angle about the own z axis at q = 0.
-    """
-
-    a_m: float
-    alpha_rad: float
-    d_m: float
-    theta_rad: float
+    a_m: float  # distance along the previous x axis
+    alpha_rad: float  # angle about the previous x axis
+    d_m: float  # distance along the own z axis at q = 0
+    theta_rad: float  # angle about the own z axis at q = 0
 
 
 @dataclass(frozen=True, slots=True)

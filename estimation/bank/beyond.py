@@ -50,17 +50,11 @@ def coordinates(bank: Bank, rows: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Beyond:
-    """A table over the conditions.
+    """A table over the conditions."""
 
-    Attributes:
-        lowest: Conditions of the first node, shape (d,).
-        step: Distance of the nodes, shape (d,).
-        values: What is looked up, at each node, d axes.
-    """
-
-    lowest: FloatArray
-    step: FloatArray
-    values: FloatArray
+    lowest: FloatArray  # conditions of the first node, shape (d,)
+    step: FloatArray  # distance of the nodes, shape (d,)
+    values: FloatArray  # what is looked up, at each node, d axes
 
     def at(self, places: FloatArray) -> FloatArray:
         """Return the values at conditions, (n, d), between nodes: shape (n,), NaN beyond them."""

@@ -50,15 +50,10 @@ AS_GOOD = 1.02
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Properties of the columns that a fit needs.
+    """Properties of the columns that a fit needs."""
 
-    Attributes:
-        stiffness: How stiffly each weight is held, relative to the ridge penalty, shape (p,).
-        between: Columns that the runs' means are fitted with, the constant first.
-    """
-
-    stiffness: FloatArray
-    between: NDArray[np.int64]
+    stiffness: FloatArray  # how stiffly each weight is held, relative to the ridge penalty, (p,)
+    between: NDArray[np.int64]  # columns that the runs' means are fitted with, the constant first
 
     @classmethod
     def plain(cls, size: int) -> "Shape":
@@ -68,23 +63,14 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Normal:
-    """A run's share in the normal equations.
+    """A run's share in the normal equations."""
 
-    Attributes:
-        count: Samples n.
-        gram: X'X, shape (p, p).
-        cross: X'Y, shape (p, targets).
-        square: Sum of squares of each target, shape (targets,).
-        mean: Mean row of X, shape (p,).
-        target: Mean row of Y, shape (targets,).
-    """
-
-    count: int
-    gram: FloatArray
-    cross: FloatArray
-    square: FloatArray
-    mean: FloatArray
-    target: FloatArray
+    count: int  # samples n
+    gram: FloatArray  # X'X, shape (p, p)
+    cross: FloatArray  # X'Y, shape (p, targets)
+    square: FloatArray  # sum of squares of each target, shape (targets,)
+    mean: FloatArray  # mean row of X, shape (p,)
+    target: FloatArray  # mean row of Y, shape (targets,)
 
     @classmethod
     def of(cls, design: FloatArray, targets: FloatArray) -> "Normal":
@@ -101,25 +87,15 @@ class Normal:
 
 @dataclass(frozen=True, eq=False)
 class Pool:
-    """Sums over runs: all that a fit needs of them, so that fits without some runs are cheap.
+    """Sums over runs: all that a fit needs of them, so that fits without some runs are cheap."""
 
-    Attributes:
-        count: Samples.
-        total: Sum of the rows of X, shape (p,).
-        gram: X'X, shape (p, p).
-        cross: X'Y, shape (p, targets).
-        square: Sum of squares of each target, shape (targets,).
-        between: The share of `gram` that is the runs' means', shape (p, p).
-        between_cross: The share of `cross` that is the runs' means', shape (p, targets).
-    """
-
-    count: int
-    total: FloatArray
-    gram: FloatArray
-    cross: FloatArray
-    square: FloatArray
-    between: FloatArray
-    between_cross: FloatArray
+    count: int  # samples
+    total: FloatArray  # sum of the rows of X, shape (p,)
+    gram: FloatArray  # X'X, shape (p, p)
+    cross: FloatArray  # X'Y, shape (p, targets)
+    square: FloatArray  # sum of squares of each target, shape (targets,)
+    between: FloatArray  # the share of `gram` that is the runs' means', shape (p, p)
+    between_cross: FloatArray  # the share of `cross` that is the runs' means', shape (p, targets)
 
     @classmethod
     def of(cls, runs: Sequence[Normal]) -> "Pool":

@@ -37,23 +37,14 @@ SHAPE: tuple[Product, ...] = (
 
 @dataclass(frozen=True, eq=False)
 class Interval:
-    """What the error looks like.
+    """What the error looks like."""
 
-    Attributes:
-        columns: Columns of the design that the width depends on, shape (m,).
-        weights: Their weights, shape (m,), in the target's unit.
-        least: Smallest half width, in the target's unit.
-        beyond: What is added to its square away from the fitted conditions; NaN beyond its nodes.
-        price: What a score of 1 adds to its square at best knowledge, the target's unit squared.
-        usual_score: Score that left-out runs have, which the weights include.
-    """
-
-    columns: np.ndarray
-    weights: FloatArray
-    least: float
-    beyond: Beyond
-    price: float = 0.0
-    usual_score: float = 0.0
+    columns: np.ndarray  # columns of the design that the width depends on, shape (m,)
+    weights: FloatArray  # their weights, shape (m,), in the target's unit
+    least: float  # smallest half width, in the target's unit
+    beyond: Beyond  # added to its square away from the fitted conditions; NaN beyond its nodes
+    price: float = 0.0  # what a score of 1 adds to its square, the target's unit squared
+    usual_score: float = 0.0  # score that left-out runs have, which the weights include
 
     @property
     def typical(self) -> float:

@@ -55,19 +55,12 @@ logistic node at work. A node that barely varies in the given runs must keep its
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Closing samples of one run of another instrument.
+    """Closing samples of one run of another instrument."""
 
-    Attributes:
-        rows: Filtered channels the estimator reads, shape (n, channels).
-        truth: The target, shape (n,).
-        valid: Samples without a flag, shape (n,); only they are fitted.
-        conditions: Conditions of the run.
-    """
-
-    rows: FloatArray
-    truth: FloatArray
-    valid: np.ndarray
-    conditions: Mapping[str, float | str] = field(default_factory=dict)
+    rows: FloatArray  # filtered channels the estimator reads, shape (n, channels)
+    truth: FloatArray  # the target, shape (n,)
+    valid: np.ndarray  # samples without a flag, shape (n,); only they are fitted
+    conditions: Mapping[str, float | str] = field(default_factory=dict)  # conditions of the run
 
     @property
     def flagged(self) -> int:

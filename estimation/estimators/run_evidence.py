@@ -20,25 +20,15 @@ LEAST_SCORE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class RunEvidence:
-    """Samples of one run to fit: every fourth valid closing one.
+    """Samples of one run to fit: every fourth valid closing one."""
 
-    Attributes:
-        rows: Filtered channels, shape (n, channels).
-        design: The bank's products, shape (n, size).
-        truth: The target without lag, shape (n,).
-        normal: The run's share in the normal equations.
-        ranges: Lowest and highest value of each judged channel, shape (2, judged).
-        places: Conditions of each sample, shape (n, d); see `estimation.bank.beyond`.
-        conditions: What was held constant in the run; the interval grows beyond their levels.
-    """
-
-    rows: FloatArray
-    design: FloatArray
-    truth: FloatArray
-    normal: Normal
-    ranges: FloatArray
-    places: FloatArray
-    conditions: Mapping[str, float | str] = field(default_factory=dict)
+    rows: FloatArray  # filtered channels, shape (n, channels)
+    design: FloatArray  # the bank's products, shape (n, size)
+    truth: FloatArray  # the target without lag, shape (n,)
+    normal: Normal  # the run's share in the normal equations
+    ranges: FloatArray  # lowest and highest value of each judged channel, shape (2, judged)
+    places: FloatArray  # conditions of each sample, shape (n, d); see `estimation.bank.beyond`
+    conditions: Mapping[str, float | str] = field(default_factory=dict)  # what was held constant
 
     @classmethod
     def of_rows(

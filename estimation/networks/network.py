@@ -26,22 +26,14 @@ class Network:
     over the range they were trained on.
 
     Source: O'Neill et al. 2018, section II.D, with 30 hidden nodes.
-
-    Attributes:
-        inputs: Names of the inputs, d of them.
-        outputs: Names of the outputs, o of them.
-        input_range: Lowest and highest input trained on, shape (2, d).
-        output_range: Lowest and highest output trained on, shape (2, o).
-        hidden: Weights of the hidden layer, the bias last, shape (nodes, d + 1).
-        output: Weights of the output layer, the bias last, shape (o, nodes + 1).
     """
 
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    input_range: FloatArray
-    output_range: FloatArray
-    hidden: FloatArray
-    output: FloatArray
+    inputs: tuple[str, ...]  # names of the inputs, d of them
+    outputs: tuple[str, ...]  # names of the outputs, o of them
+    input_range: FloatArray  # lowest and highest input trained on, shape (2, d)
+    output_range: FloatArray  # lowest and highest output trained on, shape (2, o)
+    hidden: FloatArray  # weights of the hidden layer, the bias last, shape (nodes, d + 1)
+    output: FloatArray  # weights of the output layer, the bias last, shape (o, nodes + 1)
 
     def __post_init__(self) -> None:
         wide, nodes = len(self.inputs), len(self.hidden)

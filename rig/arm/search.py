@@ -90,25 +90,16 @@ class Trial:
 
 @dataclass(frozen=True)
 class Prepared:
-    """One path, ready to be fitted or tested on: filtered, cut, thinned.
+    """One path, ready to be fitted or tested on: filtered, cut, thinned."""
 
-    Attributes:
-        name: The run.
-        torque: Filtered torque, shape (n, rows): joints, then the gripper.
-        thesis: Base columns of filtered motion, as the thesis makes them, shape (n, joints, base).
-        closed: The same of the arm with its loops.
-        table: Filtered columns of barely filtered motion: the base, then every candidate.
-        blocks: Which columns of the table belong to what; the base first.
-        independent_share: Share of its samples that are independent after the filter.
-    """
-
-    name: str
-    torque: FloatArray
+    name: str  # the run
+    torque: FloatArray  # filtered torque, shape (n, rows): joints, then the gripper
     thesis: FloatArray
-    closed: FloatArray
-    table: FloatArray
-    blocks: tuple[Block, ...]
-    independent_share: float
+    """Base columns of filtered motion, as the thesis makes them, (n, joints, base)."""
+    closed: FloatArray  # the same of the arm with its loops
+    table: FloatArray  # filtered columns of barely filtered motion: the base, then every candidate
+    blocks: tuple[Block, ...]  # which columns of the table belong to what; the base first
+    independent_share: float  # share of its samples that are independent after the filter
 
     @property
     def joints(self) -> int:

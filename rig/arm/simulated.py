@@ -44,19 +44,12 @@ SEED_SPREAD = 0.25
 
 @dataclass(frozen=True)
 class SimulatedArm:
-    """One arm drawn at random around the plausible one.
+    """One arm drawn at random around the plausible one."""
 
-    Attributes:
-        values: Its declared parameters, in the order of `estimation.arm.regressor.names`.
-        hidden: Strengths of its hidden friction, drift and cross friction, shape (3, joints).
-        slip: Displacement over which its Dahl friction turns, rad or m, shape (joints,).
-        form: Hidden torque of a drawn family, in place of those frictions and drift.
-    """
-
-    values: FloatArray
-    hidden: FloatArray
-    slip: FloatArray
-    form: HiddenTorque | None = None
+    values: FloatArray  # declared, in the order of `estimation.arm.regressor.names`
+    hidden: FloatArray  # strengths of friction, drift and cross friction, shape (3, joints)
+    slip: FloatArray  # displacement over which its Dahl friction turns, rad or m, shape (joints,)
+    form: HiddenTorque | None = None  # of a drawn family, in place of those
 
 
 def recorded(name: str, position: FloatArray, torque: FloatArray, rate_hz: float) -> Recording:

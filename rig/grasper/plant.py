@@ -33,17 +33,11 @@ FORM_VARIABLES = ("load", "speed", "angle", "time", "acceleration")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Form:
-    """A factor on the level of friction: a table over the size of one variable.
+    """A factor on the level of friction: a table over the size of one variable."""
 
-    Attributes:
-        variable: Place in `FORM_VARIABLES`: N m, rad/s, rad, s, rad/s^2.
-        high: End of the table, which begins at 0; beyond it the last value stays.
-        values: Shape (points,).
-    """
-
-    variable: int
-    high: float
-    values: FloatArray
+    variable: int  # place in `FORM_VARIABLES`: N m, rad/s, rad, s, rad/s^2
+    high: float  # end of the table, which begins at 0; beyond it the last value stays
+    values: FloatArray  # shape (points,)
 
 
 NO_FORM = Form(0, 1.0, np.ones(2))
@@ -51,43 +45,24 @@ NO_FORM = Form(0, 1.0, np.ones(2))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisParameters:
-    """One axis of the simulated grasper, SI units, at the joint.
+    """One axis of the simulated grasper, SI units, at the joint."""
 
-    Attributes:
-        gearhead_ratio: 66 in the paper.
-        torque_constant_n_m_a: Of the motor; data sheet of the Faulhaber 2224U012SR.
-        rotor_inertia_kg_m2: 2.7 g cm2 in the paper.
-        coulomb_n_m: Friction without load.
-        load_friction_ratio: Friction a unit of contact torque.
-        viscous_n_m_s_rad: Viscous friction.
-        presliding_rad: Travel over which friction builds up.
-        relaxed_ratio: Share of its friction that a held bearing keeps.
-        relaxation_s: Time constant of letting go.
-        contact_n_m_rad: Stiffness of what is grasped, with cable and jaw.
-        contact_rad: Angle of first contact.
-        arm_m: From the joint to where the force acts. Assumed.
-        current_offset_a: Of the current sensor.
-        current_noise_a: Standard deviation of one sample.
-        force_noise_n: Standard deviation of one sample of the force sensor.
-        form: Factor on the level of friction.
-    """
-
-    gearhead_ratio: float = 66.0
-    torque_constant_n_m_a: float = 14.6e-3
-    rotor_inertia_kg_m2: float = 2.7e-7
-    coulomb_n_m: float = 4e-3
-    load_friction_ratio: float = 0.4
-    viscous_n_m_s_rad: float = 5e-3
-    presliding_rad: float = 4e-3
-    relaxed_ratio: float = 0.6
-    relaxation_s: float = 3.0
-    contact_n_m_rad: float = 0.3
-    contact_rad: float = 0.1
-    arm_m: float = 0.010
-    current_offset_a: float = 0.0
-    current_noise_a: float = 2e-3
-    force_noise_n: float = 5e-3
-    form: Form = NO_FORM
+    gearhead_ratio: float = 66.0  # 66 in the paper
+    torque_constant_n_m_a: float = 14.6e-3  # of the motor; data sheet of the Faulhaber 2224U012SR
+    rotor_inertia_kg_m2: float = 2.7e-7  # 2.7 g cm2 in the paper
+    coulomb_n_m: float = 4e-3  # friction without load
+    load_friction_ratio: float = 0.4  # friction a unit of contact torque
+    viscous_n_m_s_rad: float = 5e-3  # viscous friction
+    presliding_rad: float = 4e-3  # travel over which friction builds up
+    relaxed_ratio: float = 0.6  # share of its friction that a held bearing keeps
+    relaxation_s: float = 3.0  # time constant of letting go
+    contact_n_m_rad: float = 0.3  # stiffness of what is grasped, with cable and jaw
+    contact_rad: float = 0.1  # angle of first contact
+    arm_m: float = 0.010  # From the joint to where the force acts. Assumed.
+    current_offset_a: float = 0.0  # of the current sensor
+    current_noise_a: float = 2e-3  # standard deviation of one sample
+    force_noise_n: float = 5e-3  # standard deviation of one sample of the force sensor
+    form: Form = NO_FORM  # factor on the level of friction
 
     @property
     def values(self) -> FloatArray:
