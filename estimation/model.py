@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import derived, live_channels
-from estimation.channels import unit_of
+from estimation.channels import evaluate, unit_of
 from estimation.effects import Effect, Parameter
 from estimation.errors import EstimationError, nearest
 from estimation.filters import PAPER, LowPass
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SPINDLE_SPEED
 from estimation.signals import Samples, Signals, reference
-from estimation.units import evaluate
 
 
 class ModelError(EstimationError):

@@ -7,8 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from estimation.arm.effects import ArmEffect, of_joints, on_joint, row_count
-from estimation.arm.elements import creep, slip
+from estimation.arm.effects import ArmEffect, creep, of_joints, on_joint, row_count, slip
 from estimation.arm.motion import Motion
 from estimation.arm.tables import Arm
 from estimation.recording import FloatArray

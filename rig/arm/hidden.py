@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from estimation.arm.elements import slip
+from estimation.arm.effects import slip
 from estimation.arm.motion import Motion
 from estimation.recording import FloatArray
 from rig.simulation.forms import (

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from estimation.arm.effects import row_count
-from estimation.arm.elements import slip
+from estimation.arm.effects import row_count, slip
 from estimation.arm.motion import motion_of
 from estimation.arm.signed import Block, Normal, Products, solve
 from estimation.arm.tables import PSM

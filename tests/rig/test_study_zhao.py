@@ -11,8 +11,14 @@ from estimation.model import Estimate, Term
 from estimation.model_file import parse, to_toml
 from rig.grasper.current_force import CurrentForce, angle_led
 from rig.grasper.hidden import FAMILIES, OWN, with_family
-from rig.grasper.inputs import end_of_hold, hold
-from rig.grasper.plant import PROTOTYPES, RATE_HZ, AxisParameters, play_axis
+from rig.grasper.plant import (
+    PROTOTYPES,
+    RATE_HZ,
+    AxisParameters,
+    end_of_hold,
+    hold,
+    play_axis,
+)
 from rig.studies.seeds import Keeper
 from rig.studies.zhao import study as zhao
 from rig.studies.zhao.haptics import run_haptics

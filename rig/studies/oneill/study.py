@@ -14,12 +14,11 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from estimation.campaign import Campaign
-from estimation.channels import unit_of
+from estimation.channels import evaluate, unit_of
 from estimation.derived import measured_channels
 from estimation.errors import EstimationError
 from estimation.recording import FloatArray
 from estimation.scores import Score, rmse, score
-from estimation.units import evaluate
 from rig.errors import DataError
 from rig.output.provenance import Provenance
 from rig.studies.oneill import paper

@@ -18,8 +18,7 @@ import numpy as np
 from scipy import signal
 
 from estimation.arm.base import base_of
-from estimation.arm.effects import ArmEffect, on_joint
-from estimation.arm.elements import slip
+from estimation.arm.effects import ArmEffect, on_joint, slip
 from estimation.arm.motion import Motion
 from estimation.arm.regressor import regressor
 from estimation.arm.tables import PSM, Arm

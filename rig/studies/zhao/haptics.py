@@ -17,8 +17,7 @@ from estimation.filters import CausalFilter, LowPass
 from estimation.model import Model, predict
 from estimation.recording import FloatArray, Recording
 from rig.grasper.current_force import FILTER, CurrentForce
-from rig.grasper.inputs import hold
-from rig.grasper.plant import PROTOTYPES, RATE_HZ
+from rig.grasper.plant import PROTOTYPES, RATE_HZ, hold
 from rig.studies.seeds import Keeper, kept_outcomes
 from rig.studies.zhao.methods import Axes, axes_of, declared, fitted, on_object, record
 

@@ -22,8 +22,16 @@ from estimation.model_file import to_toml
 from estimation.recording import FloatArray, Recording
 from rig.grasper.current_force import CurrentForce, angle_led
 from rig.grasper.hidden import OWN, with_family
-from rig.grasper.inputs import end_of_hold, hold, periodic
-from rig.grasper.plant import RATE_HZ, AxisParameters, Prototype, play_axis, vary
+from rig.grasper.plant import (
+    RATE_HZ,
+    AxisParameters,
+    Prototype,
+    end_of_hold,
+    hold,
+    periodic,
+    play_axis,
+    vary,
+)
 
 DOFS = ("grasp", "pitch", "yaw")
 INPUTS = ("long", "short", "periodic")
