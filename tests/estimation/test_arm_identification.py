@@ -1,18 +1,25 @@
-"""Regressor, base parameters and least squares of an arm, against Pinocchio's inverse dynamics."""
+"""Identification of an arm: base parameters, least squares free and consistent, channels."""
 
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
 from estimation.arm.base import base_of
-from estimation.arm.identification import fit, thesis_weights
+from estimation.arm.consistent import consistent_fit, pseudo_inertia
+from estimation.arm.identification import damped_around, fit, thesis_weights
 from estimation.arm.kinematics import ArmError
-from estimation.arm.motion import joint_channels
+from estimation.arm.motion import Motion, joint_channels, periodic_motion
+from estimation.arm.recursion import LINK
 from estimation.arm.regressor import names, regressor
-from estimation.arm.tables import PSM
+from estimation.arm.tables import PSM, PSM_CLOSED, Arm
 from estimation.recording import Recording
 from rig.arm.simulated import excitation
+
+clarabel_only = pytest.mark.skipif(
+    find_spec("clarabel") is None, reason="Clarabel is not installed (extra arm)"
+)
 
 
 def columns_of(seed: int, seconds: float) -> np.ndarray:
@@ -66,3 +73,82 @@ def test_joints_are_read_from_a_recordings_channels():
         np.testing.assert_array_equal(found, np.column_stack([run[name] for name in channels]))
     with pytest.raises(ArmError, match="no arm joints"):
         joint_channels(replace(run, columns={"motor_current_a": time}))
+
+
+def test_derivatives_of_whole_periods_are_exact_and_noise_above_is_left_out():
+    time = np.arange(1000)[:, None] * 0.01
+    turn = 2 * np.pi * 0.4
+    wave = np.sin(turn * time)
+    found = periodic_motion(wave + 0.1 * np.sin(2 * np.pi * 20 * time), 0.01, 5.0)
+    np.testing.assert_allclose(found.position, wave, atol=1e-9)
+    np.testing.assert_allclose(found.velocity, turn * np.cos(turn * time), atol=1e-9)
+    np.testing.assert_allclose(found.acceleration, -(turn**2) * wave, atol=1e-9)
+    with pytest.raises(ArmError, match="cannot be differentiated"):
+        periodic_motion(wave, 0.01, 80.0)
+
+
+def test_a_perfect_guess_is_kept_and_a_wrong_one_is_left():
+    rng = np.random.default_rng(0)
+    columns, truth = rng.normal(size=(50, 2, 3)), np.array([1.0, -2.0, 0.5])
+    torque = columns @ truth
+    np.testing.assert_allclose(damped_around(columns, torque, truth, 10.0), truth)
+    np.testing.assert_allclose(damped_around(columns, torque, np.zeros(3), 1e-3), truth, atol=1e-6)
+    with pytest.raises(ArmError, match="not positive"):
+        damped_around(columns, torque, truth, 0.0)
+
+
+def points(seed: int, count: int = 5) -> np.ndarray:
+    """Ten parameters of point masses, shape (10,)."""
+    rng = np.random.default_rng(seed)
+    values = np.zeros(10)
+    for mass, (x, y, z) in zip(
+        rng.uniform(0.1, 1, count), rng.normal(size=(count, 3)), strict=True
+    ):
+        inertia = (y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y)
+        values += mass * np.array([1, x, y, z, *inertia])
+    return values
+
+
+def real_arm(arm: Arm) -> np.ndarray:
+    """Parameters of an arm that could be built."""
+    rng = np.random.default_rng(2)
+    named = dict(zip(names(arm), rng.uniform(0.05, 0.5, len(names(arm))), strict=True))
+    for k, body in enumerate(arm.bodies):
+        if body.link == "full":
+            at = [f"{name}{body.label}" for name in LINK]
+            named |= dict(zip(at, 0.1 * points(k), strict=True))
+    return np.array([named[name] for name in names(arm)])
+
+
+@clarabel_only
+@pytest.mark.parametrize("arm", [PSM, PSM_CLOSED], ids=["serial", "closed chain"])
+def test_a_real_arm_is_found_and_an_unreal_fit_is_kept_from(arm: Arm):
+    base = base_of(arm)
+    columns = regressor(arm, excitation(np.random.default_rng(1), 20.0))[:, :, base.columns]
+    truth = base.mapping @ real_arm(arm)
+    torque = columns @ truth
+    weights = thesis_weights(torque)
+    found = consistent_fit(arm, columns, torque, weights)
+    scale = np.abs(torque).max()
+    np.testing.assert_allclose(columns @ found.base, torque, atol=2e-3 * scale)
+
+    negative = truth.copy()
+    negative[base.names.index("Fv1")] = -1.0
+    torque = columns @ negative
+    free = fit(columns, torque, weights).values
+    held = consistent_fit(arm, columns, torque, weights)
+    assert free[base.names.index("Fv1")] == pytest.approx(-1.0, abs=1e-6)
+    assert held.base[base.names.index("Fv1")] > -1e-6
+    for body in arm.bodies:
+        if body.link == "full":
+            link = [held.values[names(arm).index(f"{name}{body.label}")] for name in LINK]
+            assert np.linalg.eigvalsh(pseudo_inertia(np.array(link))).min() > -1e-6
+
+
+def test_the_counterweights_gravity_pulls_against_the_insertion():
+    still = np.zeros((1, 6))
+    values = np.zeros(len(names(PSM_CLOSED)))
+    values[names(PSM_CLOSED).index("mc")] = 2.0
+    values[names(PSM_CLOSED).index("m3")] = 2.0
+    motion = Motion(still, still, still, 0.01)
+    assert (regressor(PSM_CLOSED, motion) @ values)[0, 2] == pytest.approx(0.0, abs=1e-9)
