@@ -74,15 +74,10 @@ PAPER = LowPass(cutoff_hz=50.0, order=3)
 
 
 def zero_phase(values: FloatArray, sample_rate_hz: float, low_pass: LowPass = PAPER) -> FloatArray:
-    """Filter forwards and backwards: no lag, but not causal.
+    """Filter values, shape (n,) or (n, channels), forwards and backwards: no lag, but not causal.
 
-    The ends are continued by an odd reflection, so that a signal keeps its first and last value
-    and slope.
-
-    Args:
-        values: Shape (n,) or (n, channels), uniformly sampled.
-        sample_rate_hz: Sample rate, Hz.
-        low_pass: The filter.
+    The ends are continued by an odd reflection, so that a signal keeps its first and last value and
+    slope.
 
     Raises:
         FilterError: Too few samples for the reflection, or the cutoff does not fit the rate.
@@ -166,15 +161,11 @@ def holoborodko_coefficients(points: int, exact_degree: int) -> FloatArray:
 
 
 def holoborodko_derivative(values: ArrayLike, period_s: float) -> FloatArray:
-    """Differentiate a uniformly sampled signal with the noise-robust differentiator.
+    """Differentiate an even signal, shape (n,) or (n, k), with the noise-robust differentiator.
 
-    Edges: where the stencil does not fit, the longest shorter one of the same family does the
-    work, then the plain central difference, and at the very ends the one-sided difference of
-    three points. All of them are exact on parabolas.
-
-    Args:
-        values: Shape (n,) or (n, k), n at least 3.
-        period_s: Sample period, s.
+    Edges: where the stencil does not fit, the longest shorter one of the same family does the work,
+    then the plain central difference, and at the very ends the one-sided difference of three
+    points. All of them are exact on parabolas.
 
     Raises:
         FilterError: Fewer than three samples.
@@ -200,14 +191,10 @@ def holoborodko_derivative(values: ArrayLike, period_s: float) -> FloatArray:
 
 
 def fill_gaps(ticks: NDArray[np.int64], rows: FloatArray) -> FloatArray:
-    """Lay rows on every tick, filling missing ticks by straight lines.
+    """Lay rows, shape (n, channels), on every tick, filling missing ticks by straight lines.
 
-    Args:
-        ticks: Tick of each row, shape (n,), strictly increasing, first one 0.
-        rows: Shape (n, channels).
-
-    Returns:
-        Shape (ticks[-1] + 1, channels); row i of the input is at `ticks[i]`.
+    `ticks` is the tick of each row, strictly increasing, the first one 0: row i of the input is at
+    `ticks[i]` of the result, of shape (ticks[-1] + 1, channels).
     """
     if ticks[-1] + 1 == len(ticks):
         return rows
@@ -221,10 +208,6 @@ def filter_recording(recording: Recording, low_pass: LowPass = PAPER) -> Recordi
     Lost samples are bridged by straight lines while filtering and not added. Values that are not
     finite are bridged likewise, and must be flagged. A flag spreads to the samples that the filter
     smears its sample over.
-
-    Args:
-        recording: The recording.
-        low_pass: The filter.
 
     Raises:
         FilterError: The run is too short, its clock jumps, or it holds a value that is not finite

@@ -5,7 +5,7 @@ Which equations of motion can be written follows from it, see `estimation.plant_
 are SI, and their names end in the unit.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -256,36 +256,31 @@ class Plant:
 
 
 def _check_names(plant: Plant) -> None:
-    for table, parts in (
-        ("axis", plant.axes),
-        ("transmission", plant.transmissions),
-        ("equation", plant.equations),
+    for table, names in (
+        ("axis", [axis.name for axis in plant.axes]),
+        ("transmission", [joint.name for joint in plant.transmissions]),
+        ("equation", [equation.name for equation in plant.equations]),
     ):
-        _check_unique(table, [part.name for part in parts])
-    channels = [("actuator", a.name) for a in plant.actuators]
-    channels += [("sensor", s.name) for s in plant.sensors]
-    channels += [("load", load.name) for load in plant.loads]
-    channels += [("derived", c.name) for c in plant.derived]
+        for number, name in enumerate(names, start=1):
+            if name in names[: number - 1]:
+                what = f"There are two of the name {name!r}."
+                raise PlantError((table, number, "name"), what, fix="Rename one.")
     seen: set[str] = set()
-    count: dict[str, int] = {}
-    for table, name in channels:
-        count[table] = count.get(table, 0) + 1
-        place = (table, count[table], "name")
-        try:
-            unit_of(name)
-        except UnknownUnitError as error:
-            raise PlantError(place, error.what, error.why, error.fix) from error
-        if name in seen:
-            raise PlantError(place, f"Two channels are called {name!r}.", fix="Rename one.")
-        seen.add(name)
-
-
-def _check_unique(table: str, names: Sequence[str]) -> None:
-    for number, name in enumerate(names, start=1):
-        if name in names[: number - 1]:
-            raise PlantError(
-                (table, number, "name"), f"There are two of the name {name!r}.", fix="Rename one."
-            )
+    for table, names in (
+        ("actuator", [actuator.name for actuator in plant.actuators]),
+        ("sensor", [sensor.name for sensor in plant.sensors]),
+        ("load", [load.name for load in plant.loads]),
+        ("derived", [combination.name for combination in plant.derived]),
+    ):
+        for number, name in enumerate(names, start=1):
+            place = (table, number, "name")
+            try:
+                unit_of(name)
+            except UnknownUnitError as error:
+                raise PlantError(place, error.what, error.why, error.fix) from error
+            if name in seen:
+                raise PlantError(place, f"Two channels are called {name!r}.", fix="Rename one.")
+            seen.add(name)
 
 
 def _check_axes(plant: Plant) -> None:

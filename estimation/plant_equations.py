@@ -66,14 +66,11 @@ def equations(plant: Plant) -> tuple[Written, ...]:
     Raises:
         PlantError: Two equations have the same name.
     """
-    found = [
-        equation
-        for chain in chains(plant)
-        for equation in (*_efforts(plant, chain), *_deflections(plant, chain))
-    ]
-    unique = list(dict.fromkeys((e.name, e.target) for e in found))
-    once = [next(e for e in found if (e.name, e.target) == key) for key in unique]
-    # in the order of the chain: drive, bend of the gear, cable, bend of the cable
+    found: dict[tuple[str, str], Written] = {}  # chains that branch share their beginning
+    for chain in chains(plant):
+        for equation in (*_efforts(plant, chain), *_deflections(plant, chain)):
+            found.setdefault((equation.name, equation.target), equation)
+    once = list(found.values())
     names = [e.name for e in (*once, *plant.equations)]
     for name in names:
         if names.count(name) > 1:
@@ -90,10 +87,10 @@ def equations(plant: Plant) -> tuple[Written, ...]:
 
 
 def _in_order(plant: Plant, found: list[Written]) -> list[Written]:
-    """Return equations along the chain: a transmission's loss before its bend."""
+    """Return equations along the chain: drive, loss of the gear, its bend, loss of the cable."""
     place: dict[str, int] = {}
     for chain in chains(plant):
-        place.setdefault(_drive_name(chain), len(place))
+        place.setdefault(chain.actuator.axis, len(place))
         for joint in chain.joints:
             place.setdefault(joint.name, len(place))
             place.setdefault(_bend_name(plant, joint), len(place))
@@ -180,10 +177,6 @@ def bend_channel(plant: Plant, joint: Transmission) -> Combination | None:
     )
 
 
-def _drive_name(chain: Chain) -> str:
-    return chain.actuator.axis
-
-
 def _bend_name(plant: Plant, joint: Transmission) -> str:
     if joint.deflection:
         return joint.deflection
@@ -227,7 +220,7 @@ def _efforts(plant: Plant, chain: Chain) -> Iterator[Written]:
         others = [Part("transmission.ratio", -1, {"load": one.name}) for one in chain.also]
         parts = (*weights, *_motion(plant, driven, driven, 1))
         if parts:
-            yield Written(_drive_name(chain), drive, (*others, *parts, OFFSET))
+            yield Written(chain.actuator.axis, drive, (*others, *parts, OFFSET))
         return
     gains = [
         Part("transmission.ratio", 1, {"load": one.name})
@@ -237,7 +230,8 @@ def _efforts(plant: Plant, chain: Chain) -> Iterator[Written]:
     ]
     at, first = reading[0]
     own = _driven(plant, chain.axes[: at + 1]) or driven
-    yield Written(_drive_name(chain), first.name, (*gains, *_motion(plant, own, own, -1), OFFSET))
+    losses = _motion(plant, own, own, -1)
+    yield Written(chain.actuator.axis, first.name, (*gains, *losses, OFFSET))
     for (near, here), (far, there) in pairwise(reading):
         ratio = Part("transmission.ratio", 1, {"load": there.name})
         speed_of = _driven(plant, chain.axes[near : far + 1])

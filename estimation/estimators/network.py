@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.campaign import Campaign
 from estimation.closing import closing_samples, processed
@@ -69,11 +69,7 @@ class NetworkEstimator:
         """Return the estimator for use on instruments it was not fitted on."""
         return replace(self, instrument="")
 
-    def inside(self, recording: Recording, causal: bool = False) -> NDArray[np.bool_]:
-        """Return for each sample whether every input lies in the training range, shape (n,)."""
-        return self.network.inside(self.rows(recording, causal))
-
-    def rows(self, recording: Recording, causal: bool = False) -> FloatArray:
+    def rows(self, recording: Recording, causal: bool) -> FloatArray:
         """Return the network's inputs for each sample, shape (n, inputs)."""
         source = causal_channels if causal else zero_phase_channels
         channels = source(recording, self.network.inputs, self.low_pass)

@@ -27,10 +27,7 @@ def dvrk_couplings() -> dict[str, Coupling]:
 
 
 def dvrk_coupling(model: str) -> Coupling:
-    """Return the coupling of an instrument model.
-
-    Args:
-        model: Model number, such as `420049`.
+    """Return the coupling of an instrument model by its number, such as `420049`.
 
     Raises:
         GrasperError: The model is not in the table.

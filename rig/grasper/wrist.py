@@ -212,10 +212,6 @@ def planetary_grasper(path: CablePath, planetary: Planetary = EQUAL_GEARS) -> Co
     With d2/d1 = alpha/beta each motor moves its own joint. With another pulley ratio turning the
     yaw shortens the jaws' cables by equation 5, and both jaws, so the pitch, turn along.
 
-    Args:
-        path: Pulleys of the jaws' cables.
-        planetary: Gears of the wrist.
-
     Raises:
         GrasperError: Pulleys overlap.
     """
