@@ -6,6 +6,7 @@ column, and the model's own offset becomes the mean over the runs.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -56,12 +57,9 @@ def fit(
         shape = search_shape(problem, everywhere=shapes == "search")
     grams = [problem.gram(run, shape) for run in problem.runs]
     amplitudes = solve(problem, np.sum(grams, axis=0))
-    offset = _mean_offset(problem, shape, amplitudes)
-    fitted = _with_numbers(problem, amplitudes, shape, offset)
     spreads = _bootstrap(problem, amplitudes, shape, bootstrap, seed)
-    return _with_numbers(
-        problem, amplitudes, shape, offset, spreads, _evidence(fitted, problem.runs, seed)
-    )
+    fitted = _with_numbers(problem, amplitudes, shape, spreads)
+    return replace(fitted, evidence=_evidence(fitted, problem.runs, seed))
 
 
 def _mean_offset(problem: Problem, shape: Sequence[float], free: FloatArray) -> float:
@@ -136,30 +134,21 @@ def _slopes(problem: Problem, run: FitRun, shape: list[float], free: FloatArray)
 
 
 def _with_numbers(
-    problem: Problem,
-    free: FloatArray,
-    shape: list[float],
-    offset: float,
-    spreads: FloatArray | None = None,
-    evidence: Evidence | None = None,
+    problem: Problem, free: FloatArray, shape: list[float], spreads: FloatArray | None
 ) -> Model:
-    """Return the model with its numbers in place."""
-    amplitudes = np.full(len(problem.names), offset)
+    """Return the model with its numbers in place, without evidence."""
+    amplitudes = np.full(len(problem.names), _mean_offset(problem, shape, free))
     amplitudes[problem.free] = free
     place = np.full(len(problem.names), -1)  # the offset is the bootstrap's last column
     place[problem.free] = np.arange(len(free))
-    values: list[dict[str, Estimate]] = []
-    column, shape_at = 0, 0
-    for term in problem.model.terms:
-        own: dict[str, Estimate] = {}
-        for parameter in term.effect.amplitudes:
-            own[parameter.name] = _estimate(amplitudes[column], spreads, int(place[column]))
-            column += 1
-        for parameter in term.effect.shape:
-            own[parameter.name] = _estimate(shape[shape_at], spreads, len(free) + shape_at)
-            shape_at += 1
-        values.append(own)
-    return with_values(problem.model, values, evidence)
+    sizes = iter([_estimate(x, spreads, k) for x, k in zip(amplitudes, place, strict=True)])
+    shapes = iter([_estimate(x, spreads, k) for k, x in enumerate(shape, start=len(free))])
+    values = [
+        {p.name: next(sizes) for p in term.effect.amplitudes}
+        | {p.name: next(shapes) for p in term.effect.shape}
+        for term in problem.model.terms
+    ]
+    return with_values(problem.model, values, None)
 
 
 def _estimate(value: float, spreads: FloatArray | None, column: int) -> Estimate:

@@ -152,6 +152,14 @@ def _range(values: FloatArray, names: Sequence[str]) -> FloatArray:
     return bounds
 
 
+def _rows(inputs: FloatArray, targets: FloatArray) -> tuple["Tensor", "Tensor"]:
+    """Return mapped rows as tensors, a one for the bias at the end of each input."""
+    import torch
+
+    x = torch.from_numpy(np.column_stack([inputs, np.ones(len(inputs))]))
+    return x, torch.from_numpy(np.ascontiguousarray(targets))
+
+
 def _blocks(x: "Tensor", y: "Tensor") -> Iterator[tuple["Tensor", "Tensor"]]:
     """Cut rows into blocks of at most `BLOCK`."""
     for first in range(0, len(x), BLOCK):
@@ -205,8 +213,7 @@ class _Fit:
         import torch
 
         self.settings = settings
-        self._x = torch.from_numpy(np.column_stack([inputs, np.ones(len(inputs))]))
-        self._y = torch.from_numpy(np.ascontiguousarray(targets))
+        self._x, self._y = _rows(inputs, targets)
         generator = np.random.default_rng(settings.seed)
         self._shapes = (settings.nodes, inputs.shape[1] + 1), (targets.shape[1], settings.nodes + 1)
         first = _first_weights(*self._shapes, generator)
@@ -228,10 +235,7 @@ class _Fit:
 
     def hold_out(self, inputs: FloatArray, targets: FloatArray) -> None:
         """Choose among the steps by mapped rows that are not trained on."""
-        import torch
-
-        rows = torch.from_numpy(np.column_stack([inputs, np.ones(len(inputs))]))
-        self._held_out = rows, torch.from_numpy(np.ascontiguousarray(targets))
+        self._held_out = _rows(inputs, targets)
 
     def _begin(self) -> None:
         self.alpha = 0.0

@@ -1,4 +1,4 @@
-"""Filters and the noise-robust derivative."""
+"""Filters, the noise-robust derivative, and live channels; the tracker is filterpy's filter."""
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from estimation.filters import (
     holoborodko_derivative,
     zero_phase,
 )
+from estimation.kalman import steady_filter, tracker
 from estimation.live_channels import CausalChannels, causal_channels
 from estimation.recording import Flag, Recording, Stretch
 
@@ -204,3 +205,39 @@ def test_a_lost_sample_makes_no_spike_and_a_long_silence_starts_anew():
     after = causal_channels(run_of(keep=keep), WANTED)["motor_velocity_rad_s"]
     assert after[1000] == 0.0
     assert after[1100:] == pytest.approx(speeds[0][1700:], abs=0.1)
+
+
+SPEED = ["motor_velocity_rad_s"]
+
+
+def test_the_tracker_gives_what_filterpy_gives():
+    motion = 0.4 * np.sin(np.linspace(0, 6, 400)) + np.random.default_rng(0).normal(0, 1e-3, 400)
+    design, compiled = steady_filter(1000.0), tracker(1000.0)
+    design.x = np.array([[motion[0]], [0.0], [0.0]])
+    expected = []
+    for angle in motion:
+        design.predict()
+        design.update(np.array([[angle]]))
+        expected.append(design.x[:, 0].copy())
+    found = compiled.track(motion, compiled.start(motion[0]))
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("rate_hz", [500.0, 1000.0, 2000.0])
+def test_an_even_rise_of_the_acceleration_is_followed_with_the_stated_lag(rate_hz):
+    found = tracker(rate_hz)
+    time_s = np.arange(round(rate_hz)) / rate_hz
+    jerk = 300.0
+    tracked = found.track(jerk * time_s**3 / 6, found.start(0.0))
+    lag_s = time_s[-1] - tracked[-1, 2] / jerk
+    assert lag_s == pytest.approx(found.acceleration_lag_s, rel=1e-3)
+    assert 0.002 < lag_s < 0.02
+
+
+def test_tracked_channels_follow_the_motion():
+    true = np.gradient(run_of()["motor_angle_rad"], PERIOD_S)
+    better, worse = (
+        np.abs(causal_channels(run_of(), SPEED, tracked=tracked)[SPEED[0]] - true)[500:].max()
+        for tracked in (True, False)
+    )
+    assert better < min(0.2, worse)

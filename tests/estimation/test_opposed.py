@@ -1,7 +1,9 @@
-"""A drive whose sign contradicts the motion is named before its parameters are believed."""
+"""Recordings against what is stated: a drive of the wrong sign, the ratio of two travels."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from estimation.campaign import Campaign
 from estimation.causes.equations import LayoutError
@@ -10,6 +12,7 @@ from estimation.diagnosis.split import split
 from estimation.fitting import fit
 from estimation.opposed import opposed
 from estimation.recording import Recording
+from estimation.travel import slope
 from tests.estimation.causes.synthetic import axis, turning
 
 
@@ -42,3 +45,25 @@ def test_no_cause_is_sought_where_a_sign_is_wrong(sound: list[Recording]) -> Non
     runs = _negated(sound, "crank_torque_n_m")
     with pytest.raises(LayoutError, match="opposite sign"):
         diagnose(runs, [axis()], split(runs))
+
+
+def run(ratio: float, compliance: float) -> Recording:
+    """Return a run in which a torque winds up a gearbox while it turns."""
+    time_s = np.arange(0.0, 4.0, 0.002)
+    angle = np.sin(2.0 * time_s)
+    torque = 0.3 * angle + 0.1 * np.sin(7.0 * time_s)
+    motor = ratio * (angle + compliance * torque)
+    columns = {"spindle_angle_rad": angle, "motor_angle_rad": motor, "proximal_torque_n_m": torque}
+    return Recording("run", time_s, columns)
+
+
+@given(st.floats(2.0, 200.0), st.floats(0.0, 0.2))
+def test_a_compliance_is_not_taken_for_another_ratio(ratio, compliance):
+    runs = [run(ratio, compliance)]
+    found = slope(runs, "spindle_angle_rad", "motor_angle_rad", ["proximal_torque_n_m"])
+    assert found == pytest.approx(ratio, rel=1e-6)
+
+
+def test_what_never_moves_has_no_slope():
+    still = run(35.0, 0.01).with_columns(spindle_angle_rad=np.zeros(2000))
+    assert slope([still], "spindle_angle_rad", "motor_angle_rad") is None

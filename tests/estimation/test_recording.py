@@ -1,8 +1,11 @@
-"""Recordings: immutable columns with units, flags and slices."""
+"""Recordings: immutable columns with units and flags. Campaigns: lazy runs, splits by run."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from estimation.campaign import Campaign, CampaignError, Run
 from estimation.channels import UnknownUnitError, unit_of
 from estimation.recording import (
     Flag,
@@ -68,3 +71,47 @@ def test_rate_and_duration():
 def test_a_compliance_has_the_unit_of_an_angle_by_a_torque():
     assert unit_of("compliance_rad_n_m") == "rad/(N m)"
     assert unit_of("stiffness_n_m_rad") == "N m/rad"
+
+
+def test_a_campaign_is_walked_run_by_run():
+    loaded: list[str] = []
+
+    def handle(name: str) -> Run:
+        def load() -> Recording:
+            loaded.append(name)
+            return make(name=name)
+
+        return Run(name, load)
+
+    campaign = Campaign(tuple(handle(n) for n in "abc"))
+    walk = iter(campaign)
+    assert loaded == []
+    assert next(walk).name == "a"
+    assert loaded == ["a"]
+
+
+def test_two_runs_of_one_name_are_refused():
+    with pytest.raises(CampaignError, match="share a name: a"):
+        Campaign.of([make(name="a"), make(name="a")])
+
+
+@given(st.integers(2, 12), st.integers(2, 12), st.integers(0, 5))
+def test_folds_test_every_run_once_and_never_fit_on_it(runs, folds, seed):
+    campaign = Campaign.of([make(3, name=f"r{i}") for i in range(runs)])
+    if folds > runs:
+        with pytest.raises(CampaignError, match="cannot be split"):
+            campaign.folds(folds, seed)
+        return
+    splits = campaign.folds(folds, seed)
+    tested = [name for split in splits for name in split.test.names]
+    assert sorted(tested) == sorted(campaign.names)
+    assert all(not set(s.train.names) & set(s.test.names) for s in splits)
+    assert all(len(s.train) + len(s.test) == runs for s in splits)
+
+
+def test_an_excluded_run_is_kept_with_its_reason_but_is_no_evidence():
+    campaign = Campaign.of([make(name="a"), make(name="b")]).exclude({"b": "the cable slipped"})
+    assert [r.excluded for r in campaign] == [None, "the cable slipped"]
+    assert campaign.evidence.names == ("a",)
+    with pytest.raises(CampaignError, match="no run 'z'"):
+        campaign.exclude({"z": "?"})
