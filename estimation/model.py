@@ -155,11 +155,9 @@ class Model:
     """One equation: the channel it estimates, and its effects.
 
     Attributes:
-        name: Short name.
         balance: Id of the equation: as the machine's file calls it, `joint.N` of an arm, or
             `calibration.KIND`.
         target: Channel that is estimated.
-        terms: The effects.
         description: Description and origin.
         low_pass: Filter of every channel.
         run_offsets: Whether an offset of each run is a nuisance of a fit, as for a sensor whose

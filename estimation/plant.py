@@ -40,11 +40,9 @@ class Axis:
     """A shaft or a carriage.
 
     Attributes:
-        name: Its name.
         unit: `rad` of a shaft, `m` of a carriage.
         rest_speed: Speed below which it is at rest, in its unit a second; None where one count of
             its sensor in a period of the filter decides.
-        description: In words.
     """
 
     name: str
@@ -66,7 +64,6 @@ class Transmission:
         compliant: Whether it bends measurably.
         damped: Whether the bend lags behind the load.
         deflection: Name of the equation of its bend.
-        description: In words.
     """
 
     name: str
@@ -85,8 +82,6 @@ class Actuator:
 
     Attributes:
         name: Channel of the drive: a current, a voltage, a share of full scale, a force or torque.
-        axis: Axis it drives.
-        description: In words.
     """
 
     name: str
@@ -106,7 +101,6 @@ class Sensor:
         rate_hz: Samples a second; None where it is not known.
         noise: Standard deviation in the unit of the channel; None where it is not known.
         delay_s: Age of a value when it is recorded; None where it is not known.
-        description: In words.
     """
 
     name: str
@@ -156,10 +150,8 @@ class Written:
     """An equation as it is written down: a target and its effects.
 
     Attributes:
-        name: Its name.
         target: Channel on the left-hand side.
         parts: Effects on the right-hand side.
-        description: In words.
         samples: Which samples count; None for what suits the effects.
     """
 
@@ -175,7 +167,6 @@ class Plant:
     """A machine.
 
     Attributes:
-        name: Its name.
         axes: Shafts and carriages.
         transmissions: What joins them.
         actuators: What drives them.
@@ -183,7 +174,6 @@ class Plant:
         loads: Known weights.
         equations: Equations of its owner's, in addition to those that follow.
         derived: Derived channels of its owner's, in addition.
-        description: In words.
         cutoff_hz: Cutoff of the filter of every channel.
         order: Order of that filter.
         run_offsets: Whether an offset of each run is a nuisance of a fit.

@@ -50,7 +50,6 @@ class CheckedEquation:
     Attributes:
         sentence: The equation in words.
         parameters: What it identifies.
-        unit: Unit of the target.
         relative_error: Root mean square of what the fit does not explain over that of the target;
             None without recordings.
         between_runs: The same of the runs' means, where the fit ignores them (`run_offsets`); None

@@ -18,7 +18,6 @@ class Score:
     """Error of an estimate over n samples.
 
     Attributes:
-        samples: Number of samples.
         mae: Mean absolute error.
         p95: 95th percentile of the absolute error.
         rmse: Root mean square error.

@@ -99,7 +99,6 @@ class Arm:
     """An arm: its joints in a row, and the bodies of its loops where it has any.
 
     Attributes:
-        name: Name.
         joints: From the base to the tip.
         tip: The fixed row from the last joint's frame to the tip's.
         viscous_pairs: Pairs of joints (from 0) whose viscous friction is coupled: the torque of

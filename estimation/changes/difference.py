@@ -45,7 +45,6 @@ class Predicted:
         with_b: Fitted on B alone.
         as_a: Fitted on both with the changes, taken as unchanged.
         as_b: The same, taken as changed.
-        unit: Unit of the target.
     """
 
     with_a: float
@@ -64,8 +63,6 @@ class Difference:
         runs: Campaign to the names of its runs.
         predicted: Equation to its errors on a third campaign; empty without one.
         notes: Limits of the answer, in words.
-        seed: Seed of the random choices.
-        schema: Name of this layout.
     """
 
     changes: tuple[Change, ...]

@@ -58,7 +58,6 @@ class BankEstimator:
     """A fitted sum of products of physical states.
 
     Attributes:
-        bank: The states and products.
         target: Channel that is estimated.
         weights: Weight of each product, shape (size,).
         interval: The error's interval; None where too few runs were fitted.
@@ -259,7 +258,6 @@ class BankRecipe:
     """Fits a state estimator of a target on the closing samples of a campaign.
 
     Attributes:
-        bank: The states and products.
         causal: Fit on channels filtered as live, for use as live; the target has no lag anyway.
         low_pass: Filter of every channel.
     """

@@ -2,13 +2,11 @@
 
 import numpy as np
 
+from estimation.arm.motion import JointNames
 from estimation.arm.tables import PSM
 from estimation.recording import FloatArray, Recording
 
 RATE_HZ = 100.0
-
-REVOLUTE = ("angle_rad", "velocity_rad_s", "torque_n_m")
-PRISMATIC = ("position_m", "velocity_m_s", "force_n")
 
 
 def waving(seconds: float, slowest_hz: float, share: float, rng: np.random.Generator) -> FloatArray:
@@ -27,7 +25,8 @@ def psm_recording(
     effort = np.column_stack([torque[:, :6], np.zeros(len(torque))])
     columns = {}
     for k in range(7):
-        values = (position[:, k], velocity[:, k], effort[:, k])
-        for unit, column in zip(PRISMATIC if k == 2 else REVOLUTE, values, strict=True):
-            columns[f"joint_{k + 1}_{unit}"] = column
+        names = JointNames(k + 1, prismatic=k == 2)
+        for name, values in ((names.position, position), (names.velocity, velocity)):
+            columns[name] = values[:, k]
+        columns[names.torque] = effort[:, k]
     return Recording(name, np.arange(len(position)) / rate_hz, columns)
