@@ -6,7 +6,6 @@ matrix inequalities for physically consistent inertial parameter identification"
 Least squares under it is a semidefinite program; Clarabel solves it.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,24 +26,13 @@ NOT_NEGATIVE = ("Fv", "Fs", "Ia", "Ke")
 ROOT = float(np.sqrt(2.0))
 
 
-@dataclass(frozen=True)
-class Consistent:
-    """A physically consistent fit.
-
-    Attributes:
-        values: All parameters, in the order of `estimation.arm.regressor.names`; those that are
-            not identifiable from the torques get the smallest consistent values.
-        base: Their base parameters, in the order of `estimation.arm.base.base_of`.
-    """
-
-    values: FloatArray
-    base: FloatArray
-
-
 def consistent_fit(
     arm: Arm, base_columns: FloatArray, torque: FloatArray, weights: FloatArray
-) -> Consistent:
-    """Fit an arm's parameters by weighted least squares over those that a real arm can have.
+) -> FloatArray:
+    """Return the parameters of least weighted squares among those that a real arm can have.
+
+    They are in the order of `estimation.arm.regressor.names`; those that are not identifiable from
+    the torques get the smallest consistent values.
 
     The columns of its base parameters are of shape (n, joints, base), torque and weights of (n,
     joints) and (joints,).
@@ -80,8 +68,7 @@ def consistent_fit(
             "No physically consistent parameters were found.",
             f"Status of Clarabel: {found.status}.",
         )
-    values = np.array(found.x) / length
-    return Consistent(values, mapping @ values)
+    return np.asarray(np.array(found.x) / length)
 
 
 def pseudo_inertia(link: FloatArray) -> FloatArray:

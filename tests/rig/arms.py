@@ -25,8 +25,7 @@ def psm_recording(
     effort = np.column_stack([torque[:, :6], np.zeros(len(torque))])
     columns = {}
     for k in range(7):
-        names = JointNames(k + 1, prismatic=k == 2)
-        for name, values in ((names.position, position), (names.velocity, velocity)):
-            columns[name] = values[:, k]
-        columns[names.torque] = effort[:, k]
+        own = JointNames(k + 1, prismatic=k == 2)
+        columns[own.position], columns[own.velocity] = position[:, k], velocity[:, k]
+        columns[own.torque] = effort[:, k]
     return Recording(name, np.arange(len(position)) / rate_hz, columns)

@@ -181,7 +181,7 @@ def _row(
 
 def _consistent(path: Prepared) -> FloatArray:
     torque, weights = path.torque[:, : path.joints], path.weights[: path.joints]
-    return consistent_fit(PSM, path.thesis, torque, weights).base
+    return base_of(PSM).mapping @ consistent_fit(PSM, path.thesis, torque, weights)
 
 
 def _simpler_rows(one: Prepared, other: Prepared, trials: Sequence[Trial]) -> list[Row]:
