@@ -61,27 +61,22 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
             channels = estimator.bank.channels
         else:
             channels = estimator.network.inputs
-    measured = derived.measured_channels(channels, signals)
-    windows = [c for c in channels if c.endswith(derived.TRAVEL) or derived.FALL in c]
-    pasts = _pasts(channels)
+    program = _Program(channels, sample_rate_hz, signals)
     text = _template().render(
         estimator=estimator,
         bank=estimator.bank if isinstance(estimator, BankEstimator) else None,
         network=estimator.network if isinstance(estimator, NetworkEstimator) else None,
         model=model,
         channels=channels,
-        measured=measured,
-        windows=windows,
-        pasts=pasts,
+        measured=program.measured,
+        windows=program.windows,
+        pasts=program.pasts,
         rate_hz=sample_rate_hz,
         window=derived.window_samples(sample_rate_hz),
         sections=np.delete(low_pass.sections(sample_rate_hz), 3, axis=1),
         tracker=tracker(sample_rate_hz),
-        keep=_keep(pasts, measured),
-        fill="\n".join(
-            _channel(k, c, measured, windows, pasts, sample_rate_hz, signals)
-            for k, c in enumerate(channels)
-        ),
+        keep="\n".join(program.keep(k, name) for k, name in enumerate(program.pasts)),
+        fill="\n".join(program.fill(k, name) for k, name in enumerate(channels)),
     )
     return text.replace("NAME", name.upper()).replace("name_", f"{name}_")
 
@@ -130,79 +125,67 @@ def _ints(values: Sequence[int] | np.ndarray) -> str:
     return ", ".join(str(int(v)) for v in values)
 
 
-def _pasts(channels: Sequence[str]) -> list[str]:
-    """Return the measured channels and accelerations whose last values are kept."""
-    found = [m["name"] + m["unit"] for m in map(derived.AGO.match, channels) if m is not None]
-    found += [channel.replace(derived.RISE, "_") for channel in channels if derived.RISE in channel]
-    return list(dict.fromkeys(found))
+class _Program:
+    """The statements that compute a row of channels from one sample.
 
-
-def _keep(pasts: Sequence[str], measured: Sequence[str]) -> str:
-    return "\n".join(
-        f"    name_keep(&s->past[{k}], s->tick, {_value(name, measured)});"
-        for k, name in enumerate(pasts)
-    )
-
-
-def _value(channel: str, measured: Sequence[str]) -> str:
-    """Return the expression of a measured channel, a speed or an acceleration."""
-    source, times = derived.origin_of(channel)
-    if times and source in measured:
-        return f"{('speed', 'acceleration')[times - 1]}[{measured.index(source)}]"
-    if channel in measured:
-        return f"value[{measured.index(channel)}]"
-    raise ExportError(f"The channel {channel} cannot be computed in C.")
-
-
-def _channel(
-    k: int,
-    channel: str,
-    measured: Sequence[str],
-    windows: Sequence[str],
-    pasts: Sequence[str],
-    sample_rate_hz: float,
-    signals: Signals,
-) -> str:
-    """Return the statement that computes the channel at place k of a row.
-
-    Of the channels in `windows` the lowest value of a window is needed, of those in `pasts` the
-    last values are kept.
+    Of the channels in `windows` the lowest value of a window is needed, of the measured channels
+    and accelerations in `pasts` the last values are kept.
     """
 
-    def place(name: str) -> int:
-        return measured.index(name)
+    def __init__(self, channels: Sequence[str], sample_rate_hz: float, signals: Signals) -> None:
+        self._rate_hz, self._signals = sample_rate_hz, signals
+        self.measured = derived.measured_channels(channels, signals)
+        self.windows = [c for c in channels if c.endswith(derived.TRAVEL) or derived.FALL in c]
+        pasts = [m["name"] + m["unit"] for m in map(derived.AGO.match, channels) if m is not None]
+        pasts += [c.replace(derived.RISE, "_") for c in channels if derived.RISE in c]
+        self.pasts = list(dict.fromkeys(pasts))
 
-    def ago(name: str, ticks: str) -> str:
-        return f"name_ago(&s->past[{pasts.index(name)}], s->tick, {ticks})"
+    def keep(self, k: int, name: str) -> str:
+        """Return the statement that keeps a value of the past at place k."""
+        return f"    name_keep(&s->past[{k}], s->tick, {self._value(name)});"
 
-    def turned() -> str:
-        return f"name_age(&s->window[{windows.index(TURNING_TRAVEL)}], s->tick)"
+    def fill(self, k: int, channel: str) -> str:
+        """Return the statement that computes the channel at place k of a row."""
+        combination = self._signals.combination(channel)
+        if combination is not None:
+            parts = [
+                f"{share.times!r} * {self._measured(share.channel)} / {share.over!r}"
+                for share in combination.shares
+            ]
+            if (turn := combination.direction) is not None:
+                parts.append(f"{turn.size!r} * tanh({self._value(turn.speed)} / {turn.width!r})")
+            value = " + ".join(parts)
+        elif channel in self.windows:
+            rises = channel.endswith(derived.TRAVEL)
+            ending = (derived.TRAVEL, "_angle_rad") if rises else (derived.FALL, "_")
+            source = ("" if rises else "-") + self._measured(channel.replace(*ending))
+            value = f"name_travel(&s->window[{self.windows.index(channel)}], s->tick, {source})"
+        elif channel == TURNING_TURNED and TURNING_TRAVEL in self.windows:
+            value = f"{self._turned()} / {self._rate_hz!r}"
+        elif derived.RISE in channel and TURNING_TRAVEL in self.windows:
+            source = channel.replace(derived.RISE, "_")
+            value = f"{self._measured(source)} - {self._ago(source, self._turned())}"
+        elif (past := derived.AGO.match(channel)) is not None:
+            ticks = round(1e-3 * int(past["ms"]) * self._rate_hz)
+            value = self._ago(past["name"] + past["unit"], str(ticks))
+        else:
+            value = self._value(channel)
+        return f"    row[{k}] = (float)({value}); /* {channel} */"
 
-    combination = signals.combination(channel)
-    if combination is not None:
-        parts = [
-            f"{share.times!r} * value[{place(share.channel)}] / {share.over!r}"
-            for share in combination.shares
-        ]
-        if (turn := combination.direction) is not None:
-            parts.append(f"{turn.size!r} * tanh({_value(turn.speed, measured)} / {turn.width!r})")
-        value = " + ".join(parts)
-    elif channel in windows:
-        rises = channel.endswith(derived.TRAVEL)
-        source = channel.replace(
-            *((derived.TRAVEL, "_angle_rad") if rises else (derived.FALL, "_"))
-        )
-        sign = "" if rises else "-"
-        slot = windows.index(channel)
-        value = f"name_travel(&s->window[{slot}], s->tick, {sign}value[{place(source)}])"
-    elif channel == TURNING_TURNED and TURNING_TRAVEL in windows:
-        value = f"{turned()} / {sample_rate_hz!r}"
-    elif derived.RISE in channel and TURNING_TRAVEL in windows:
-        source = channel.replace(derived.RISE, "_")
-        value = f"value[{place(source)}] - {ago(source, turned())}"
-    elif (past := derived.AGO.match(channel)) is not None:
-        ticks = round(1e-3 * int(past["ms"]) * sample_rate_hz)
-        value = ago(past["name"] + past["unit"], str(ticks))
-    else:
-        value = _value(channel, measured)
-    return f"    row[{k}] = (float)({value}); /* {channel} */"
+    def _measured(self, channel: str) -> str:
+        return f"value[{self.measured.index(channel)}]"
+
+    def _ago(self, channel: str, ticks: str) -> str:
+        return f"name_ago(&s->past[{self.pasts.index(channel)}], s->tick, {ticks})"
+
+    def _turned(self) -> str:
+        return f"name_age(&s->window[{self.windows.index(TURNING_TRAVEL)}], s->tick)"
+
+    def _value(self, channel: str) -> str:
+        """Return the expression of a measured channel, a speed or an acceleration."""
+        source, times = derived.origin_of(channel)
+        if times and source in self.measured:
+            return f"{('speed', 'acceleration')[times - 1]}[{self.measured.index(source)}]"
+        if channel in self.measured:
+            return self._measured(channel)
+        raise ExportError(f"The channel {channel} cannot be computed in C.")
