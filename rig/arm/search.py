@@ -92,7 +92,7 @@ class Trial:
 class Prepared:
     """One path, ready to be fitted or tested on: filtered, cut, thinned."""
 
-    name: str  # the run
+    name: str  # of the run
     torque: FloatArray  # filtered torque, shape (n, rows): joints, then the gripper
     thesis: FloatArray
     """Base columns of filtered motion, as the thesis makes them, (n, joints, base)."""

@@ -48,18 +48,18 @@ NO_FORM = Form(0, 1.0, np.ones(2))
 class AxisParameters:
     """One axis of the simulated grasper, SI units, at the joint."""
 
-    gearhead_ratio: float = 66.0  # 66 in the paper
+    gearhead_ratio: float = 66.0  # of the paper
     torque_constant_n_m_a: float = 14.6e-3  # of the motor; data sheet of the Faulhaber 2224U012SR
-    rotor_inertia_kg_m2: float = 2.7e-7  # 2.7 g cm2 in the paper
+    rotor_inertia_kg_m2: float = 2.7e-7  # of the paper
     coulomb_n_m: float = 4e-3  # friction without load
     load_friction_ratio: float = 0.4  # friction a unit of contact torque
-    viscous_n_m_s_rad: float = 5e-3  # viscous friction
+    viscous_n_m_s_rad: float = 5e-3
     presliding_rad: float = 4e-3  # travel over which friction builds up
     relaxed_ratio: float = 0.6  # share of its friction that a held bearing keeps
     relaxation_s: float = 3.0  # time constant of letting go
     contact_n_m_rad: float = 0.3  # stiffness of what is grasped, with cable and jaw
     contact_rad: float = 0.1  # angle of first contact
-    arm_m: float = 0.010  # From the joint to where the force acts. Assumed.
+    arm_m: float = 0.010  # from the joint to where the force acts; assumed
     current_offset_a: float = 0.0  # of the current sensor
     current_noise_a: float = 2e-3  # standard deviation of one sample
     force_noise_n: float = 5e-3  # standard deviation of one sample of the force sensor
