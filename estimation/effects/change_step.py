@@ -5,17 +5,23 @@ from typing import ClassVar
 import numba
 import numpy as np
 
-from estimation.effects.effect import Inputs, Parameter, Pointwise, Remembering, Row, Shape
+from estimation.effects.effect import (
+    READING,
+    Inputs,
+    Parameter,
+    Pointwise,
+    Remembering,
+    Row,
+    Shape,
+)
+from estimation.effects.memory import BEGINNING, age
 from estimation.recording import FloatArray
 
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
-        if not state[0]:
-            state[0], state[1] = 1.0, now[i, 1]
-        after = 1.0 if now[i, 1] - state[1] >= shape[0] else 0.0
+        after = 1.0 if age(now[i, 1], state) >= shape[0] else 0.0
         rows[i, 0] = after * np.tanh(now[i, 0] / shape[1])
 
 
@@ -39,7 +45,7 @@ class FrictionStep(Remembering):
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=4),
     )
     walk = _walk
-    rest = (0.0, 0.0)
+    rest = BEGINNING
     told_apart_by = "the run repeated twice as long"
 
 
@@ -74,11 +80,8 @@ class CampaignFrictionStep(Pointwise):
 
 @numba.njit(cache=True)
 def _walk_offset(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
-        if not state[0]:
-            state[0], state[1] = 1.0, now[i, 0]
-        rows[i, 0] = 1.0 if now[i, 0] - state[1] >= shape[0] else 0.0
+        rows[i, 0] = 1.0 if age(now[i, 0], state) >= shape[0] else 0.0
 
 
 class OffsetStep(Remembering):
@@ -93,19 +96,10 @@ class OffsetStep(Remembering):
 
     id = "change.step.offset"
     family = "change.step"
-    balances: ClassVar = {
-        "motor": 1,
-        "gearbox": 1,
-        "cable": 1,
-        "stretch": 1,
-        "grasp": 1,
-        "pitch": 1,
-        "yaw": 1,
-        "joint": 1,
-    }
+    balances: ClassVar = {**READING, "pitch": 1, "yaw": 1}
     roles: ClassVar = {"clock": "time_s"}
     amplitudes = (Parameter("offset", "target", "level after the change minus before"),)
     shape = (Parameter("since", "clock", "time of the change in its run", 0.5, 60.0, points=33),)
     walk = _walk_offset
-    rest = (0.0, 0.0)
+    rest = BEGINNING
     told_apart_by = "the unloaded sensor before and after, and the run repeated twice as long"

@@ -75,9 +75,7 @@ class StickingPositionFriction(Remembering):
     }
     amplitudes = (
         Parameter("friction", "target", "loss at position 0"),
-        Parameter("slope", "target / position", "linear change with position"),
-        Parameter("bend", "target / position / position", "quadratic change with position"),
-        Parameter("twist", "target / position / position / position", "cubic change with position"),
+        *PositionFriction.amplitudes,
     )
     shape = SHAPE
     walk = _walk_sticking

@@ -14,17 +14,15 @@ from estimation.effects.effect import (
     Row,
     Shape,
 )
+from estimation.effects.memory import BEGINNING, age
 from estimation.recording import FloatArray
 
 
 @numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
-        if not state[0]:
-            state[0], state[1] = 1.0, now[i, 1]
-        age = (now[i, 1] - state[1]) / shape[0]
-        rows[i, 0] = np.exp(-age) * np.tanh(now[i, 0] / shape[1])
+        past = age(now[i, 1], state) / shape[0]
+        rows[i, 0] = np.exp(-past) * np.tanh(now[i, 0] / shape[1])
 
 
 class Warmup(Remembering):
@@ -50,7 +48,7 @@ class Warmup(Remembering):
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=6),
     )
     walk = _walk
-    rest = (0.0, 0.0)
+    rest = BEGINNING
     told_apart_by = "the first run repeated at the end, and again after a night"
 
 

@@ -1,10 +1,21 @@
-"""States that several effects share: a first-order lag, and a contact that may stick."""
+"""States that several effects share: a run's age, a first-order lag, a contact that may stick."""
 
 import numba
 import numpy as np
 
 from estimation.effects.effect import Parameter
 from estimation.recording import FloatArray
+
+BEGINNING = (0.0, 0.0)
+"""State of `age` before the first sample: started (0 or 1), the time of the first sample."""
+
+
+@numba.njit(cache=True)
+def age(time: float, state: FloatArray) -> float:
+    """Return the time since the first sample."""
+    if not state[0]:
+        state[0], state[1] = 1.0, time
+    return float(time - state[1])
 
 
 @numba.njit(cache=True)

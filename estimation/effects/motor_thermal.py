@@ -14,6 +14,7 @@ from estimation.effects.effect import (
     Row,
     Shape,
 )
+from estimation.effects.memory import BEGINNING, age
 from estimation.recording import FloatArray
 
 
@@ -115,11 +116,8 @@ class MeasuredThermalLoss(Pointwise):
 
 @numba.njit(cache=True)
 def _walk_warming(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
-        if not state[0]:
-            state[0], state[1] = 1.0, now[i, 0]
-        rows[i, 0] = now[i, 1] * (1.0 - np.exp(-(now[i, 0] - state[1]) / shape[0]))
+        rows[i, 0] = now[i, 1] * (1.0 - np.exp(-age(now[i, 0], state) / shape[0]))
 
 
 class WarmingLoss(ThermalLoss):
@@ -140,4 +138,4 @@ class WarmingLoss(ThermalLoss):
     )
     shape = (Parameter("time_constant", "clock", "thermal time constant", 0.5, 100.0, points=6),)
     walk = _walk_warming
-    rest = (0.0, 0.0)
+    rest = BEGINNING

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import Parameter
+from estimation.effects.effect import READING, Parameter
 from estimation.effects.waves import Waves, harmonics_in
 
 
@@ -20,14 +20,7 @@ class OutputRipple(Waves):
     """
 
     id = "ripple.output"
-    balances: ClassVar = {
-        "motor": -1,
-        "gearbox": 1,
-        "cable": 1,
-        "stretch": 1,
-        "grasp": -1,
-        "joint": 1,
-    }
+    balances: ClassVar = {**READING, "motor": -1, "grasp": -1}
     roles: ClassVar = {"output_angle": "spindle_angle_rad"}
     # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
     shape = (Parameter("order", "1", "periods per turn", 1.0, 32.0, linear=True, points=63),)

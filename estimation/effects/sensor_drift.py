@@ -14,6 +14,7 @@ from estimation.effects.effect import (
     Row,
     Shape,
 )
+from estimation.effects.memory import BEGINNING, age
 from estimation.recording import FloatArray
 
 
@@ -60,11 +61,8 @@ class CampaignDrift(Pointwise):
 def _walk_exponential(
     now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray
 ) -> None:
-    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
-        if not state[0]:
-            state[0], state[1] = 1.0, now[i, 0]
-        rows[i, 0] = 1.0 - np.exp(-(now[i, 0] - state[1]) / shape[0])
+        rows[i, 0] = 1.0 - np.exp(-age(now[i, 0], state) / shape[0])
 
 
 class SettlingDrift(Remembering):
@@ -86,7 +84,7 @@ class SettlingDrift(Remembering):
     amplitudes = (Parameter("drift", "target", "warm zero minus cold zero"),)
     shape = (Parameter("time_constant", "clock", "time to reach 63 %", 0.5, 100.0, points=6),)
     walk = _walk_exponential
-    rest = (0.0, 0.0)
+    rest = BEGINNING
     told_apart_by = "the unloaded sensor at standstill before, during and after a run"
 
 
@@ -94,11 +92,8 @@ class SettlingDrift(Remembering):
 def _walk_logarithmic(
     now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray
 ) -> None:
-    """Fill the rows; state: started (0 or 1), the time of the first."""
     for i in range(len(now)):
-        if not state[0]:
-            state[0], state[1] = 1.0, now[i, 0]
-        rows[i, 0] = np.log1p((now[i, 0] - state[1]) / shape[0])
+        rows[i, 0] = np.log1p(age(now[i, 0], state) / shape[0])
 
 
 class LogarithmicDrift(SettlingDrift):
@@ -114,7 +109,6 @@ class LogarithmicDrift(SettlingDrift):
     """
 
     id = "sensor.drift.logarithmic"
-    family = "sensor.drift"
     amplitudes = (Parameter("drift", "target", "change per factor 2.7 of time"),)
     shape = (Parameter("onset", "clock", "time when the change slows", 0.05, 50.0, points=4),)
     walk = _walk_logarithmic

@@ -23,51 +23,35 @@ class Form(NamedTuple):
     Attributes:
         of: Function of the variable's values and the shape.
         shape: Name, unit over the role `{role}`, and meaning of each shape parameter.
-        text: The formula as text; `{x}` is the variable, `{0}`, `{1}` are the shape.
+        power: Of the variable's unit.
     """
 
     of: Callable[..., Any]
-    shape: tuple[tuple[str, str, str], ...]
-    text: str
+    shape: tuple[tuple[str, str, str], ...] = ()
+    power: int = 0
 
 
 _WIDTH = ("width", "{role}", "width of the change")
 _PLACE = ("place", "1", "position of its middle, in widths")
+_ORDER = ("order", "1 / {role}", "radians per unit")
+_TRAVEL = ("width", "{role}", "half the travel that crosses it")
 
 FORMS: Mapping[str, Form] = {
-    "value": Form(lambda x: x, (), "{x}"),
-    "absolute": Form(np.abs, (), "|{x}|"),
-    "square": Form(np.square, (), "{x}^2"),
-    "cube": Form(lambda x: x * np.square(x), (), "{x}^3"),
-    "sign": Form(lambda x, width: np.tanh(x / width), (_WIDTH,), "tanh({x} / {0:.3g})"),
-    "sine": Form(
-        lambda x, order: np.sin(order * x),
-        (("order", "1 / {role}", "radians per unit"),),
-        "sin({0:.4g} {x})",
-    ),
-    "cosine": Form(
-        lambda x, order: np.cos(order * x),
-        (("order", "1 / {role}", "radians per unit"),),
-        "cos({0:.4g} {x})",
-    ),
-    "bump": Form(
-        lambda x, width, place: np.exp(-np.square(x / width - place)),
-        (_WIDTH, _PLACE),
-        "bump({x}; {middle:.3g}, {0:.3g})",
-    ),
+    "value": Form(lambda x: x, power=1),
+    "absolute": Form(np.abs, power=1),
+    "square": Form(np.square, power=2),
+    "cube": Form(lambda x: x * np.square(x), power=3),
+    "sign": Form(lambda x, width: np.tanh(x / width), (_WIDTH,)),
+    "sine": Form(lambda x, order: np.sin(order * x), (_ORDER,)),
+    "cosine": Form(lambda x, order: np.cos(order * x), (_ORDER,)),
+    "bump": Form(lambda x, width, place: np.exp(-np.square(x / width - place)), (_WIDTH, _PLACE)),
     "step": Form(
-        lambda x, width, place: 0.5 * (1.0 + np.tanh(x / width - place)),
-        (_WIDTH, _PLACE),
-        "step({x}; {middle:.3g}, {0:.3g})",
+        lambda x, width, place: 0.5 * (1.0 + np.tanh(x / width - place)), (_WIDTH, _PLACE)
     ),
-    "play": Form(
-        lambda x, _: x,  # computed by `followed`
-        (("width", "{role}", "half the travel that crosses it"),),
-        "play({x}; {0:.3g})",
-    ),
+    "play": Form(lambda x, _: x, (_TRAVEL,)),  # computed by `followed`
 }
-"""Functions of one variable. `bump(x; c, s)` is exp(-((x - c) / s)^2), `step(x; c, s)` rises
-from 0 to 1 within about s of c, `play(x; s)` is the position in a free travel of +-s."""
+"""Functions of one variable. `bump` is exp(-(x / width - place)^2), `step` rises from 0 to 1 within
+about a width of its place, `play` is the position in a free travel of +-width."""
 
 
 class Product(Effect):
@@ -125,19 +109,6 @@ class Product(Effect):
             at += count
         return factors
 
-    def in_words(self, variables: Mapping[str, str], shape: Sequence[float]) -> str:
-        """Return the product as a readable formula.
-
-        Args:
-            variables: Role to the name of its variable.
-            shape: Values of the shape parameters.
-        """
-        words = []
-        for form, variable, own in self._factors(variables, shape):
-            middle = own[0] * own[1] if len(own) == 2 else 0.0
-            words.append(FORMS[form].text.format(*own, x=variable, middle=middle))
-        return " ".join(words)
-
     def __reduce__(self) -> tuple[object, ...]:
         """Serialise by name, for other processes."""
         return product, (self.id,)
@@ -150,8 +121,8 @@ def product(name: str) -> Product | None:
     if family != UNKNOWN or not 1 <= len(forms) <= MOST_FACTORS or not set(forms) <= set(FORMS):
         return None
     roles = dict(list(ROLES.items())[: len(forms)])
-    powers = [role for role, form in zip(roles, forms, strict=True) for _ in range(_power(form))]
-    unit = " / ".join(["target", *powers])
+    powers = (f" / {r}" * FORMS[f].power for r, f in zip(roles, forms, strict=True))
+    unit = "".join(["target", *powers])
     kind = type(
         "Product",
         (Product,),
@@ -170,11 +141,6 @@ def product(name: str) -> Product | None:
         },
     )
     return cast(Product, kind())
-
-
-def _power(form: str) -> int:
-    """Return the power of the variable's unit that a form has."""
-    return {"value": 1, "absolute": 1, "square": 2, "cube": 3}.get(form, 0)
 
 
 def _parameter(role: str, name: str, unit: str, meaning: str) -> Parameter:
