@@ -22,6 +22,12 @@ from estimation.recording import FloatArray, Recording
 
 PERIOD, PART = ", period ", ", part "
 
+PARTS, SHORTEST_PART_S = 10, 2.0
+"""Parts that few recordings are cut into, and the shortest."""
+
+REPEATS, SHORTEST_PERIOD_S, ALIKE = 3, 1.0, 0.7
+"""Periods that a path must have, the shortest, and the least correlation with the next one."""
+
 
 class SplitError(EstimationError):
     """The runs do not make a campaign that can be split."""
@@ -74,15 +80,9 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
     """Choose the test runs, stratified over the conditions.
 
     The training runs keep the least and the greatest value of every condition: a model is not
-    judged beyond its conditions.
-
-    Where there are enough new runs besides those of earlier diagnoses, only new ones become test
-    runs: a run confirms once.
-
-    Args:
-        recordings: Runs that count as evidence, three at least.
-        seed: Seed of the choice inside each stratum.
-        seen: Names of runs that an earlier diagnosis held.
+    judged beyond its conditions. Where there are enough new runs besides those that an earlier
+    diagnosis has seen, only new ones become test runs: a run confirms once. The seed chooses inside
+    each stratum.
 
     Raises:
         SplitError: Fewer than three runs, or runs of different rigs or instruments.
@@ -107,23 +107,11 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
 
 
 def cut_and_split(
-    recordings: Sequence[Recording],
-    seed: int = 0,
-    seen: Collection[str] = (),
-    parts: int = 10,
-    shortest_part_s: float = 2.0,
+    recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] = ()
 ) -> tuple[list[Recording], Sealed]:
-    """Choose the test runs; few recordings are cut into pieces that stand for runs.
+    """Return the runs and their split; few recordings are cut into pieces that stand for runs.
 
-    Args:
-        recordings: Any number.
-        seed: Seed of the choice.
-        seen: Names of recordings that an earlier diagnosis held; of two paths the new one tests.
-        parts: Parts that few recordings are cut into.
-        shortest_part_s: The shortest part.
-
-    Returns:
-        The runs or pieces, and their split.
+    Of two paths the one tests that no earlier diagnosis has seen.
 
     Raises:
         SplitError: The recordings are of different rigs or instruments; or one of two does not
@@ -132,10 +120,10 @@ def cut_and_split(
     number = len(recordings)
     if number == 2:
         return _split_paths(recordings, seed, seen)
-    each = math.ceil(parts / max(1, number))
+    each = math.ceil(PARTS / max(1, number))
     longest = min((float(np.ptp(r.time_s)) for r in recordings), default=0.0)
     enough = number - number // DEFAULT.runs_a_test_run >= DEFAULT.least_to_name
-    if enough or longest < each * shortest_part_s:
+    if enough or longest < each * SHORTEST_PART_S:
         return [*recordings], split(recordings, seed, seen)
     _check_one_rig(recordings)
     pieces = [
@@ -195,26 +183,18 @@ def periods(path: Recording) -> list[Recording]:
     return _pieces(path, (np.arange(k, min(k + length, len(path))) for k in starts), PERIOD)
 
 
-def period_samples(
-    path: Recording, repeats: int = 3, shortest_s: float = 1.0, alike: float = 0.7
-) -> int:
+def period_samples(path: Recording) -> int:
     """Return the length of a path's period: where its positions are most like themselves.
 
-    Args:
-        path: The path.
-        repeats: Periods that it must have.
-        shortest_s: Shortest period.
-        alike: Least correlation of the path with itself one period later.
-
     Raises:
-        SplitError: It does not repeat itself so many times.
+        SplitError: It does not repeat itself often enough.
     """
     angles = [
         values
         for name, values in path.columns.items()
         if ("angle" in name or "position" in name) and np.ptp(values) > 0
     ]
-    shortest, longest = round(shortest_s * path.sample_rate_hz), len(path) // repeats
+    shortest, longest = round(SHORTEST_PERIOD_S * path.sample_rate_hz), len(path) // REPEATS
     likeness = np.mean([_likeness(x)[: longest + 1] for x in angles] or [np.zeros(1)], axis=0)
     # what is near lag zero is alike because nothing has moved yet
     apart = int(np.argmax(likeness < 0.5)) if (likeness < 0.5).any() else len(likeness)
@@ -223,9 +203,9 @@ def period_samples(
     near = np.flatnonzero(likeness >= likeness.max() - 0.02)
     first = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)[0]
     best = int(first[np.argmax(likeness[first])])
-    if likeness[best] < alike:
+    if likeness[best] < ALIKE:
         raise SplitError(
-            f"Path {path.name!r} does not repeat itself {repeats} times.",
+            f"Path {path.name!r} does not repeat itself {REPEATS} times.",
             "With two recordings only, whole periods of one stand for runs, and there are none.",
             "Record three runs at least, or paths of several periods.",
         )
@@ -304,7 +284,6 @@ def _hash(*parts: str) -> str:
 
 
 def _check_one_rig(recordings: Sequence[Recording]) -> None:
-    """Raise when the runs come from different rigs or instruments."""
     for what, found in (
         ("rigs", {r.rig for r in recordings}),
         ("instruments", {f"{r.instrument.model} {r.instrument.serial}" for r in recordings}),

@@ -16,6 +16,9 @@ from rig.errors import MissingExtraError, UsageError
 Start = Callable[[], AbstractContextManager[Executor | None]]
 """Starts what work is given to: processes, a cluster, or None for this process."""
 
+ATTEMPTS = 4
+"""Pools that are started before a folder that ends them is given up."""
+
 T = TypeVar("T")
 
 
@@ -77,23 +80,16 @@ def for_each(
     work: Callable[[Path], T],
     start: Start,
     on_done: Callable[[Path, T], None],
-    attempts: int = 4,
 ) -> dict[Path, T]:
-    """Do the work on each folder that has no kept result, and return all results.
+    """Do the work, which can be pickled, on each folder that has no kept result.
 
-    Args:
-        folders: The folders.
-        kept: Returns the result that a folder has already.
-        work: What is done with one of the others; it can be pickled.
-        start: Starts what the work is given to.
-        on_done: Called in this process with each folder and its result.
-        attempts: Pools that are started before a folder that ends them is given up.
+    `on_done` is called in this process with each folder and its result. All results are returned.
 
     Raises:
         BrokenExecutor: Processes end again and again.
     """
     found = {folder: one for folder in folders if (one := kept(folder)) is not None}
-    for attempt in range(attempts):
+    for attempt in range(ATTEMPTS):
         missing = [folder for folder in folders if folder not in found]
         if not missing:
             break
@@ -103,7 +99,7 @@ def for_each(
                     on_done(folder, result)
                     found[folder] = result
         except BrokenExecutor:
-            if attempt == attempts - 1:
+            if attempt == ATTEMPTS - 1:
                 raise
     return {folder: found[folder] for folder in folders}
 
