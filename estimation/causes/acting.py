@@ -5,12 +5,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.causes.candidates import (
-    Candidate,
-    Claim,
-)
+from estimation.causes.blocks import Products
+from estimation.causes.candidates import Candidate, Claim
 from estimation.causes.joint import Joint
-from estimation.causes.scoring import ByRun
 from estimation.recording import FloatArray
 
 PARTIAL, CHOICES = 24, 6
@@ -20,24 +17,19 @@ TURNS = 4
 """Turns of fitting an effect to the runs that have it, and of choosing these runs."""
 
 
-def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, ByRun]]) -> list[Claim]:
-    """Return named effects that act in some of the runs, as promising as there are.
-
-    Args:
-        joint: The regression.
-        everything: Causes, each with its products by run.
-    """
+def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, Products]]) -> list[Claim]:
+    """Return named effects that act in some of the runs, as promising as there are."""
     count = len(joint.runs)
     if count < 6:
         return []
     inverse = joint.left_out([[]]).inverse[0]
-    named: dict[int, list[tuple[Claim, ByRun]]] = {}
+    named: dict[int, list[tuple[Claim, Products]]] = {}
     for claim, by_run in everything:
         if not claim.is_function:
-            named.setdefault(by_run[0].shape[1], []).append((claim, by_run))
+            named.setdefault(by_run.target.shape[1], []).append((claim, by_run))
     promise: list[tuple[float, Claim, NDArray[np.bool_]]] = []
     for group in named.values():
-        products = tuple(np.stack([by_run[i] for _, by_run in group]) for i in range(3))
+        products = Products(*map(np.stack, zip(*(by_run for _, by_run in group), strict=True)))
         for acts in _acting(inverse, products):
             gains = _removed(inverse, *(_over(acts, x) for x in products))
             acting = acts.sum(axis=1)
@@ -65,13 +57,13 @@ def one_run_changed(candidate: Candidate) -> Iterator[Claim]:
             yield Claim(candidate.cause, changed, candidate.choices)
 
 
-def _acting(inverse: FloatArray, products: tuple[FloatArray, ...]) -> Iterator[NDArray[np.bool_]]:
+def _acting(inverse: FloatArray, products: Products) -> Iterator[NDArray[np.bool_]]:
     """Yield choices of runs in which candidates act, shape (candidates, runs).
 
     Each order of the runs is cut where most error goes. From there, the amplitudes and the base are
     fitted to the runs that act, and the runs chosen again in which they lower the error, in turn.
     """
-    cross, own, base = products
+    base, own, cross = products
     candidates, count = cross.shape[:2]
     order = np.broadcast_to(np.arange(count), (candidates, count))
     sizes = np.argsort(_sizes(cross, own), axis=1)
@@ -83,7 +75,7 @@ def _acting(inverse: FloatArray, products: tuple[FloatArray, ...]) -> Iterator[N
         acts[every, runs] = np.arange(count) < cut[:, None] + 2
         yield acts
         for _ in range(TURNS):
-            right, square, across = (_over(acts, x) for x in products)
+            across, square, right = (_over(acts, x) for x in products)
             through = inverse @ across
             fitted = solved(right, square - across.swapaxes(-1, -2) @ through)
             moved = -(through @ fitted[..., None])[..., 0]
@@ -94,7 +86,7 @@ def _acting(inverse: FloatArray, products: tuple[FloatArray, ...]) -> Iterator[N
 
 
 def _over(acts: NDArray[np.bool_], products: FloatArray) -> FloatArray:
-    """Return the sum of products over the runs in which each candidate acts."""
+    """Return the sum over the runs in which each candidate acts."""
     return np.asarray(np.einsum("cr,cr...->c...", acts, products))
 
 
@@ -110,16 +102,9 @@ def _sizes(cross: FloatArray, own: FloatArray) -> FloatArray:
 
 
 def _removed(
-    inverse: FloatArray, cross: FloatArray, own: FloatArray, base: FloatArray
+    inverse: FloatArray, base: FloatArray, own: FloatArray, cross: FloatArray
 ) -> FloatArray:
-    """Return the error that amplitudes remove, fitted together with the base.
-
-    Args:
-        inverse: Of the base's normal matrix, shape (base, base).
-        cross: Products of the columns with the base's residual, shape (..., k).
-        own: With themselves, shape (..., k, k).
-        base: Of the base's columns with them, shape (..., base, k).
-    """
+    """Return the error that amplitudes remove, fitted together with the base, shape (...,)."""
     beyond = own - base.swapaxes(-1, -2) @ inverse @ base
     return np.asarray((cross * solved(cross, beyond)).sum(axis=-1))
 

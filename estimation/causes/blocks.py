@@ -4,8 +4,9 @@ Candidates of one place with as many columns each share every step, so a search 
 them costs a few large products.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,31 +17,43 @@ from estimation.causes.laid import Columns, Laid, products
 from estimation.recording import FloatArray
 
 
+class Products(NamedTuple):
+    """Products of causes' columns in each run.
+
+    Attributes:
+        base: The base's columns times the causes', shape (runs, causes, base, k).
+        own: The causes' columns times themselves, shape (runs, causes, k, k).
+        target: The causes' columns times the target, shape (runs, causes, k).
+    """
+
+    base: FloatArray
+    own: FloatArray
+    target: FloatArray
+
+
 @dataclass(frozen=True)
 class Block:
-    """Cross-products of causes with a regression's base, run by run.
+    """Cross-products of causes with a regression's base.
 
     Attributes:
         laid: The causes.
-        base: Part to the base's columns times the causes', shape (runs, causes, base, k).
-        own: Part to the causes' columns times themselves, shape (runs, causes, k, k).
-        target: Part to the causes' columns times the target, shape (runs, causes, k).
+        of: Part to its products.
         taken: How much of each declared column was taken off them, (causes, declared, k).
     """
 
     laid: Laid
-    base: Mapping[Part, FloatArray]
-    own: Mapping[Part, FloatArray]
-    target: Mapping[Part, FloatArray]
+    of: Mapping[Part, Products]
     taken: FloatArray
 
     def only(self, chosen: NDArray[np.bool_]) -> "Block":
         """Return some of the causes."""
-        base, own, target = (
-            {p: x[:, chosen] for p, x in kind.items()}
-            for kind in (self.base, self.own, self.target)
-        )
-        return Block(self.laid.only(chosen), base, own, target, self.taken[chosen])
+        of = {p: Products(*(x[:, chosen] for x in known)) for p, known in self.of.items()}
+        return Block(self.laid.only(chosen), of, self.taken[chosen])
+
+    def summed(self, weights: Mapping[Part, float], parts: Iterable[Part]) -> Products:
+        """Return the weighted sum of the products of some parts."""
+        weighted = [[weights[p] * x for x in self.of[p]] for p in parts]
+        return Products(*(np.asarray(sum(kind)) for kind in zip(*weighted, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -54,10 +67,7 @@ class Outcome:
         changes: Equation to the factor by which its largest linear term changes, shape (causes,).
         slopes: Equation to the factor of each channel times a constant within runs, the causes'
             own contribution included, shape (causes, channels).
-        cross: Products of the columns with the base's residual within runs, weighted, shape
-            (runs, causes, k).
-        own: Products of the columns with themselves, shape (runs, causes, k, k).
-        base: Products of the base's columns with the columns, shape (runs, causes, base, k).
+        by_run: Weighted products within runs, with the base's residual as the target.
     """
 
     promising: NDArray[np.bool_]
@@ -65,66 +75,50 @@ class Outcome:
     amplitudes: FloatArray
     changes: Mapping[str, FloatArray]
     slopes: Mapping[str, FloatArray]
-    cross: FloatArray
-    own: FloatArray
-    base: FloatArray
+    by_run: Products
 
 
 def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
-    """Return the cross-products of causes with a regression.
-
-    Args:
-        joint: The regression.
-        laid: The causes.
-        known: Their products with a regression of which this one is an extension.
-    """
-    base, own, target = {}, {}, {}
-    runs, k = len(joint.runs), laid.size.shape[1]
+    """Return causes' products with a regression; those with a part of its base may be known."""
+    of, runs, k = {}, len(joint.runs), laid.size.shape[1]
     for p in joint.parts:
         name, kind = p
         if name not in laid.inner:
             continue
         columns: Columns = laid.inner[name] if kind == "within" else laid.means[name][:, :, None]
         table, places = joint.tables[p].astype(columns.dtype), [*joint.at[p]]
-        base[p] = np.zeros((runs, len(laid), joint.size, k))
+        base = np.zeros((runs, len(laid), joint.size, k))
         if known is None:
             product = products(table[:, None], columns)
-            base[p][:, :, places] = product[:, :, :-1]
-            target[p], own[p] = product[:, :, -1], products(columns, columns)
+            base[:, :, places] = product[:, :, :-1]
+            of[p] = Products(base, products(columns, columns), product[:, :, -1])
             continue
-        before = known.base[p].shape[2]
-        base[p][:, :, :before] = known.base[p]
+        before = known.of[p].base.shape[2]
+        base[:, :, :before] = known.of[p].base
         new = [i for i, place in enumerate(places) if place >= before]
         if new:
             added = products(table[:, None, :, new], columns)
-            base[p][:, :, [places[i] for i in new]] = added
-        target[p], own[p] = known.target[p], known.own[p]
-    return Block(laid, base, own, target, joint.taken_off(laid) if known is None else known.taken)
+            base[:, :, [places[i] for i in new]] = added
+        of[p] = known.of[p]._replace(base=base)
+    return Block(laid, of, joint.taken_off(laid) if known is None else known.taken)
 
 
 def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) -> Outcome:
     """Fit every cause together with the base and return its errors on what was left out.
 
-    Args:
-        joint: The regression.
-        block: The causes.
-        folds: Families of folds.
-        precision: Prior precision of every amplitude, shape (causes, k).
+    Prior precisions of the amplitudes have the shape (causes, k).
     """
     (base,), (amplitudes,) = _Fitting(joint, block, precision).left_out([[]])
     promising = _gain(joint, block, base, amplitudes) >= joint.numbers.cause_cost
     errors = []
     if promising.any():
         errors = _errors(joint, block.only(promising), folds, precision[promising])
-    inside, usual = [p for p in block.base if p[1] == "within"], joint.left_out([[]]).base[0]
-    weights, zero = joint.weights, np.zeros(())
-    cross, own, right = (
-        np.asarray(sum((weights[p] * kind[p] for p in inside), zero))
-        for kind in (block.base, block.own, block.target)
-    )
+    inside, usual = [p for p in block.of if p[1] == "within"], joint.left_out([[]]).base[0]
+    weights = joint.weights
+    cross, own, right = block.summed(weights, inside)
     declared = joint.whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
     changes, slopes = {}, {}
-    for name in {name for name, _ in block.base}:
+    for name in {name for name, _ in block.of}:
         at = [*joint.linear(name)]
         usual_there = joint.whole(usual)[at]
         factor = np.where(usual_there == 0.0, 1.0, usual_there)
@@ -134,15 +128,15 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
             largest = at.index(joint.largest_linear[name][0])
             changes[name] = declared[:, at[largest]] / factor[largest]
     # the columns as they were before declared ones were taken off: in some runs these differ
-    gram = np.asarray(sum((weights[p] * joint.gram[p] for p in inside), zero))
+    gram = np.asarray(sum(weights[p] * joint.gram[p] for p in inside))
     count = block.taken.shape[1]
     mixed = block.taken.swapaxes(1, 2) @ cross[:, :, :count]
     own = own + mixed + mixed.swapaxes(2, 3)
     own += block.taken.swapaxes(1, 2) @ gram[:, None, :count, :count] @ block.taken
     right = right + (gram[:, None, None, :count, -1] @ block.taken)[:, :, 0]
     cross = cross + gram[:, None, :-1, :count] @ block.taken
-    residual = right - (usual @ cross)
-    return Outcome(promising, errors, amplitudes, changes, slopes, residual, own, cross)
+    by_run = Products(cross, own, right - usual @ cross)
+    return Outcome(promising, errors, amplitudes, changes, slopes, by_run)
 
 
 def _errors(
@@ -163,21 +157,11 @@ def _errors(
 
 
 class _Fitting:
-    """Causes of a block, fitted together with the base.
-
-    Args:
-        joint: The regression.
-        block: The causes.
-        precision: Prior precision of every amplitude, shape (causes, k).
-    """
+    """Causes of a block, fitted together with the base."""
 
     def __init__(self, joint: Joint, block: Block, precision: FloatArray) -> None:
         self.joint, self.precision = joint, precision
-        weights, zero = joint.weights, np.zeros(())
-        self._sums = [
-            np.asarray(sum((weights[p] * kind[p] for p in block.base), zero))
-            for kind in (block.base, block.own, block.target)
-        ]
+        self._sums = block.summed(joint.weights, block.of)
         self._of_prior = joint.prior_products(block.taken)
         declared = self._of_prior[:, : block.taken.shape[1]]
         self._own_prior = -block.taken.swapaxes(1, 2) @ declared
@@ -204,9 +188,7 @@ def _gain(joint: Joint, block: Block, base: FloatArray, amplitudes: FloatArray) 
     usual, total = np.append(joint.left_out([[]]).base[0], -1.0), np.zeros(len(base))
     for p in joint.parts:
         gram, samples = joint.gram[p].sum(axis=0), joint.samples[p].sum()
-        products = None
-        if p in block.base:
-            products = [x[p].sum(axis=0)[None] for x in (block.base, block.own, block.target)]
+        products = Products(*(x.sum(axis=0)[None] for x in block.of[p])) if p in block.of else None
         (error,) = _residual(gram[None], products, base[None], amplitudes[None])
         before = float(usual @ gram @ usual)
         total += joint.log_ratio(p, max(before, 0.0) / samples, error / samples)
@@ -218,7 +200,7 @@ def _per_unit(
 ) -> FloatArray:
     """Return the slopes of causes' contribution over declared columns, (causes, columns)."""
     across = joint.gram[p][:, at, : block.taken.shape[1]].sum(axis=0)
-    raw = block.base[p][:, :, at].sum(axis=0) + np.einsum("jd,cdk->cjk", across, block.taken)
+    raw = block.of[p].base[:, :, at].sum(axis=0) + np.einsum("jd,cdk->cjk", across, block.taken)
     own = across[range(len(at)), at]
     return np.asarray(np.einsum("cjk,ck->cj", raw, amplitudes) / np.where(own > 0.0, own, 1.0))
 
@@ -232,9 +214,7 @@ def _squared(
     amplitudes: FloatArray,
 ) -> FloatArray:
     """Return squared errors of runs, (n, causes), of parameters (n, causes, .)."""
-    products = None
-    if p in block.base:
-        products = [x[p][runs] for x in (block.base, block.own, block.target)]
+    products = Products(*(x[runs] for x in block.of[p])) if p in block.of else None
     error = _residual(joint.gram[p][runs], products, base, amplitudes)
     next_to = Next(block.laid, amplitudes, (block.taken @ amplitudes[..., None])[..., 0])
     return np.asarray(error + joint.avoided(p, runs, base, next_to))
@@ -242,23 +222,15 @@ def _squared(
 
 def _residual(
     gram: FloatArray,
-    products: Sequence[FloatArray] | None,
+    products: Products | None,
     base: FloatArray,
     amplitudes: FloatArray,
 ) -> FloatArray:
-    """Return squared residuals, (n, causes), from cross-products.
-
-    Args:
-        gram: Of the base and, last, the target, shape (n, base + 1, base + 1).
-        products: Of the causes with the base, themselves and the target; None without columns.
-        base: Parameters of the base, shape (n, causes, base).
-        amplitudes: Of the causes, shape (n, causes, k).
-    """
+    """Return squared residuals, (n, causes), of parameters (n, causes, .) from cross-products."""
     error = ((base @ gram[:, :-1, :-1]) * base).sum(axis=2) + gram[:, None, -1, -1]
     error -= 2.0 * (base @ gram[:, :-1, -1:])[..., 0]
     if products is not None:
-        of_base, of_causes, of_target = products
-        across = (base[:, :, None] @ of_base)[:, :, 0]
-        own = (amplitudes[:, :, None] @ of_causes)[:, :, 0]
-        error += ((2.0 * (across - of_target) + own) * amplitudes).sum(axis=2)
+        across = (base[:, :, None] @ products.base)[:, :, 0]
+        own = (amplitudes[:, :, None] @ products.own)[:, :, 0]
+        error += ((2.0 * (across - products.target) + own) * amplitudes).sum(axis=2)
     return np.asarray(np.maximum(error, 0.0))

@@ -160,18 +160,12 @@ def _choices(cause: Source | Function, count: Mapping[tuple[str, str], int]) -> 
 
 
 def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
-    """Return causes laid out; those that show nowhere are left out.
-
-    Args:
-        joint: The regression without causes, or with some.
-        wanted: The causes, those of one place after one another.
-    """
+    """Return causes laid out that come place by place; those that show nowhere are left out."""
     out: list[Group] = []
     for _, at_one in itertools.groupby(wanted, lambda one: one.cause.place.name):
         waiting: dict[object, list[Raw]] = {}
         for one in at_one:
-            columns = _columns(one, joint.runs)
-            if columns is None:
+            if (columns := _columns(one, joint.runs)) is None:
                 continue
             noisy = _is_noisy(joint.layout, one)
             shaken = _columns(one, joint.layout.shaken) if noisy else None
@@ -196,8 +190,7 @@ def _columns(one: Claim, runs: Sequence[RunSignals]) -> list[Mapping[str, FloatA
     """Return a cause's columns of every run; None where one is not finite."""
     columns = []
     for k, run in enumerate(runs):
-        own = one.cause.columns(run)
-        if own is None:
+        if (own := one.cause.columns(run)) is None:
             return None
         if one.acts is not None and not one.acts[k]:
             own = {name: np.zeros_like(values) for name, values in own.items()}
@@ -247,7 +240,6 @@ def without_declared(
 
 
 def _apart(shaken: OfRuns, columns: OfRuns) -> OfRuns:
-    """Return by how much columns differ."""
     return [
         {name: x - own[name] for name, x in one.items()}
         for one, own in zip(shaken, columns, strict=True)

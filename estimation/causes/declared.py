@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimation.causes.blocks import Products
 from estimation.causes.candidates import Claim
 from estimation.causes.equations import Layout
 from estimation.causes.instruments import instrumented
 from estimation.causes.joint import Joint
 from estimation.causes.places import places_of
-from estimation.causes.scoring import ByRun
 from estimation.causes.sources import Source
 from estimation.effects import effect
 from estimation.fit_problem import OFFSET
@@ -70,7 +70,7 @@ def drives_of(layout: Layout) -> Iterator[Moved]:
             yield Moved(place, effect("motor.torque_constant"), (("source", target),), (), (0,))
 
 
-def moved_terms(joint: Joint) -> list[tuple[Claim, ByRun]]:
+def moved_terms(joint: Joint) -> list[tuple[Claim, Products]]:
     """Return the declared terms as causes that act in no run yet, with their products by run.
 
     In all runs they are the base itself, so they compete only for acting in some. So does the gain
@@ -90,5 +90,5 @@ def moved_terms(joint: Joint) -> list[tuple[Claim, ByRun]]:
         products = weights[part] * joint.gram[part] @ terms[:, None]
         base = products[:, :-1]
         cross = products[:, -1] - np.einsum("b,rbk->rk", usual, base)
-        out.append((Claim(one), (cross, (terms @ products)[..., None], base)))
+        out.append((Claim(one), Products(base, (terms @ products)[..., None], cross)))
     return out

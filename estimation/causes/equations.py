@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +108,20 @@ class RunSignals:
         return found
 
 
+class Column(NamedTuple):
+    """A declared column.
+
+    Attributes:
+        sign: With which its term enters.
+        channel: What it is a constant times; empty where it is another function.
+        of_shape: Whether it is the derivative by a shape.
+    """
+
+    sign: int
+    channel: str
+    of_shape: bool
+
+
 @dataclass(frozen=True)
 class Equation:
     """One declared equation, fitted on the training runs.
@@ -158,28 +173,15 @@ class Equation:
         return np.hstack(parts)
 
     @cached_property
-    def of_shape(self) -> list[bool]:
-        """Which of the columns are derivatives by a shape."""
-        kinds = []
-        for term in self.terms:
-            kinds += [False] * len(term.effect.amplitudes) + [True] * len(term.effect.shape)
-        return kinds
-
-    @cached_property
-    def signs(self) -> list[int]:
-        """The sign with which each column's term enters."""
-        counts = [len(t.effect.amplitudes) + len(t.effect.shape) for t in self.terms]
-        return [t.sign for t, count in zip(self.terms, counts, strict=True) for _ in range(count)]
-
-    @cached_property
-    def of_channel(self) -> list[str]:
-        """The channel that each column is a constant times, or nothing."""
-        channels = []
+    def kinds(self) -> list[Column]:
+        """What each of the columns is."""
+        found = []
         for term in self.terms:
             linear = isinstance(term.effect, Proportional)
             channel = next(iter(term.channels.values())) if linear else ""
-            channels += [channel] * (len(term.effect.amplitudes) + len(term.effect.shape))
-        return channels
+            found += [Column(term.sign, channel, False)] * len(term.effect.amplitudes)
+            found += [Column(term.sign, channel, True)] * len(term.effect.shape)
+        return found
 
     def noise(self, run: RunSignals) -> FloatArray:
         """Return the noise in `columns` and in the target, (n, k + 1).
@@ -255,12 +257,7 @@ class Layout:
 def lay_out(
     models: Sequence[Model], recordings: Sequence[Recording], train: Sequence[str]
 ) -> Layout:
-    """Fit declared equations on the training runs and lay out every run.
-
-    Args:
-        models: Declared models, one an equation.
-        recordings: All runs.
-        train: Names of the runs that may be fitted on.
+    """Fit declared models, one an equation, on the training runs and lay out every run.
 
     Raises:
         LayoutError: No run has samples enough to regress on.
@@ -345,13 +342,7 @@ def _thinned(run: RunSignals, every: int) -> RunSignals:
 def sensitivity(name: str, measured: str, signals: Signals) -> tuple[float, int] | None:
     """Return how a channel follows an error of a measured one: (gain, times differentiated).
 
-    Args:
-        name: Measured or derived channel.
-        measured: Measured channel whose reading is wrong.
-        signals: The machine's derived channels.
-
-    Returns:
-        None where the channel does not read it.
+    None where the channel, measured or derived, does not read it.
     """
     if (combination := signals.combination(name)) is not None:
         gain = combination.gain(measured)
@@ -382,7 +373,7 @@ def equation_of(model: Model) -> Equation:
         if isinstance(term.effect, Proportional) and term.effect.id != OFFSET:
             (channel,) = term.channels.values()
             channels[channel] = channels.get(channel, 0.0) + float(term.weights[0])
-        if term.effect.id == "friction.coulomb":
+        if term.effect.id == COULOMB:
             speed, width = term.channels["speed"], term.values["width"].value
     return Equation(model.balance, with_prediction(model), channels, speed, width)
 
@@ -462,13 +453,8 @@ def _used(
     grid: NDArray[np.intp],
 ) -> NDArray[np.intp]:
     """Return the places of the grid that an equation counts: those in motion, with friction."""
-    speed = _friction_speed(model)
+    speed = next((t.channels["speed"] for t in model.terms if t.effect.id == COULOMB), "")
     if not speed or model.counted == "all":
         return np.arange(len(grid))
     moving = in_motion(channels[speed], valid, rate_hz, model.signals.rest.get(speed, 0.0))
     return np.flatnonzero(moving[grid])
-
-
-def _friction_speed(model: Model) -> str:
-    """Return the channel of the speed that declared friction depends on; empty without."""
-    return next((t.channels["speed"] for t in model.terms if t.effect.id == COULOMB), "")

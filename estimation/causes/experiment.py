@@ -61,12 +61,7 @@ class Question:
 
 
 def question(answer: Answer, place: int) -> Question | None:
-    """Return the hypotheses that an experiment should separate; None where the name is sure.
-
-    Args:
-        answer: The diagnosis.
-        place: Place of the finding.
-    """
+    """Return what an experiment should separate of the finding at a place; None if it is sure."""
     if answer.diagnosis.findings[place].verdict == "identified":
         return None
     joint = answer.found.joint
@@ -86,10 +81,7 @@ def question(answer: Answer, place: int) -> Question | None:
     total = sum(share for share, _ in likely)
     found = tuple(
         Hypothesis(
-            _label(one),
-            share / total,
-            one.candidate.cause,
-            one.amplitudes / one.candidate.size,
+            _label(one), share / total, one.candidate.cause, one.amplitudes / one.candidate.size
         )
         for share, one in likely
     )
@@ -99,12 +91,8 @@ def question(answer: Answer, place: int) -> Question | None:
 def separation(asked: Question, recordings: Sequence[Recording]) -> float | None:
     """Return the expected distance of the hypotheses on simulated runs, in variances of the noise.
 
-    Args:
-        asked: The hypotheses.
-        recordings: Simulated runs of one experiment, with the campaign's time.
-
-    Returns:
-        None where no run has a sample of the equations.
+    The runs are of one experiment and have the campaign's time; None where none has a sample of the
+    equations.
     """
     try:
         layout = laid_out_like(asked.layout, recordings)

@@ -161,12 +161,7 @@ def parameters_of(kept: Kept, home: str, written: Sequence[Model]) -> Mapping[st
 
 
 def others_in_set(name: str, shares: Mapping[str, float]) -> list[str]:
-    """Return the names besides one that a verdict lists.
-
-    Args:
-        name: The name.
-        shares: Every name to its probability, the likeliest first.
-    """
+    """Return the names besides one that a verdict lists, of all with their probabilities."""
     covered, others = shares[name], list[str]()
     for other, share in shares.items():
         if other != name and covered < (IN_SET if others else SURE) * sum(shares.values()):
@@ -195,6 +190,5 @@ def _variables(candidate: Candidate) -> tuple[str, ...]:
 
 
 def _same(one: Term, other: Term) -> bool:
-    """Whether two terms are of one effect at one shape."""
     shape = one.effect.shape
     return one.effect.id == other.effect.id and one.numbers(shape) == other.numbers(shape)

@@ -123,38 +123,27 @@ def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
 
 def variables_at(layout: Layout, place: Place) -> list[str]:
     """Return the variables a cause at a place may depend on, simplest first."""
-    roles = place.roles
     found = []
-    if "speed" in roles and direction_width(layout, place):
+    if "speed" in place.roles and direction_width(layout, place):
         found += ["velocity_sign", "velocity"]
-    if "position" in roles:
-        found.append("position")
-    if "load" in roles:
-        found.append("load")
-    if "current" in roles:
-        found.append("current")
-    if "acceleration" in roles and place.kind == "loss":
-        found.append("acceleration")
-    if "travel" in roles:
-        found.append("history")
-    if "speed" in roles:
-        found.append("dwell")
-    if "temperature" in roles:
-        found.append("temperature")
-    found.append("time")
-    return found
+    others = ["position", "load", "current", "acceleration", "history", "dwell", "temperature"]
+    if place.kind != "loss":
+        others.remove("acceleration")
+    found += [v for v in others if ROLE_OF_VARIABLE.get(v, v) in place.roles]
+    return [*found, "time"]
 
 
 def turns(layout: Layout, place: Place) -> bool:
-    """Return whether a place has a shaft that turns often enough to repeat anything."""
+    """Whether a place has a shaft that turns often enough to repeat anything."""
     angle = place.roles.get("position", ("",))[0]
     return angle.endswith("_angle_rad") and travel_of(layout, angle) > LEAST_TURNS * TURN
 
 
-def reported(place: Place, variable: str) -> str:
-    """Return the name under which a variable of a place is reported."""
-    known = variable in ("position", "turn", *itertools.chain(*place.others))
-    return name_of_channel(_read(place, variable)) if known else variable
+def names(place: Place, variables: Sequence[str]) -> tuple[str, ...]:
+    """Return the names under which a function's variables are reported."""
+    by_channel = ("position", "turn", *itertools.chain(*place.others))
+    found = (name_of_channel(_read(place, v)) if v in by_channel else v for v in variables)
+    return tuple(dict.fromkeys(found))
 
 
 def name_of_channel(channel: str) -> str:
@@ -262,8 +251,3 @@ def _rested(resting: FloatArray, period_s: float) -> FloatArray:
             since += period_s
         out[i] = np.log1p(rest / GROWTH_S) * np.exp(-since / FADE_S)
     return out
-
-
-def names(place: Place, variables: Sequence[str]) -> tuple[str, ...]:
-    """Return the names under which a function's variables are reported."""
-    return tuple(dict.fromkeys(reported(place, v) for v in variables))

@@ -43,10 +43,8 @@ class Gains:
     def log_ratio(self, per_score: float) -> float:
         """Return the logarithm of the likelihood ratio of all runs.
 
-        In each run it is that of the mean of acting and not acting.
-
-        Args:
-            per_score: Log likelihood ratio for one unit of score in one run.
+        In each run it is that of the mean of acting and not acting, and `per_score` for one unit of
+        score.
         """
         return float(
             sum(
@@ -65,14 +63,7 @@ class Gains:
 
 
 class HeldOut:
-    """The evidence of the test runs for each cause.
-
-    Args:
-        layout: All runs.
-        sealed: Which runs train and which test.
-        numbers: What decides.
-        late: Short delays of readings that are part of the base.
-    """
+    """The evidence of the test runs for each cause, next to short delays of late readings."""
 
     def __init__(
         self, layout: Layout, sealed: Sealed, numbers: Numbers, late: Sequence[Claim] = ()

@@ -5,12 +5,13 @@ that an equation reads (a torque, a force, a current) is therefore replaced by i
 through the other declared equations: an instrumental variable. Angles are used as measured.
 """
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from estimation.causes.equations import ANGLES, Equation, Layout, RunSignals
+from estimation.causes.equations import ANGLES, RATES, Equation, Layout, RunSignals
 from estimation.filters import FilterError, zero_phase
 from estimation.recording import FloatArray
 
@@ -31,11 +32,8 @@ def add_instruments(layout: Layout, train: Sequence[str]) -> None:
 
     A prediction stands in for a reading where it is the better of the two: where its discrepancy
     to the reading is at most the equation's residual, which holds the reading's noise. Else
-    a target is replaced by its own equation's estimate if that is quieter.
-
-    Args:
-        layout: The equations and all runs.
-        train: Names of the runs that decide which reading is replaced.
+    a target is replaced by its own equation's estimate if that is quieter. The training runs
+    decide which reading is replaced.
     """
     torques = [e for e in layout.equations.values() if not e.of_angle]
     trained = {run.name for run in layout.runs} & set(train)
@@ -70,13 +68,7 @@ def declared_of(equation: Equation, run: RunSignals) -> FloatArray:
 
 
 def noise_share(runs: Sequence[RunSignals], channel: str, cutoff_hz: float = np.inf) -> float:
-    """Return the noise of a channel over all that it holds, the median over runs.
-
-    Args:
-        runs: The runs.
-        channel: The channel.
-        cutoff_hz: Of a further filter of both.
-    """
+    """Return the noise of a channel over all that it holds below a cutoff, the median over runs."""
     sizes = [
         [_below(x[channel], run, cutoff_hz)[run.grid].std() for x in (run.noise, run.channels)]
         for run in runs
@@ -88,14 +80,13 @@ def noise_share(runs: Sequence[RunSignals], channel: str, cutoff_hz: float = np.
 def noisy_bands(equation: Equation, runs: Sequence[RunSignals]) -> list[tuple[int, float]]:
     """Return the noisy bands of the columns that are a channel times a constant.
 
-    Returns:
-        The place of each among the declared columns, and the cutoff that the band is above, Hz.
+    Of each, its place among the declared columns and the cutoff that the band is above, Hz.
     """
     return [
         (k, cutoff_hz)
-        for k, channel in enumerate(equation.of_channel)
-        if channel
-        for cutoff_hz in _cutoffs(runs, channel)
+        for k, column in enumerate(equation.kinds)
+        if column.channel
+        for cutoff_hz in _cutoffs(runs, column.channel)
     ]
 
 
@@ -139,23 +130,9 @@ def _declared(equation: Equation, run: RunSignals) -> FloatArray:
 
 def _efforts(equation: Equation) -> list[str]:
     """Return the channels of an equation that are efforts: neither angles nor their derivatives."""
-    names = [n for n in equation.channels if not _is_motion(n)]
+    motion = (*ANGLES, *itertools.chain(*RATES.values()))
+    names = [n for n in equation.channels if not n.endswith(motion) and "_rate_" not in n]
     return names if equation.of_angle else [equation.target, *names]
-
-
-def _is_motion(channel: str) -> bool:
-    return (
-        channel.endswith(
-            (
-                *ANGLES,
-                "_velocity_rad_s",
-                "_velocity_m_s",
-                "_acceleration_rad_s2",
-                "_acceleration_m_s2",
-            )
-        )
-        or "_rate_" in channel
-    )
 
 
 def _is_better(
@@ -184,8 +161,7 @@ def _add_estimate(equation: Equation, run: RunSignals) -> None:
     run.channels[instrumented(equation.target, equation.name)] = target
     base = next((a for a in ANGLES if equation.target.endswith(a)), "")
     if base:
-        unit = "_velocity_rad_s" if base == "_angle_rad" else "_velocity_m_s"
-        speed = equation.target.removesuffix(base) + unit
+        speed = equation.target.removesuffix(base) + RATES[base][0]
         run.channels[instrumented(speed, equation.name)] = np.gradient(target) * run.rate_hz
 
 

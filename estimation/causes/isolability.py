@@ -20,7 +20,6 @@ from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.levels import with_levels
 from estimation.causes.nuisances import skews, with_skews
-from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.scoring import assessed, best_of_each, probabilities
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
@@ -58,27 +57,21 @@ class Isolable:
 def isolability(
     models: Sequence[Model],
     recordings: Sequence[Recording],
-    numbers: Numbers = DEFAULT,
     on_part: Callable[[int, int], None] = lambda done, count: None,
 ) -> list[Isolable]:
     """Return the expected conclusion on each effect from these runs, the vaguest first.
 
-    Each effect is as large as the residual of the declared equations.
-
-    Args:
-        models: Declared equations.
-        recordings: Runs of the machine, recorded or simulated, without an unmodelled effect.
-        numbers: What decides.
-        on_part: Called with the number of effects done and of all.
+    Each effect is as large as the residual of the declared equations on these runs, recorded or
+    simulated without it. `on_part` is called with the number of effects done and of all.
 
     Raises:
         LayoutError: No equation can be laid out on these runs.
         FitError: A declared equation cannot be identified.
     """
     names = [r.name for r in recordings]
-    layout = with_levels(lay_out(models, recordings, names), names, numbers)
+    layout = with_levels(lay_out(models, recordings, names), names)
     add_instruments(layout, names)
-    plain = Joint(layout, numbers)
+    plain = Joint(layout)
     joint = with_skews(plain, skews(plain))
     pool, folds = candidates(joint), folds_of(layout)
     effects = _effects(pool)
@@ -154,7 +147,7 @@ def _near(joint: Joint, group: Group) -> Group | None:
         left = table[..., -1] - table[..., :-1] @ base[joint.at[p]]
         right = right + weight * (left[:, None, None] @ inner)[:, :, 0].sum(axis=0)
         whole += weight * float(np.sum(left**2))
-    own = sum(joint.weights[p] * x.sum(axis=0) for p, x in block.own.items() if p[1] == "within")
+    own = sum(joint.weights[p] * x.own.sum(axis=0) for p, x in block.of.items() if p[1] == "within")
     explained = (right * solved(right, own)).sum(axis=1) / whole
     kept = np.flatnonzero(explained > EXPLAINED)
     if not len(kept):

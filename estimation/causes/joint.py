@@ -5,6 +5,7 @@ vector. Each equation has two residuals: within runs, and of the runs' means. Ev
 score needs is in cross-products of one run, worked out once, so a fold costs one small solve.
 """
 
+import itertools
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -81,7 +82,9 @@ class Joint:
             (name, kind) for name in layout.equations for kind in ("within", "between")
         ]
         stacks = Stacks(layout)
-        self._equations_at = _places(layout)
+        counts = [len(equation.kinds) for equation in layout.equations.values()]
+        ends = itertools.pairwise(itertools.accumulate(counts, initial=0))
+        self._equations_at = {n: range(*at) for n, at in zip(layout.equations, ends, strict=True)}
         self._added, self.taken = np.zeros(0), np.zeros((self._declared_size, 0))
         self.tables, self.at, self.samples = self._laid_out(stacks)
         self.gram = self._products()
@@ -128,14 +131,18 @@ class Joint:
         """Declared parameters and the offset of each equation."""
         return sum(map(len, self._equations_at.values())) + len(self._equations_at)
 
+    def _offset_at(self, equation: str) -> int:
+        """Return the place of an equation's offset: they follow all declared parameters."""
+        names = [*self._equations_at]
+        return self._declared_size - len(names) + names.index(equation)
+
     # ---- the base
 
     def _laid_out(
         self, stacks: Stacks
     ) -> tuple[Mapping[Part, FloatArray], Mapping[Part, Sequence[int]], Mapping[Part, FloatArray]]:
         tables, at, samples = {}, {}, {}
-        offsets = self._declared_size - len(self._equations_at)
-        for k, (name, equation) in enumerate(self.layout.equations.items()):
+        for name, equation in self.layout.equations.items():
             columns = []
             for run in self.runs:
                 used = run.grid[run.used[name]]
@@ -146,7 +153,7 @@ class Joint:
             tables[name, "within"] = inner
             tables[name, "between"] = np.hstack([means[:, :-1], one, means[:, -1:]])[:, None]
             at[name, "within"] = [*self._equations_at[name]]
-            at[name, "between"] = [*self._equations_at[name], offsets + k]
+            at[name, "between"] = [*self._equations_at[name], self._offset_at(name)]
             samples[name, "within"] = stacks.counts[name].astype(np.float64)
             samples[name, "between"] = np.ones(len(means))
         return tables, at, samples
@@ -184,7 +191,7 @@ class Joint:
         # no term exceeds half of all signals, and a shape is known to within its own size
         size = self._declared_size
         self._precision = 4.0 * np.diag(whole)[:size] / float(whole[-1, -1])
-        shapes = [s for e in self.layout.equations.values() for s in e.of_shape]
+        shapes = [c.of_shape for e in self.layout.equations.values() for c in e.kinds]
         self._precision[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
         self._prior = np.diag(np.append(self._precision, self._added))
         self._prior[:, size:] += self.prior_products(self.taken)
@@ -209,13 +216,8 @@ class Joint:
         """Return the prior's products of the base with causes that declared columns were taken off.
 
         The prior is that of the declared parameters themselves, not of what is left of them next to
-        a cause. Otherwise it would say how large a cause is in runs that show nothing of it.
-
-        Args:
-            taken: How much of each declared column was taken off the causes, (..., declared, k).
-
-        Returns:
-            Shape (..., base, k).
+        a cause. Otherwise it would say how large a cause is in runs that show nothing of it. Shapes
+        (..., declared, k) of what was taken off, and (..., base, k) of the products.
         """
         of_declared = -self._precision[:, None] * taken
         return np.concatenate([of_declared, -self.taken.T @ of_declared], axis=-2)
@@ -231,42 +233,27 @@ class Joint:
 
         Shapes stay as they were fitted: an amplitude and the derivative by a shape may be much
         alike, as a gap and its compliance.
-
-        Args:
-            part: The equation, within runs or of their means.
-
-        Returns:
-            Shape (amplitudes + 2, amplitudes + 2): offset and target are the last two.
         """
         name, _ = part
-        of_shape = self.layout.equations[name].of_shape
-        at = [k for k, s in zip(self._equations_at[name], of_shape, strict=True) if not s]
-        offsets = self._declared_size - len(self._equations_at)
-        at += [offsets + list(self._equations_at).index(name), self.size]
+        kinds = self.layout.equations[name].kinds
+        at = [k for k, c in zip(self._equations_at[name], kinds, strict=True) if not c.of_shape]
+        at += [self._offset_at(name), self.size]
         return np.asarray(self.gram[part].sum(axis=0)[np.ix_(at, at)])
 
     def parameter(self, base: FloatArray, equation: str, column: int | None) -> float:
-        """Return one declared parameter, with what was taken off the columns of causes.
+        """Return a declared parameter of a base, with what was taken off the columns of causes.
 
-        Args:
-            base: Parameters of the base, shape (base,).
-            equation: Its equation.
-            column: Its declared column; None for the offset.
+        That of a declared column of an equation, or of its offset where the column is None.
         """
         if column is not None:
             return float(self.whole(base)[self._equations_at[equation].start + column])
-        offsets = self._declared_size - len(self._equations_at)
-        return float(base[offsets + list(self._equations_at).index(equation)])
+        return float(base[self._offset_at(equation)])
 
     def with_effect(self, laid: Laid, amplitudes: FloatArray) -> "Joint":
-        """Return the regression as if the base were true but for one effect.
+        """Return the regression as if the base were true but for one effect of some amplitudes.
 
         Within runs the targets are those of the base, with the noise of the readings, and the
         effect. Between runs they keep the residual.
-
-        Args:
-            laid: One cause.
-            amplitudes: How much of its columns is added, shape (k,).
         """
         made = object.__new__(Joint)
         made.__dict__.update(self.__dict__)
@@ -277,8 +264,7 @@ class Joint:
             if kind == "within":
                 usual = np.append(self.declared[[*self._equations_at[name]]], -1.0)
                 table[..., -1] = table[..., :-1] @ base[self.at[p]] - self._white[name] @ usual
-            columns = _columns(laid, p)
-            if columns is not None:
+            if (columns := _columns(laid, p)) is not None:
                 table[..., -1] += columns[:, 0] @ amplitudes
         made.gram = made._products()
         made.error = made._declared_error()
@@ -287,12 +273,7 @@ class Joint:
         return made
 
     def with_cause(self, laid: Laid, precision: FloatArray) -> "Joint":
-        """Return the regression with a cause's columns, of a prior precision each, in its base.
-
-        Args:
-            laid: One cause.
-            precision: Prior precision of every amplitude, shape (k,).
-        """
+        """Return the regression with a cause's columns, of a prior precision each, in its base."""
         made = object.__new__(Joint)
         made.__dict__.update(self.__dict__)
         made._added = np.append(self._added, precision)
@@ -300,14 +281,10 @@ class Joint:
         made.tables, made.at = {}, {}
         new = range(self.size, self.size + len(precision))
         for p, table in self.tables.items():
-            columns = _columns(laid, p)
-            made.at[p] = self.at[p] if columns is None else [*self.at[p], *new]
-            parts = [table[..., :-1], table[..., -1:]]
-            made.tables[p] = (
-                table
-                if columns is None
-                else np.concatenate([parts[0], columns[:, 0], parts[1]], axis=2)
-            )
+            made.tables[p], made.at[p] = table, self.at[p]
+            if (columns := _columns(laid, p)) is not None:
+                parts = [table[..., :-1], columns[:, 0], table[..., -1:]]
+                made.tables[p], made.at[p] = np.concatenate(parts, axis=2), [*self.at[p], *new]
         made.gram = made._products()
         made._noise = {name: self._grown_noise(name, laid) for name in self._noise}
         made._prepare()
@@ -354,16 +331,8 @@ class Joint:
         """Return the error that is missing because less of the readings' noise is in a residual.
 
         A cause that stands in for a noisy reading, or follows its noise, removes that noise. The
-        error that it removes so is put back.
-
-        Args:
-            part: Of the regression.
-            runs: Numbers of the runs, shape (n,).
-            base: Parameters of the base, shape (n, causes, base).
-            next_to: Causes next to the base.
-
-        Returns:
-            Squared error, shape (n, causes).
+        squared error that it removes so is put back, (n, causes), in n runs with a base of
+        parameters (n, causes, base) each.
         """
         name, kind = part
         if kind == "between":
@@ -384,11 +353,7 @@ class Joint:
         return np.asarray(np.maximum(((noise @ usual) @ usual)[:, None] - left, 0.0))
 
     def whole(self, base: FloatArray) -> FloatArray:
-        """Return amplitudes of the declared columns, with what was taken off those of causes.
-
-        Args:
-            base: Parameters of the base, shape (..., base).
-        """
+        """Return amplitudes of the declared columns, with what was taken off those of causes."""
         count = self._declared_size
         return np.asarray(base[..., :count] - base[..., count:] @ self.taken.T)
 
@@ -401,17 +366,17 @@ class Joint:
 
     def linear(self, name: str) -> Mapping[int, str]:
         """Return place to channel of each declared column that is a channel times a constant."""
-        equation = self.layout.equations[name]
-        at = self._equations_at[name].start + np.flatnonzero(equation.of_channel)
-        return dict(zip(at.tolist(), filter(None, equation.of_channel), strict=True))
+        kinds = self.layout.equations[name].kinds
+        places = zip(self._equations_at[name], kinds, strict=True)
+        return {at: column.channel for at, column in places if column.channel}
 
     def weights_of(self, name: str) -> Mapping[str, float]:
         """Return channel to weight of the terms that are a constant times it, next to the base."""
-        equation, base = self.layout.equations[name], self.whole(self.left_out(((),)).base[0])
-        found: dict[str, float] = {}
-        for at, channel in self.linear(name).items():
-            sign = equation.signs[at - self._equations_at[name].start]
-            found[channel] = found.get(channel, 0.0) + sign * float(base[at])
+        base, found = self.whole(self.left_out(((),)).base[0]), dict[str, float]()
+        kinds = self.layout.equations[name].kinds
+        for at, (sign, channel, _) in zip(self._equations_at[name], kinds, strict=True):
+            if channel:
+                found[channel] = found.get(channel, 0.0) + sign * float(base[at])
         return found
 
     @cached_property
@@ -461,14 +426,10 @@ class Joint:
     ) -> FloatArray:
         """Return the scores of candidates, shape (candidates,).
 
-        The score of a part is the mean over families. A family counts by how well the base itself
-        is known where it predicts, and at most what the family of single runs shows: where the base
-        extrapolates badly anything seems to help.
-
-        Args:
-            spreads: `extrapolated` of each family of folds.
-            before: Errors of the base, of each family.
-            after: Errors with the candidates.
+        The score of a part is the mean over families, from the errors of each before and after. A
+        family counts by how well the base itself is known where it predicts, which is its spread,
+        and at most what the family of single runs shows: where the base extrapolates badly anything
+        seems to help.
         """
         total = np.zeros(())
         for p in self.parts:
@@ -490,15 +451,6 @@ class Joint:
             weight = numbers.between
             floor += numbers.between * self.error[part[0], "within"]
         return np.asarray(weight * np.log((before + floor) / (after + floor)))
-
-
-def _places(layout: Layout) -> Mapping[str, range]:
-    """Return the places of each equation's parameters among all."""
-    out, at = {}, 0
-    for name, equation in layout.equations.items():
-        out[name] = range(at, at + len(equation.of_shape))
-        at += len(equation.of_shape)
-    return out
 
 
 def _columns(laid: Laid, part: Part) -> Columns | None:

@@ -68,11 +68,7 @@ class Laid:
 
 
 class Stacks:
-    """The samples that each equation counts, of all runs in one array that zeros fill up.
-
-    Args:
-        layout: The runs.
-    """
+    """The samples that each equation counts, of all runs in one array that zeros fill up."""
 
     def __init__(self, layout: Layout) -> None:
         self.counts = {
@@ -89,12 +85,7 @@ class Stacks:
         return out
 
     def centred(self, name: str, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return columns less each run's mean, in place, and the means.
-
-        Args:
-            name: Equation.
-            stacked: Shape (runs, ..., samples, k).
-        """
+        """Return columns (runs, ..., samples, k) less each run's mean, in place, and the means."""
         counts = self.counts[name]
         means = stacked.sum(axis=-2) / counts.reshape(-1, *[1] * (stacked.ndim - 2))
         for own, mean, count in zip(stacked, means, counts, strict=True):

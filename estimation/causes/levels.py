@@ -23,13 +23,7 @@ LARGEST_RATIO, RATIOS = 1e8, 80
 
 
 def with_levels(layout: Layout, train: Sequence[str], numbers: Numbers = DEFAULT) -> Layout:
-    """Return a layout whose equations have amplitudes fitted within runs and between them.
-
-    Args:
-        layout: Equations fitted within runs.
-        train: Names of the runs that may be fitted on.
-        numbers: How much a run's mean counts.
-    """
+    """Return a layout with amplitudes that are fitted between training runs as well as within."""
     joint = Joint(layout.select(train), numbers)
     made = {n: _refitted(equation, joint) for n, equation in layout.equations.items()}
     return replace(layout, equations=made)

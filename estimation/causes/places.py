@@ -13,6 +13,13 @@ from estimation.causes.angles import angles_of, related, signals_of, unrelated
 from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensitivity
 from estimation.derived import CAMPAIGN_TIME
 
+CLOCKS: Mapping[str, tuple[str, ...]] = {
+    "clock": ("time_s",),
+    "elapsed": (CAMPAIGN_TIME,),
+    "campaign_clock": (CAMPAIGN_TIME,),
+}
+"""Role of a time to its channel, at every place."""
+
 Kind = Literal["loss", "actuator", "deflection", "lever", "torque sensor", "angle sensor"]
 
 
@@ -64,17 +71,6 @@ class Place:
 
 def places_of(layout: Layout) -> list[Place]:
     """Return every place the declared equations know of."""
-    warmth = tuple(n for n in signals_of(layout).temperatures if n in layout.measured)
-    roles = {"temperature": warmth} if warmth else {}
-    return [
-        replace(place, roles={**place.roles, **roles})
-        if place.kind in ("loss", "actuator")
-        else place
-        for place in _places_of(layout)
-    ]
-
-
-def _places_of(layout: Layout) -> list[Place]:
     found = []
     angles = angles_of(layout)
     for equation in layout.equations.values():
@@ -87,6 +83,11 @@ def _places_of(layout: Layout) -> list[Place]:
         p for n in sensors for p in (*_behind(layout, n, angles), *_levers(layout, n, angles))
     ]
     found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
+    warmth = tuple(n for n in signals_of(layout).temperatures if n in layout.measured)
+    if warmth:
+        for k, place in enumerate(found):
+            if place.kind in ("loss", "actuator"):
+                found[k] = replace(place, roles={**place.roles, "temperature": warmth})
     return found
 
 
@@ -120,11 +121,7 @@ def _motion(angle: str) -> dict[str, tuple[str, ...]]:
 
 def _shared(layout_angles: Sequence[str], position: str) -> dict[str, tuple[str, ...]]:
     """Return the roles of clocks, and those of angles as far as any is read."""
-    roles: dict[str, tuple[str, ...]] = {
-        "clock": ("time_s",),
-        "elapsed": (CAMPAIGN_TIME,),
-        "campaign_clock": (CAMPAIGN_TIME,),
-    }
+    roles = dict(CLOCKS)
     if layout_angles:
         roles["motor_angle"] = tuple(layout_angles[:1])
     if position:
@@ -283,19 +280,14 @@ def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None
         return entry.order == 0, of_angle == angle, entry.gain > 0
 
     home = max(enters, key=suits).equation
-    others = tuple(n for n in (*angles, *_currents(layout)) if n != channel)
+    read = [n for e in layout.equations.values() for n in e.channels]
+    others = (*angles, *(n for n in read if n.endswith("_a")))
     roles = {
         "reading": (channel,),
         "creeping": (channel,),
         "encoder": (channel,),
-        "clock": ("time_s",),
-        "elapsed": (CAMPAIGN_TIME,),
-        "campaign_clock": (CAMPAIGN_TIME,),
-        "other_reading": others,
+        **CLOCKS,
+        "other_reading": tuple(n for n in others if n != channel),
     }
     kind: Kind = "angle sensor" if angle else "torque sensor"
     return Place(f"sensor {channel}", kind, home, tuple(enters), roles)
-
-
-def _currents(layout: Layout) -> list[str]:
-    return [n for e in layout.equations.values() for n in e.channels if n.endswith("_a")]

@@ -28,6 +28,9 @@ from estimation.within_bounds import solve_within
 MOVES = 4
 """Turns of moving the declared shapes."""
 
+DRAWS = 200
+"""Campaigns drawn for the spreads of a written model."""
+
 Unwritten = Callable[[str, FloatArray], FloatArray]
 """Name of a run and times in it to the columns of a cause that no model file holds, (n, k)."""
 
@@ -145,10 +148,12 @@ class Refit:
             self._solved[key] = self._fitted(tuple(parts))
         return self._solved[key]
 
-    def residuals(self, solved: Solved, name: str) -> tuple[NDArray[np.intp], FloatArray] | None:
-        """Return the samples that a run's error counts and the residual there, shape (n,) each.
+    def residuals(
+        self, solved: Solved, name: str
+    ) -> tuple[NDArray[np.intp], FloatArray, FloatArray] | None:
+        """Return the samples that a run's error counts, and the target and the residual there.
 
-        None where the run has no sample of this equation.
+        Shape (n,) each; None where the run has no sample of this equation.
         """
         known = self._run(solved.parts, name)
         if known is None:
@@ -156,27 +161,20 @@ class Refit:
         run, judged = known
         target = run.whole[self.model.target][judged]
         table = self._table(solved.parts, solved.declared, name, judged)
-        return judged, target - table @ solved.weights - solved.level
-
-    def channel(self, solved: Solved, name: str, channel: str) -> FloatArray | None:
-        """Return a filtered channel at the samples of `residuals`; None where it is not read."""
-        known = self._run(solved.parts, name)
-        if known is None or channel not in known[0].whole:
-            return None
-        return known[0].whole[channel][known[1]]
+        return judged, target, target - table @ solved.weights - solved.level
 
     def errors(self, solved: Solved, without: Collection[str] = ()) -> Errors:
         """Return the errors on the test runs, or on some of them."""
         names = [name for name in self.test_names if name not in without]
         found = [(name, self.residuals(solved, name)) for name in names]
-        left = {name: one[1] for name, one in found if one is not None}
+        left = {name: one[-1] for name, one in found if one is not None}
         return Errors(
             {name: float(np.sum((e - e.mean()) ** 2)) for name, e in left.items()},
             {name: float(e @ e) for name, e in left.items()},
             {name: len(e) for name, e in left.items()},
         )
 
-    def written(self, parts: Sequence[Part], bootstrap: int = 200) -> Model:
+    def written(self, parts: Sequence[Part]) -> Model:
         """Return the model with the causes that a file can hold.
 
         Values are those of `solve` with these causes. Spreads and intervals are of a bootstrap over
@@ -190,7 +188,7 @@ class Refit:
         while True:
             model = replace(self.model, terms=(*declared, *terms), evidence=None)
             try:
-                return without_unused(fit(model, campaign, bootstrap=bootstrap, shapes="keep"))
+                return without_unused(fit(model, campaign, bootstrap=DRAWS, shapes="keep"))
             except FitError:
                 if not terms:
                     raise
@@ -223,7 +221,6 @@ class Refit:
         return solved
 
     def _amplitudes(self, parts: tuple[Part, ...], declared: tuple[Term, ...]) -> Solved:
-        """Return the amplitudes at given shapes."""
         grams, means, samples = [], [], 0
         for name, run in self._train_runs(parts):
             table = self._table(parts, declared, name, run.places)

@@ -1,5 +1,6 @@
 """All equations refitted with the causes that were kept, one after another."""
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
@@ -7,14 +8,16 @@ import numpy as np
 
 from estimation.causes.candidates import Candidate
 from estimation.causes.declared import Moved
-from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.equations import Equation, Layout, RunSignals
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Errors, Part, Refit, Solved
 from estimation.causes.sources import Source
-from estimation.causes.terms import plain, term_of
+from estimation.derived import origin_of
 from estimation.diagnosis.result import Error
 from estimation.diagnosis.split import Sealed
-from estimation.model import Model
+from estimation.effects import effect
+from estimation.model import Estimate, Model, Term
+from estimation.predicted import predicted_of
 from estimation.recording import FloatArray, Recording
 
 DRAWS = 1000
@@ -47,16 +50,10 @@ class Refits:
         self.open: set[str] = set()
 
     def add(self, candidate: Candidate, acts_in: Mapping[str, bool]) -> None:
-        """Add a cause to every equation it enters.
-
-        Args:
-            candidate: The cause.
-            acts_in: Run to whether it acts there.
-        """
+        """Add a cause to every equation it enters, in the runs in which it acts."""
         runs = [name for name, acts in acts_in.items() if acts]
         for name in candidate.cause.place.equations:
-            part = self._part(candidate, name, runs)
-            if part is not None:
+            if (part := self._part(candidate, name, runs)) is not None:
                 self.parts[name] = [*self.parts[name], part]
 
     def before(self, name: str) -> Solved:
@@ -96,8 +93,7 @@ class Refits:
         cause, equation = candidate.cause, self.layout.equations[name]
         acts = None if candidate.acts is None else frozenset(runs)
         if isinstance(cause, Source):
-            term = term_of(cause, equation)
-            if term is not None:
+            if (term := _term(cause, equation)) is not None:
                 if set(term.channels.values()) - {channel for _, channel in cause.channels}:
                     term = self.of[name].refined(self.parts[name], term)
                 return Part(term, acts, is_change=isinstance(cause, Moved))
@@ -120,7 +116,10 @@ def _everywhere(
 ) -> tuple[FloatArray, FloatArray]:
     """Return times and a cause's columns there, at all of a run's places, at standstill too."""
     everything = {name: np.arange(len(run.grid)) for name in run.used}
-    columns = plain(candidate.cause).columns(replace(run, used=everything)) or {}
+    cause = candidate.cause
+    if isinstance(cause, Source):  # the form of its equation, as a model has it
+        cause = replace(cause, bend=None, odd=False)
+    columns = cause.columns(replace(run, used=everything)) or {}
     return run.channels["time_s"][run.grid], columns[equation]
 
 
@@ -135,3 +134,30 @@ def _interval(
     ratio = np.sqrt((draws @ new) / np.maximum(draws @ old, np.finfo(float).tiny))
     low, high = np.percentile(ratio, [2.5, 97.5])
     return float(low), float(high)
+
+
+def _term(source: Source, equation: Equation) -> Term | None:
+    """Return a cause as a term of one equation, its shape set and its amplitudes not.
+
+    A term never reads the equation's own target: its prediction by the fitted equation takes its
+    place, see `estimation.predicted`. None where the cause does not enter the equation
+    undifferentiated, or nothing predicts the target.
+    """
+    own = [e for e in source.place.enters if e.equation == equation.name and not e.order and e.gain]
+    if not own:
+        return None
+    entry, target, shape = own[0], equation.target, [Estimate(float(x)) for x in source.shape]
+    if entry.load:
+        return Term(
+            effect("eccentric.load.harmonics"),
+            int(math.copysign(1, entry.gain)),
+            {**dict(source.channels), "load": entry.load},
+            dict(zip(("order",), shape, strict=True)),
+        )
+    read = {c for _, c in source.channels if target in (c, origin_of(c)[0])}
+    channels = {r: predicted_of(c, target) if c in read else c for r, c in source.channels}
+    if read and equation.model.signals.combination(predicted_of(target, target)) is None:
+        return None
+    names = [p.name for p in source.effect.shape]
+    sign = int(math.copysign(1, entry.gain * source.side))
+    return Term(source.effect, sign, channels, dict(zip(names, shape, strict=True)))

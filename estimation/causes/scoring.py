@@ -6,20 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.causes.blocks import Outcome, block_of, evaluate
-from estimation.causes.candidates import (
-    Candidate,
-    Group,
-)
+from estimation.causes.blocks import Outcome, Products, block_of, evaluate
+from estimation.causes.candidates import Candidate, Group
 from estimation.causes.folds import Folds
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import Numbers
 from estimation.derived import origin_of
 from estimation.recording import FloatArray
-
-ByRun = tuple[FloatArray, FloatArray, FloatArray]
-"""Products of columns with the base's residual, with themselves and with the base, of each run."""
 
 MOST_CHANGE = 2.0
 """Factor by which the largest linear term of an equation may change next to a cause."""
@@ -66,8 +60,7 @@ class Scored:
         gain: The same with the price left in.
         price: What was chosen.
         amplitudes: Its amplitudes on all runs, in the scale of its columns.
-        by_run: Products of its columns with the base's residual, with themselves and with the base,
-            of each run.
+        by_run: Products of its columns, with the base's residual as the target.
     """
 
     candidate: Candidate
@@ -75,7 +68,7 @@ class Scored:
     gain: float
     price: Price
     amplitudes: FloatArray
-    by_run: ByRun
+    by_run: Products
 
 
 def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
@@ -95,7 +88,7 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
                 continue
             gain, price = round(float(gains[k]), DIGITS), _price(candidate, joint)
             score = gain - price.score(joint.numbers)
-            by_run = outcome.cross[:, k], outcome.own[:, k], outcome.base[:, k]
+            by_run = Products(*(x[:, k] for x in outcome.by_run))
             out.append(Scored(candidate, score, gain, price, amplitudes, by_run))
     return out
 
@@ -120,12 +113,8 @@ def probabilities(scores: FloatArray, gains: FloatArray, sharpness: float) -> Fl
     """Return the probability of each candidate, shape (n,); the rest to one is that of no cause.
 
     No cause at all has the score zero. What explains nothing has no share: of each weight that of
-    the same candidate without its gain is taken off.
-
-    Args:
-        scores: Of the candidates, shape (n,).
-        gains: Their scores before the price of what was chosen, shape (n,).
-        sharpness: Log odds for one unit of score.
+    the same candidate without its gain, the score before its price, is taken off. The sharpness is
+    the log odds for one unit of score.
     """
     top = float(max(0.0, *scores))
     explains = -np.expm1(-sharpness * np.maximum(gains, 0.0))

@@ -1,24 +1,34 @@
 """The search over hypotheses: sets of causes, scored together, extended one cause at a time."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from estimation.causes.acting import TURNS, on_some_runs, one_run_changed
 from estimation.causes.angles import groups_apart
-from estimation.causes.candidates import (
-    Claim,
-    Group,
-    candidates,
-)
+from estimation.causes.blocks import Products
+from estimation.causes.candidates import Candidate, Claim, Group, candidates, groups_of
+from estimation.causes.declared import moved_terms
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
+from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.nuisances import skews, with_skews
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.ranking import competing
-from estimation.causes.scoring import Scored
+from estimation.causes.scoring import Scored, assessed, best_of_each
+from estimation.causes.sources import RELATIVE, Bend, Source, least_order
+from estimation.causes.weights import reweighted
+from estimation.effects import Parameter
 
 MOST_CAUSES = 3
 """Causes of one group of equations that share readings."""
+
+KNOTS_OF_BEND, BENT = 5, 24
+"""Hat functions of a form's deviation from its equation, and families that are given one."""
+
+REFINED = 8
+"""Names whose shapes are refined after the grid, and those whose choices of runs are."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +51,7 @@ class Found:
 
 
 def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
-    """Find the set of causes that explains training runs best.
-
-    Args:
-        train: The declared equations on the training runs, instruments added.
-        numbers: What decides.
-    """
+    """Find the set of causes that explains training runs best; instruments were added to them."""
     plain = Joint(train, numbers)
     late = skews(plain)
     joint = with_skews(plain, late)
@@ -61,12 +66,7 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
 def hypothesis(
     ranking: "Ranking", starts: Sequence[Scored]
 ) -> tuple[list[Scored], list[Sequence[Scored]]]:
-    """Return the best set of causes, and all that compete in the place of each.
-
-    Args:
-        ranking: The candidates.
-        starts: Causes with which a set may begin.
-    """
+    """Return the best set of causes that begins with one, and all that compete with each of it."""
     chains = [_chain(ranking, start) for start in starts]
     return _settled(ranking, max(chains, key=lambda chain: sum(c.score for c in chain)))
 
@@ -78,15 +78,11 @@ Rank = Callable[[Joint, Sequence[Group], Folds], list[Scored]]
 class Ranking:
     """Candidates in the order of their scores next to causes that were accepted.
 
-    Args:
-        joint: The regression without causes.
-        pool: The candidates, with their products with it.
-        folds: What is left out.
-        rank: Ranks the candidates next to a regression's base, the best of each name.
+    `rank` ranks the candidates next to a regression's base, the best of each name.
     """
 
     def __init__(
-        self, joint: Joint, pool: Sequence[Group], folds: Folds, rank: "Rank | None" = None
+        self, joint: Joint, pool: Sequence[Group], folds: Folds, rank: Rank | None = None
     ) -> None:
         self.joint, self.folds, self.pool = joint, folds, pool
         self._rank = rank or competing
@@ -146,3 +142,104 @@ def _settled(
     if least.score < 0.0 and len(settled) > 1:
         return _settled(ranking, [c for c in settled if c is not least])
     return settled, conditional
+
+
+def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
+    """Return the best of each name: on the grid, on some of the runs, refined, and relaxed."""
+    everything = assessed(joint, pool, folds)
+    known: list[tuple[Claim, Products]] = [(s.candidate, s.by_run) for s in everything]
+    forms = min((claim.choices for claim, _ in known), default=1)
+    known += [(replace(claim, choices=forms), by_run) for claim, by_run in moved_terms(joint)]
+    some = best_of_each(assessed(joint, groups_of(joint, on_some_runs(joint, known)), folds))
+    climbing = some[:REFINED]
+    for _ in range(TURNS):
+        flipped = [c for s in climbing for c in one_run_changed(s.candidate)]
+        found = best_of_each(assessed(joint, groups_of(joint, flipped), folds))
+        before = {s.candidate.name: s.score for s in some}
+        climbing = [s for s in found if s.score > before[s.candidate.name]]
+        some = best_of_each([*some, *climbing])
+    spoilt = assessed(joint, groups_of(joint, reweighted(joint, pool, folds)), folds)
+    best = best_of_each([*everything, *some, *spoilt])
+    near = [c for s in best[:REFINED] for c in _neighbours(joint.layout, s.candidate)]
+    best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
+    bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
+    more = assessed(joint, groups_of(joint, bent), folds)
+    return _by_whole_form(joint, best_of_each([*best, *more]), folds)
+
+
+def _by_whole_form(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list[Scored]:
+    """Return a ranking in which causes that show by their odd part compete by their whole form.
+
+    What follows the noise of a reading is found by its odd part alone. Which of several such causes
+    of one place it is, a delay or a lag, shows in the even part: given that one of them is there,
+    their noise favours neither.
+    """
+    groups: dict[object, list[Scored]] = {}
+    for one in ranked:
+        cause = one.candidate.cause
+        if not isinstance(cause, Function) and cause.odd:
+            groups.setdefault((cause.place.name, one.candidate.acts), []).append(one)
+    changed: dict[object, Scored | None] = {}
+    for group in groups.values():
+        if len(group) < 2 or group[0].score < 0.0:
+            continue
+        near = [c for s in group for c in (s.candidate, *_neighbours(joint.layout, s.candidate))]
+        whole = [
+            Claim(replace(c.cause, odd=False), c.acts, c.choices)
+            for c in near
+            if isinstance(c.cause, Source)
+        ]
+        found = best_of_each(assessed(joint, groups_of(joint, whole), folds))
+        of_name = {one.candidate.name: one for one in found}
+        for one in group:
+            known = of_name.get(one.candidate.name)
+            if known is not None:  # by as much more or less than it has by the odd part
+                more = group[0].score + known.score - found[0].score - one.score
+                known = replace(one, score=one.score + more, gain=one.gain + more)
+            changed[one.candidate.name] = known
+    out = [changed.get(one.candidate.name, one) for one in ranked]
+    return sorted((one for one in out if one is not None), key=lambda one: -one.score)
+
+
+def _bent(joint: Joint, one: Scored) -> Claim | None:
+    """Return a named effect of one column with a form that deviates from its equation."""
+    candidate, cause = one.candidate, one.candidate.cause
+    if isinstance(cause, Function) or len(candidate.size) != 1:
+        return None
+    signals = [cause.values(run) for run in joint.runs]
+    values = np.concatenate([x[:, 0] for x in signals if x is not None])
+    low, high = np.percentile(values, (1.0, 99.0))
+    amplitude = abs(float(one.amplitudes[0] / candidate.size[0]))
+    if not high > low or amplitude == 0.0:
+        return None
+    knots = tuple(float(x) for x in np.linspace(low, high, KNOTS_OF_BEND))
+    bend = Bend(knots, joint.numbers.bend_share * amplitude)
+    return Claim(replace(cause, bend=bend), candidate.acts, candidate.choices)
+
+
+def _neighbours(layout: Layout, candidate: Candidate) -> list[Claim]:
+    """Return a named effect at shapes between the points of the grid."""
+    cause = candidate.cause
+    if isinstance(cause, Function):
+        return []
+    out = []
+    for k, parameter in enumerate(cause.effect.shape):
+        for value in _nearby(layout, cause, k, parameter):
+            shape = (*cause.shape[:k], float(value), *cause.shape[k + 1 :])
+            out.append(Claim(replace(cause, shape=shape), candidate.acts, candidate.choices))
+    return out
+
+
+def _nearby(layout: Layout, cause: Source, k: int, parameter: Parameter) -> list[float]:
+    """Return values of one shape parameter between the points of its grid."""
+    if parameter.name == "order":
+        near = [cause.shape[k] + step for step in (-2.0, -1.0, 1.0, 2.0)]  # whole: of its shaft
+        least = least_order(layout, dict(cause.channels)[cause.turning])
+        return [order for order in near if order >= least]
+    values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
+    if parameter.name in ("width", "settled") or values is None or len(values) < 2:
+        return []
+    steps, ratio = (-0.5, -0.25, 0.25, 0.5), values[1] / values[0]
+    if parameter.linear:
+        return [cause.shape[k] + step * (values[1] - values[0]) for step in steps]
+    return [cause.shape[k] * ratio**step for step in steps]

@@ -30,10 +30,7 @@ def slopes(
 ) -> FloatArray:
     """Return the derivative of the terms' sum by the logarithm of each shape, shape (n, shapes).
 
-    Args:
-        terms: Terms with shapes.
-        weights: Their amplitudes, and others after them.
-        columns: Returns the columns of a term, shape (n, k).
+    The weights are their amplitudes, and others after them; `columns` returns those of a term.
     """
     found, at = [], 0
     for term in terms:
@@ -48,10 +45,7 @@ def slopes(
 def moved(terms: Sequence[Term], products: FloatArray, share: float) -> tuple[Term, ...]:
     """Return the terms with their shapes a share of one step towards the least error.
 
-    Args:
-        terms: Terms with shapes.
-        products: Of all columns, then the slopes, last what is left of the target.
-        share: Of the step.
+    The products are of all columns, then the slopes, last what is left of the target.
     """
     inner, right = products[:-1, :-1], products[:-1, -1]
     inner = inner + np.diag(RIDGE * np.diag(inner) + np.finfo(float).tiny)

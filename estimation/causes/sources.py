@@ -15,7 +15,7 @@ import numpy as np
 from estimation.causes.angles import travel_of
 from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
-from estimation.causes.places import Place, direction_width
+from estimation.causes.places import CLOCKS, Place, direction_width
 from estimation.effects import Effect, Parameter, Pointwise, catalogue
 from estimation.filters import holoborodko_derivative
 from estimation.recording import FloatArray
@@ -29,25 +29,38 @@ DECLARED_ONLY = (
     "transmission.damping",
 )
 DECLARED_FRICTION = ("friction.coulomb", "friction.viscous")
-ACTUATOR = ("motor.", "ripple.current")
-DEFLECTION = (
-    "coupling.kinematic",
+NOT_A_LOSS = (
+    "motor.",
+    "ripple.current",
+    "sensor.",
     "transmission.",
     "hysteresis.bouc_wen.twist",
-    "hysteresis.presliding",
-    "ripple.output",
-    "eccentric.load",
-)
-TORQUE_SENSOR = (
-    "sensor.gain_nonlinear",
-    "sensor.drift",
-    "sensor.creep",
-    "sensor.lag",
-    "sensor.delay",
-    "sensor.crosstalk",
     "change.step.offset",
+    "inertia.missing",
 )
-ANGLE_SENSOR = ("sensor.encoder_inl", "sensor.delay", "sensor.lag")
+OF_KIND: Mapping[str, tuple[str, ...]] = {
+    "lever": ("eccentric.load.pulley",),
+    "actuator": ("motor.", "ripple.current", "sensor.delay", "sensor.gain_nonlinear"),
+    "deflection": (
+        "coupling.kinematic",
+        "transmission.",
+        "hysteresis.bouc_wen.twist",
+        "hysteresis.presliding",
+        "ripple.output",
+        "eccentric.load",
+    ),
+    "torque sensor": (
+        "sensor.gain_nonlinear",
+        "sensor.drift",
+        "sensor.creep",
+        "sensor.lag",
+        "sensor.delay",
+        "sensor.crosstalk",
+        "change.step.offset",
+    ),
+    "angle sensor": ("sensor.encoder_inl", "sensor.delay", "sensor.lag"),
+}
+"""Kind of a place to the effects that act there; at a loss all others act but some."""
 
 FILTERS = (
     "sensor.delay",
@@ -61,8 +74,10 @@ FILTERS = (
 LOOPS = ("hysteresis.", "transmission.backlash")
 """Effects with a loop: at a constant load they follow the noise of its reading."""
 
+OVER_TIME = ("friction.warmup", "sensor.drift", "change.step", "motor.thermal")
+"""Effects that a time in the run stands for."""
+
 TURNING = ("motor_angle", "output_angle", "encoder")
-CLOCKS = ("clock", "elapsed", "campaign_clock")
 KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
 """Equations of the reference rig that effects name."""
 
@@ -172,10 +187,6 @@ class Source:
         """The role of the angle or position that a wave repeats with."""
         return next(role for role, _ in self.channels if role in TURNING)
 
-    @cached_property
-    def _is_whole(self) -> bool:
-        return self.parts == tuple(range(len(self.effect.amplitudes)))
-
     def values(self, run: RunSignals) -> FloatArray | None:
         """Return the source's columns over the run, (n, parts), as its own equation reads them.
 
@@ -190,7 +201,8 @@ class Source:
         made: dict[str, FloatArray] = {}
         series: dict[object, FloatArray | None] = {}
         bends_first = None if self.on_grid else self.bend  # before it is differentiated
-        chosen = slice(None) if self._is_whole else list(self.parts)
+        whole = len(self.parts) == len(self.effect.amplitudes)
+        chosen = slice(None) if whole else list(self.parts)
         for entry in self.place.enters:
             names = self._names(run, entry.equation)
             load = entry.load and signal(run, entry.load, entry.equation)
@@ -224,14 +236,16 @@ def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
     """Yield every candidate at a place."""
     repeats = repeats_one_reference(layout)
     for effect in catalogue().values():
-        if not _acts(effect, place) or (repeats and _of_run_time(effect)):
+        of_run_time = "clock" in effect.roles and effect.id.startswith(OVER_TIME)
+        if not _acts(effect, place) or (repeats and of_run_time):
             continue
         options = [[(role, c) for c in place.roles.get(role, ())] for role in effect.roles]
         for channels in itertools.product(*options):
             if any(c not in layout.runs[0].channels for _, c in channels):
                 continue
             odd = _follows_noise(layout, place, effect, channels)
-            for shape in _grid(layout, place, effect, dict(channels)):
+            axes = [_axis(layout, place, effect, p, dict(channels)) for p in effect.shape]
+            for shape in itertools.product(*axes):
                 for parts in _parts(effect):
                     yield Source(place, effect, tuple(channels), shape, parts, odd)
 
@@ -280,34 +294,11 @@ def _acts(effect: Effect, place: Place) -> bool:
         return False  # a wrapped cable or a linkage, not a shaft in its bearings
     if (place.kind == "lever") != (effect.id == "eccentric.load.pulley"):
         return False
-    match place.kind:
-        case "lever":
-            return True
-        case "actuator":
-            return effect.id.startswith((*ACTUATOR, "sensor.delay", "sensor.gain_nonlinear"))
-        case "deflection":
-            return effect.id.startswith(DEFLECTION) and not effect.id.endswith(".lugre")
-        case "torque sensor":
-            return effect.id.startswith(TORQUE_SENSOR)
-        case "angle sensor":
-            return effect.id.startswith(ANGLE_SENSOR)
-        case "loss":
-            return not effect.id.startswith(
-                (
-                    *ACTUATOR,
-                    "sensor.",
-                    "transmission.",
-                    "hysteresis.bouc_wen.twist",
-                    "change.step.offset",
-                    "inertia.missing",
-                )
-            )
-
-
-def _of_run_time(effect: Effect) -> bool:
-    return "clock" in effect.roles and effect.id.startswith(
-        ("friction.warmup", "sensor.drift", "change.step", "motor.thermal")
-    )
+    if place.kind == "deflection" and effect.id.endswith(".lugre"):
+        return False
+    if place.kind == "loss":
+        return not effect.id.startswith(NOT_A_LOSS)
+    return effect.id.startswith(OF_KIND[place.kind])
 
 
 def _parts(effect: Effect) -> list[tuple[int, ...]]:
@@ -320,13 +311,6 @@ def _parts(effect: Effect) -> list[tuple[int, ...]]:
     if not polynomial:
         return [everything]
     return [p for k in range(1, count + 1) for p in itertools.combinations(everything, k)]
-
-
-def _grid(
-    layout: Layout, place: Place, effect: Effect, channels: Mapping[str, str]
-) -> list[tuple[float, ...]]:
-    axes = [_axis(layout, place, effect, p, channels) for p in effect.shape]
-    return list(itertools.product(*axes))
 
 
 def _axis(
@@ -417,19 +401,16 @@ def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:
 def _range(layout: Layout, channel: str) -> tuple[float, float]:
     """Return the range of a channel: of a speed or a clock from zero to its usual most."""
     if channel not in layout.ranges:
-        layout.ranges[channel] = _worked_out_range(layout, channel)
+        inside = [run.on_grid(channel) for run in layout.runs]
+        if "velocity" in channel:
+            found = 0.0, float(np.median([np.percentile(np.abs(x), 95) for x in inside]))
+        elif channel == "time_s":
+            found = 0.0, float(np.median([x.max() for x in inside]))
+        else:
+            ends = np.array([np.percentile(x, [0.5, 99.5]) for x in inside])
+            found = float(ends[:, 0].min()), float(ends[:, 1].max())
+        layout.ranges[channel] = found
     return layout.ranges[channel]
-
-
-def _worked_out_range(layout: Layout, channel: str) -> tuple[float, float]:
-    inside = [run.on_grid(channel) for run in layout.runs]
-    if "velocity" in channel:
-        return 0.0, float(np.median([np.percentile(np.abs(x), 95) for x in inside]))
-    if channel == "time_s":
-        return 0.0, float(np.median([x.max() for x in inside]))
-    low = min(float(np.percentile(x, 0.5)) for x in inside)
-    high = max(float(np.percentile(x, 99.5)) for x in inside)
-    return low, high
 
 
 def _worked_out(
@@ -450,10 +431,8 @@ def _worked_out(
         columns = 0.5 * (columns - effect.columns(back, source.shape)[::-1])
     if not np.isfinite(columns).all():
         return None
-    order = next(
-        (x for p, x in zip(effect.shape, source.shape, strict=True) if p.name == "order"), None
-    )
-    if order is not None:
+    if source.is_wave:
+        order = dict(zip((p.name for p in effect.shape), source.shape, strict=True))["order"]
         passed = _passed(run, names[roles.index(source.turning)], order)
         columns = columns * (passed[run.grid] if source.on_grid else passed)[:, None]
     return columns

@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,13 +109,12 @@ def answer(
     on_stage("opening the held-out test runs")
     refits = Refits(layout, timed, sealed, numbers)
     held_out = HeldOut(layout, sealed, numbers, found.late)
-    kept, findings, notes = _judged(found, held_out, refits)
+    judged, notes = _judged(found, held_out, refits)
     written = refits.models()
     findings = [
-        replace(f, parameters=parameters_of(k, f.balance, written))
-        for k, f in zip(kept, findings, strict=True)
+        replace(f, parameters=parameters_of(kept, f.balance, written)) for kept, f in judged
     ]
-    if not kept and sealed.may_name and (changing := unsteady(held_out, numbers)):
+    if not findings and sealed.may_name and (changing := unsteady(held_out, numbers)):
         findings = [unpredicted(changing, refits)]
         notes.append(
             f"{changing.equation}: the level of {changing.effect} changes within runs, at times"
@@ -137,55 +136,42 @@ def answer(
         notes=(*_limits(timed, layout, sealed), *notes),
         seconds=time.perf_counter() - began,
     )
-    return Answer(diagnosis, layout, found, tuple(kept), refits, tuple(written))
-
-
-@dataclass(frozen=True)
-class _Opened:
-    """A cause next to the earlier ones, with its errors on the test runs.
-
-    Attributes:
-        acts_in: Run to whether it acts there.
-        before: Equation to its errors without the cause.
-        after: Equation to its errors with it.
-        notes: On runs that decide themselves whether it acts there.
-    """
-
-    acts_in: Mapping[str, bool]
-    before: Mapping[str, Errors]
-    after: Mapping[str, Errors]
-    notes: Sequence[str]
+    kept = tuple(one for one, _ in judged)
+    return Answer(diagnosis, layout, found, kept, refits, tuple(written))
 
 
 def _judged(
     found: Found, held_out: HeldOut, refits: Refits
-) -> tuple[list[Kept], list[Finding], list[str]]:
-    """Return the causes that the test runs confirm, their findings, and notes on the others."""
+) -> tuple[list[tuple[Kept, Finding]], list[str]]:
+    """Return the causes that the test runs confirm with their findings, and notes on the others."""
     confirmed, notes = _confirmed(found, held_out, refits.numbers)
     opened: dict[int, tuple[Kept, Finding]] = {}
     spread = [len(one.scored.candidate.cause.place.equations) for one in confirmed]
     # each equation is refitted on its own, where a cause of several ones could stand in for another
     for k in sorted(range(len(confirmed)), key=spread.__getitem__):
         one, candidate = confirmed[k], confirmed[k].scored.candidate
-        added = _opened(one, [kept for kept, _ in opened.values()], held_out, refits)
-        if added is None:
+        finding, more = _opened(one, [kept for kept, _ in opened.values()], held_out, refits)
+        if finding is None:
             notes.append(
                 f"{candidate.cause.family} ({candidate.cause.place.name}) was found in the training"
                 " runs and does not lower the error on the test runs."
             )
             continue
-        part = refits.parts[candidate.cause.place.home][-1]
-        finding = _with_errors(named(one, refits.sealed.may_name), added)
+        part = refits.parts[finding.balance][-1]
         opened[k] = replace(one, part=part), finding
-        notes += added.notes
+        notes += more
         if not part.is_written:
             notes.append(_unwritten(candidate))
-    in_order = [opened[k] for k in sorted(opened)]
-    return [kept for kept, _ in in_order], [finding for _, finding in in_order], notes
+    return [opened[k] for k in sorted(opened)], notes
 
 
-def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) -> _Opened | None:
-    """Add a cause to the equations it enters; None, and nothing added, where no error falls."""
+def _opened(
+    one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits
+) -> tuple[Finding | None, list[str]]:
+    """Add a cause to the equations it enters; return its finding, and notes on runs.
+
+    Without a finding, and nothing added, where no error on the test runs falls.
+    """
     candidate, sealed = one.scored.candidate, refits.sealed
     acts_in, settled = held_out.acts_in([k.scored.candidate for k in kept], candidate)
     parts, uncounted, notes = dict(refits.parts), refits.open, list[str]()
@@ -199,26 +185,23 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
             f" {candidate.cause.family} acts there; "
             + ("these test runs themselves do." if counted else "not counted in the errors.")
         )
-    entered = candidate.cause.place.equations
-    before = {name: refits.test_errors(name) for name in entered}
+    place = candidate.cause.place
+    before = {name: refits.test_errors(name) for name in place.equations}
     refits.add(candidate, acts_in)
-    after = {name: refits.test_errors(name) for name in entered}
-    if any(_is_lower(before[name], after[name], refits.numbers) for name in entered):
-        return _Opened(acts_in, before, after, notes)
-    refits.parts, refits.open = parts, uncounted
-    return None
-
-
-def _with_errors(finding: Finding, opened: _Opened) -> Finding:
-    before, after = opened.before[finding.balance], opened.after[finding.balance]
-    return replace(
-        finding,
-        rmse_before=before.rmse,
-        rmse_after=after.rmse,
-        runs_improved=sum(after.by_run[name] < x for name, x in before.by_run.items()),
-        runs_total=len(before.by_run),
-        runs_affected=tuple(name for name, acts in opened.acts_in.items() if acts),
+    after = {name: refits.test_errors(name) for name in place.equations}
+    if not any(_is_lower(before[name], after[name], refits.numbers) for name in place.equations):
+        refits.parts, refits.open = parts, uncounted
+        return None, []
+    old, new = before[place.home], after[place.home]
+    finding = replace(
+        named(one, sealed.may_name),
+        rmse_before=old.rmse,
+        rmse_after=new.rmse,
+        runs_improved=sum(new.by_run[name] < x for name, x in old.by_run.items()),
+        runs_total=len(old.by_run),
+        runs_affected=tuple(name for name, acts in acts_in.items() if acts),
     )
+    return finding, notes
 
 
 def _confirmed(found: Found, held_out: HeldOut, numbers: Numbers) -> tuple[list[Kept], list[str]]:

@@ -18,13 +18,7 @@ from estimation.causes.sources import Source
 
 
 def reweighted(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Claim]:
-    """Return errors of readings that equations differentiate, with weights fitted next to them.
-
-    Args:
-        joint: The regression.
-        pool: Every candidate, laid out.
-        folds: Families of folds.
-    """
+    """Return errors of readings that equations differentiate, with weights fitted next to them."""
     plain = [
         group.within(undifferentiated)
         for group in pool

@@ -23,11 +23,7 @@ Range = tuple[float, float]
 def timed_stages(asked: Subject, quick: bool = False) -> Iterator[Callable[[str], None]]:
     """Yield what is called with each stage of a diagnosis that begins; its times are kept.
 
-    A terminal shows each stage and the time that is left.
-
-    Args:
-        asked: What is diagnosed.
-        quick: Whether no next experiment is proposed.
+    A terminal shows each stage and the time that is left. A quick one proposes no next experiment.
     """
     place, (kind, size) = state_folder() / "durations.jsonl", work_of(asked, quick)
     began: list[tuple[str, float]] = []
@@ -54,13 +50,9 @@ def work_of(asked: Subject, quick: bool = False) -> tuple[str, float]:
 
 
 def expected(place: Path, kind: str, size: float, latest: int = 5) -> dict[str, Range]:
-    """Return each stage's time, in order; empty where none of the kind was measured.
+    """Return each stage's time, in order, from the latest diagnoses of a kind in a file.
 
-    Args:
-        place: File of the times so far.
-        kind: Kind of the diagnosis.
-        size: Bytes of its recordings.
-        latest: Earlier diagnoses that count.
+    They grow with the bytes of the recordings. Empty where none of the kind was measured.
     """
     found: dict[str, list[float]] = {}
     with suppress(OSError, ValueError, KeyError, TypeError):

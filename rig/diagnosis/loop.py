@@ -100,18 +100,10 @@ def run_loop(
 ) -> Iterator[Round]:
     """Yield rounds until every name is unique, nothing is left, or the budget is spent.
 
-    Args:
-        folder: Empty or absent; rounds, their protocols and the ledger go here.
-        config: The simulated rig.
-        models: Declared models.
-        budget: What may be used.
-        first: First experiment; the shipped protocol `diagnosis` when None.
-        seed: Seed of the diagnoses; each round's sensor noise has its own.
-        executor: Runs work in parallel.
-        quick: Propose no next experiment.
-        on_stage: Called with what begins, in words.
-        on_progress: Called with the samples as they are recorded.
-        clock: Monotonic time, s.
+    Rounds, their protocols and the ledger go into the folder, which is empty or absent. The first
+    experiment is the shipped protocol `diagnosis` when None. Seed, executor, `quick` and `on_stage`
+    are those of `run_diagnosis`; each round's sensor noise has a seed of its own. `on_progress` is
+    called with the samples as they are recorded.
 
     Raises:
         UsageError: The rig is not simulated, or the folder is not empty.

@@ -55,14 +55,9 @@ def plan_of(
 ) -> Plan:
     """Return the effects that the runs of a protocol, or recordings, can distinguish.
 
-    A protocol is played on the simulated reference rig.
-
-    Args:
-        path: Protocol file or its name; or recordings of any machine, for runs like these.
-        model: A model file or the name of a shipped one; see `subject`.
-        balance: Only this equation.
-        machine: Machine file; its runs are recordings.
-        on_part: Called with the number of effects done and of all.
+    A protocol, a file or a name, is played on the simulated reference rig; recordings are of any
+    machine. The model, the only equation and the machine are those of `subject`. `on_part` is
+    called with the number of effects done and of all.
 
     Raises:
         UsageError: No such protocol or recordings, or a machine that no simulator plays.

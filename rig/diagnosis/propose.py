@@ -53,13 +53,9 @@ def propose(
 ) -> dict[str, Any] | None:
     """Return the next experiment in plain JSON types, or None where every name is sure.
 
-    It is chosen for the first finding without a sure name. Where the rig cannot be simulated, the
-    experiments that the effects' files name are proposed, without a protocol.
-
-    Args:
-        answer: The diagnosis.
-        recordings: The runs, with the campaign's time.
-        executor: Plays experiments in parallel; None plays them here.
+    It is chosen for the first finding without a sure name, on runs with the campaign's time. Where
+    the rig cannot be simulated, the experiments that the effects' files name are proposed, without
+    a protocol. An executor plays experiments in parallel.
     """
     asked = (question(answer, k) for k in range(len(answer.kept)))
     found = next(((k, one) for k, one in enumerate(asked) if one is not None), None)
@@ -81,18 +77,14 @@ def propose(
         return _by_hand(described)
     scored.sort(key=lambda pair: COST_PER_MINUTE * _seconds(pair[0]) / 60.0 - pair[1])
     best, separated = scored[0]
+    named = {"name": best.name, "description": best.description}
     return {
-        "name": best.name,
-        "description": best.description,
+        **named,
         **described,
         "discrimination": separated,
         "others": {other.name: value for other, value in scored[1:]},
         "seconds": _seconds(best),
-        "protocol": {
-            "name": best.name,
-            "description": best.description,
-            "runs": [table.model_dump(exclude_unset=True) for table in best.runs],
-        },
+        "protocol": named | {"runs": [table.model_dump(exclude_unset=True) for table in best.runs]},
     }
 
 
@@ -108,17 +100,11 @@ def write_protocol(diagnosis: Diagnosis, path: Path) -> str:
 
 
 def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> FittedRig | None:
-    """Return the simulated rig with the fitted equations.
+    """Return the simulated rig with equations that were fitted on training runs.
 
     An equation that is not diagnosed is taken from the shipped models and fitted on the same runs:
-    the plant needs all its parts.
-
-    Args:
-        fitted: The declared equations, fitted on the training runs.
-        train: The training runs.
-
-    Returns:
-        None where the simulated rig has none of the equations, or the runs lack a channel.
+    the plant needs all its parts. None where the simulated rig has none of the equations, or the
+    runs lack a channel.
     """
     own = {model.balance: model for model in fitted if model.balance in PLAYED}
     if not own:
@@ -140,9 +126,7 @@ def simulated_rig(fitted: Sequence[Model], train: Sequence[Recording]) -> Fitted
 def menu(recordings: Sequence[Recording], limits: ReferenceLimits) -> list[Protocol]:
     """Return the experiments: six short runs each, so that some of them can confirm.
 
-    Args:
-        recordings: Runs that have shown the travel.
-        limits: Limits of the rig, for travel and loads.
+    They stay within the travel of the recordings, and within the rig's limits of travel and load.
     """
     angles = np.concatenate([r["spindle_angle_rad"] for r in recordings])
     reach = OF_LIMIT * limits.spindle_angle_rad

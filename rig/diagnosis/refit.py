@@ -48,13 +48,9 @@ def refit_all(
     start: Start,
     on_done: Callable[[Path], None] = lambda _: None,
 ) -> dict[Path, Refit]:
-    """Fit a model on each folder's campaign, or take the kept result.
+    """Fit a declared model, as TOML, on each folder's campaign, or take the kept result.
 
-    Args:
-        folders: Folders of logs.
-        model: The declared model, as TOML.
-        start: Starts what the work is given to: processes, a cluster, or None for this process.
-        on_done: Called with each folder that was fitted.
+    `start` is that of `for_each`; `on_done` is called with each folder that was fitted.
 
     Raises:
         BrokenExecutor: Processes end again and again.

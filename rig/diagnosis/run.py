@@ -24,6 +24,9 @@ from rig.diagnosis.propose import propose
 from rig.diagnosis.subject import Subject
 from rig.output.table import counted
 
+LEAST_SHARED = 200
+"""Samples that two repeats must share for a noise floor."""
+
 
 def run_diagnosis(
     asked: Subject,
@@ -88,26 +91,19 @@ def run_diagnosis(
     return replace(found, diagnosis=diagnosis), look_at(whole, sealed)
 
 
-def noise_floors(
-    refits: Refits, recordings: Sequence[Recording], least: int = 200
-) -> dict[str, float | None]:
+def noise_floors(refits: Refits, recordings: Sequence[Recording]) -> dict[str, float | None]:
     """Return each equation's noise floor in its target's unit, None where nothing was repeated.
 
     Two runs of one motion and load contain the same physics, and so do two periods of one path.
     Half of the variance of the difference of their residuals is unexplained by any model of these
     variables.
-
-    Args:
-        refits: The equations with the causes found.
-        recordings: The runs.
-        least: Samples that two repeats must share.
     """
     pairs = repeats(recordings)
     out = dict[str, float | None]()
     for equation, refit in refits.of.items():
         used = [pair for pair in pairs if {*pair} <= refit.recordings.keys()]  # some are left out
         both = [_difference(refits, equation, *pair) for pair in used]
-        centred = [x - x.mean() for x in both if x.size >= least]
+        centred = [x - x.mean() for x in both if x.size >= LEAST_SHARED]
         squares = sum(0.5 * float(np.sum(x**2)) for x in centred)
         samples = sum(map(len, centred))
         out[equation] = float(np.sqrt(squares / samples)) if samples else None
@@ -115,16 +111,13 @@ def noise_floors(
 
 
 def repeats(recordings: Sequence[Recording]) -> list[tuple[str, str]]:
-    """Return the pairs of runs of the same motion under the same load."""
+    """Return the pairs of runs of the same motion under the same load, or of one path."""
     return [
         (one.name, other.name)
         for one, other in itertools.combinations(recordings, 2)
-        if len(one) == len(other) and (_of_one_path(one, other) or _asked_alike(one, other))
+        if len(one) == len(other)
+        and (one.name != path_of(one.name) == path_of(other.name) or _asked_alike(one, other))
     ]
-
-
-def _of_one_path(one: Recording, other: Recording) -> bool:
-    return one.name != path_of(one.name) == path_of(other.name)
 
 
 def _asked_alike(one: Recording, other: Recording, alike: float = 2e-3) -> bool:
@@ -142,6 +135,6 @@ def _difference(refits: Refits, equation: str, one: str, other: str) -> FloatArr
     found = [refits.of[equation].residuals(solved, name) for name in (one, other)]
     if found[0] is None or found[1] is None:
         return np.empty(0)
-    (first, left), (second, right) = found[0], found[1]
+    (first, _, left), (second, _, right) = found[0], found[1]
     _, at, also = np.intersect1d(first, second, assume_unique=True, return_indices=True)
     return np.asarray(left[at] - right[also])

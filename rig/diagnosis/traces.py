@@ -81,10 +81,9 @@ def _equation(answer: Answer, name: str, wanted: list[str]) -> EquationTraces:
     runs = []
     for run in refit.test_names:
         sides = [refit.residuals(solved, run) for solved in (before, after)]
-        measured = refit.channel(after, run, refit.model.target)
-        if sides[0] is None or sides[1] is None or measured is None:
+        if sides[0] is None or sides[1] is None:
             continue
-        (places, old), (_, new) = sides[0], sides[1]
+        (places, _, old), (_, measured, new) = sides[0], sides[1]
         clock = refit.recordings[run].time_s
         # a cause that no model file holds is no term of the equation: its channels are read here
         read = {}
