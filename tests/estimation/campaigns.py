@@ -25,9 +25,5 @@ def spring(motor_rad, speed_rad_s, load_n_m):
     return 0.02 * motor_rad / 35
 
 
-def tight_spot(motor_rad, speed_rad_s, load_n_m):
-    return 0.01 * np.exp(-(((motor_rad / 35 - 0.2) / 0.1) ** 2)) * np.tanh(speed_rad_s / 3)
-
-
 def spring_and_ripple(motor_rad, speed_rad_s, load_n_m):
     return spring(motor_rad, speed_rad_s, load_n_m) + 0.0025 * np.sin(3 * motor_rad)

@@ -3,7 +3,6 @@
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from estimation import model_file
@@ -15,7 +14,7 @@ from estimation.fit_problem import prepared
 from estimation.fitting import _evidence
 from estimation.recording import Flag, Stretch
 from tests.estimation import synthetic
-from tests.estimation.campaigns import runs, spring, spring_and_ripple, tight_spot
+from tests.estimation.campaigns import runs, spring, spring_and_ripple
 
 pytestmark = pytest.mark.long
 
@@ -24,10 +23,6 @@ MOTOR = model_file.read(Path("motor"))
 
 def diagnosed(recordings) -> Answer:
     return answer(recordings, [MOTOR], split(recordings, 1))
-
-
-def ripple(motor_rad, speed_rad_s, load_n_m):
-    return 0.004 * np.sin(3 * motor_rad)
 
 
 def test_flagged_stretches_are_left_out():
@@ -74,22 +69,6 @@ def test_the_model_written_with_two_causes_has_the_reported_errors_on_the_test_r
     assert found_again.rmse_with_means == pytest.approx(reported.with_means_after, rel=1e-6)
 
 
-def test_an_effect_outside_the_catalogue_is_unknown_but_its_variables_are_found():
-    found = diagnosed(runs(tight_spot))
-    assert found.diagnosis.verdict == "depends_on"
-    (finding,) = found.diagnosis.findings
-    assert finding.family == "unknown"
-    # the equation reads the motor's angle, which drives the spindle
-    assert set(finding.depends_on) <= {"velocity_sign", "velocity", "spindle_angle"}
-    assert "spindle_angle" in finding.depends_on
-    assert finding.confidence is None
-    # six knots over the travel do not resolve a spot of a tenth of it
-    assert finding.rmse_after < 0.7 * finding.rmse_before
-    (written,) = found.models
-    assert len(written.terms) == len(MOTOR.terms)
-    assert any("not added to the model file" in note for note in found.diagnosis.notes)
-
-
 @pytest.mark.parametrize(
     ("order", "why"), [(0, "the quantity that the model estimates"), (1, "the rate of change")]
 )
@@ -99,26 +78,6 @@ def test_a_cause_that_no_model_holds_is_reported_with_the_reason(order, why):
     note = _unwritten(SimpleNamespace(acts=None, cause=cause))
     assert note.startswith("motor: sensor.gain is reported and not added to the model file; ")
     assert why in note
-
-
-def test_an_effect_of_some_runs_is_named_with_the_runs_that_have_it():
-    plain, missing = runs(), runs(ripple)
-    found = diagnosed([missing[k] if k >= 6 else plain[k] for k in range(12)])
-    (finding,) = found.diagnosis.findings
-    assert finding.family == "ripple.motor"
-    assert set(finding.runs_affected) == {f"run{k:02d}" for k in range(6, 12)}
-    assert finding.rmse_after < finding.rmse_before
-    # the runs without it would be worse with it, so it is in no model file
-    (written,) = found.models
-    assert len(written.terms) == len(MOTOR.terms)
-
-
-@pytest.mark.parametrize("seed", [100, 200, 300, 400])
-def test_nothing_is_found_where_nothing_is_missing(seed):
-    found = diagnosed(runs(first_seed=seed)).diagnosis
-    assert found.verdict == "nothing_missing"
-    assert found.findings == ()
-    assert found.errors["motor"].after == found.errors["motor"].before
 
 
 def test_runs_at_one_load_do_not_distinguish_what_depends_on_it_and_a_note_states_it():

@@ -184,16 +184,6 @@ def test_campaigns_keep_their_diagnoses_and_are_diagnosed_once(
     assert sum(bool(one["diagnosis"]) for one in listed) == len(pages)
 
 
-def test_a_rig_that_lacks_nothing_has_a_page(monkeypatch, tmp_path):
-    clean = Campaign.of(runs(lambda angle, speed, load: 0.0 * angle, count=9, seconds=5.0))
-    monkeypatch.setattr(subject, "open_campaign", lambda *_: clean)
-    found = run(tmp_path, "--report", str(tmp_path / "report"), "--equation", "motor", "--quick")
-    assert found["findings"] == []
-    page = (tmp_path / "report/diagnosis.html").read_text()
-    assert "No unmodelled effect" in page
-    assert "motor: measured and estimated" in page
-
-
 def test_two_paths_are_diagnosed_by_their_periods_and_the_claim_reports_it(monkeypatch, tmp_path):
     def periodic(name, seed):
         one = runs(count=1, seconds=24.0, first_seed=seed)[0]

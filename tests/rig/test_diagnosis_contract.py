@@ -29,54 +29,44 @@ PAIRS = st.none() | st.tuples(NUMBERS, NUMBERS)
 RUNS = st.lists(st.text(min_size=1), max_size=3).map(tuple)
 
 
-@st.composite
-def findings(draw: st.DrawFn) -> Finding:
-    verdict = draw(st.sampled_from(VERDICTS[:-1]))
-    named = verdict in ("identified", "one_of")
-    family = draw(st.sampled_from(families()[:-1])) if named else "unknown"
-    others = [f for f in families()[:-1] if f != family]
-    values = st.builds(Value, NUMBERS, st.sampled_from(["N m", "1"]), PAIRS)
-    return Finding(
-        balance=draw(BALANCES),
-        family=family,
-        verdict=verdict,
-        rmse_before=draw(NUMBERS),
-        rmse_after=draw(NUMBERS),
-        runs_improved=draw(st.integers(0, 9)),
-        runs_total=9,
-        runs_affected=draw(RUNS),
-        alternatives=tuple(draw(st.lists(st.sampled_from(others), max_size=2))) if named else (),
-        depends_on=tuple(draw(st.lists(st.sampled_from(ALL_VARIABLES), max_size=2))),
-        confidence=draw(st.floats(0, 1) | st.none()),
-        parameters=draw(st.dictionaries(st.text(min_size=1), values, max_size=2)),
-        place=draw(st.sampled_from(["motor", "sensor distal_torque_n_m"])),
-        probabilities={family: draw(st.floats(0, 1))},
-    )
-
-
-@st.composite
-def diagnoses(draw: st.DrawFn) -> Diagnosis:
-    found = tuple(draw(st.lists(findings(), max_size=3)))
-    error = st.builds(
-        Error, NUMBERS, NUMBERS, NUMBERS, NUMBERS, st.tuples(NUMBERS, NUMBERS), st.just({}),
-        st.just({}),
-    )  # fmt: skip
-    names = draw(st.lists(BALANCES, unique=True, max_size=3))
-    moved = {"friction.coulomb.friction": {"before": draw(NUMBERS), "after": draw(NUMBERS)}}
-    return Diagnosis(
-        findings=found,
-        errors={name: draw(error) for name in names},
-        unit=dict.fromkeys(names, "N m"),
-        noise_floor={name: draw(st.none() | NUMBERS) for name in names},
-        moved=dict.fromkeys(names, moved),
-        sealed=Sealed(draw(RUNS), draw(RUNS), 3, "data", "seal"),
-        exploratory=draw(st.booleans()),
-        seconds=1.5,
-    )
+FAMILIES = st.sampled_from(families())
+VALUES = st.builds(Value, NUMBERS, st.sampled_from(["N m", "1"]), PAIRS)
+FINDINGS = st.builds(
+    Finding,
+    balance=BALANCES,
+    family=FAMILIES,
+    verdict=st.sampled_from(VERDICTS[:-1]),
+    rmse_before=NUMBERS,
+    rmse_after=NUMBERS,
+    runs_improved=st.integers(0, 9),
+    runs_affected=RUNS,
+    alternatives=st.lists(FAMILIES, max_size=2).map(tuple),
+    depends_on=st.lists(st.sampled_from(ALL_VARIABLES), max_size=2).map(tuple),
+    confidence=st.floats(0, 1) | st.none(),
+    parameters=st.dictionaries(st.text(min_size=1), VALUES, max_size=2),
+    place=st.sampled_from(["motor", "sensor distal_torque_n_m"]),
+    probabilities=st.dictionaries(FAMILIES, st.floats(0, 1), max_size=2),
+)
+ERRORS = st.builds(
+    Error, *[NUMBERS] * 4, st.tuples(NUMBERS, NUMBERS), *[st.just(dict[str, float]())] * 2
+)
+MOVED = st.fixed_dictionaries(
+    {"friction.coulomb.friction": st.fixed_dictionaries({"before": NUMBERS, "after": NUMBERS})}
+)
+DIAGNOSES = st.builds(
+    Diagnosis,
+    findings=st.lists(FINDINGS, max_size=3).map(tuple),
+    errors=st.dictionaries(BALANCES, ERRORS, max_size=3),
+    unit=st.dictionaries(BALANCES, st.just("N m"), max_size=3),
+    noise_floor=st.dictionaries(BALANCES, st.none() | NUMBERS, max_size=3),
+    moved=st.dictionaries(BALANCES, MOVED, max_size=3),
+    sealed=st.builds(Sealed, RUNS, RUNS, st.just(3), st.just("data"), st.just("seal")),
+    exploratory=st.booleans(),
+)
 
 
 @settings(deadline=None, max_examples=60)
-@given(diagnosis=diagnoses())
+@given(diagnosis=DIAGNOSES)
 def test_every_field_is_there_and_no_number_is_undefined(diagnosis):
     text = json.dumps(diagnosis.to_json(), allow_nan=False)
     found: dict[str, Any] = json.loads(text)

@@ -71,9 +71,6 @@ def geared(
     bend: float = 0.0,
     creep: float = 0.0,
     wave: float = 0.0,
-    *,
-    runs: int = 12,
-    seed: int = 0,
 ) -> list[Recording]:
     """Return runs of motor and gearbox against a load of both signs that moves in steps.
 
@@ -82,12 +79,10 @@ def geared(
         bend: Gain of the torque's reading that grows with its size, at the largest load.
         creep: Share of the torque's reading that comes slowly, over .5 s.
         wave: Error of the motor's encoder, two waves a turn, rad.
-        runs: How many.
-        seed: Of the noise.
     """
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     out = []
-    for one in recordings(runs=runs, seed=seed):
+    for one in recordings():
         levels = random.uniform(-0.12, 0.12, 8)
         steps = np.repeat(levels, len(one.time_s) // 8)
         load, lag = _lagging(steps, 0.05), _lagging(_lagging(steps, 0.05), 0.6)
@@ -116,20 +111,16 @@ RATIO = 1.2
 """Jaw angle per spindle angle of `cabled`."""
 
 
-def cabled(
-    wave: float = 0.0, *, held: bool = False, runs: int = 12, seed: int = 0
-) -> list[Recording]:
+def cabled(wave: float = 0.0, *, held: bool = False) -> list[Recording]:
     """Return runs of a cable between spindle and jaw.
 
     Args:
         wave: Change of the pulley's lever arm over its turn, seven times a turn.
         held: Whether the load hardly changes within each run.
-        runs: How many.
-        seed: Of the motion and the noise.
     """
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     out = []
-    for k in range(runs):
+    for k in range(12):
         time = np.arange(int(RATE_HZ * SECONDS)) / RATE_HZ
         waves = [(0.2 + 0.1 * (k % 4) + 0.2 * m, random.uniform(0, 2 * np.pi)) for m in range(3)]
         spindle = 0.6 * sum(
@@ -189,20 +180,19 @@ def axis(drive: str = "crank_torque_n_m") -> Model:
 
 
 def turning(
-    torque: Effect, *, runs: int = 10, always_ahead: bool = False, size: float = 1.0
+    torque: Effect = lambda angle, *_: 0.0 * angle,
+    *,
+    always_ahead: bool = False,
+    size: float = 1.0,
 ) -> list[Recording]:
     """Return runs of one axis with inertia and friction; angle, speed and acceleration add torque.
 
-    Args:
-        torque: Further torque of angle, speed and acceleration.
-        runs: How many.
-        always_ahead: Whether the speed is never negative.
-        size: Of the motion, rad.
+    The motion has a size in rad; one that is always ahead has no negative speed.
     """
     random = np.random.default_rng(0)
     time = np.arange(int(RATE_HZ * SECONDS)) / RATE_HZ
     out = []
-    for k in range(runs):
+    for k in range(10):
         waves = zip(random.uniform(0.1, 0.7, 4), random.uniform(0, 2 * np.pi, 4), strict=True)
         angle = size * sum(np.sin(2 * np.pi * f * time + p) for f, p in waves) / 2
         if always_ahead:

@@ -21,18 +21,12 @@ def _effects(one_load: bool) -> dict[tuple[str, str], Isolable]:
     return {(one.place, one.family): one for one in found}
 
 
-def test_probabilities_of_an_effect_its_likes_and_nothing_sum_to_one() -> None:
-    for one in _effects(one_load=False).values():
+def test_a_ripple_is_distinguished_and_what_declared_terms_can_express_is_not_seen() -> None:
+    found = _effects(one_load=False)
+    for one in found.values():
         assert abs(one.share + sum(one.others.values()) - 1.0) < 1e-6
-
-
-def test_what_the_declared_terms_can_express_is_not_seen() -> None:
-    constant = _effects(one_load=False)["motor", "friction.coulomb_asymmetry"]
-    assert constant.others.get(NOTHING, 0.0) > 0.5
-
-
-def test_a_ripple_with_the_motor_angle_is_distinguished() -> None:
-    assert _effects(one_load=False)["motor", "ripple.motor"].share > 0.5
+    assert found["motor", "ripple.motor"].share > 0.5
+    assert found["motor", "friction.coulomb_asymmetry"].others.get(NOTHING, 0.0) > 0.5
 
 
 @pytest.mark.long

@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 from benchmarks.rigs import draw
 from estimation import model_file, plant_file
 from estimation.causes.candidates import Claim, groups_of
-from estimation.causes.equations import lay_out
+from estimation.causes.equations import Layout, lay_out
 from estimation.causes.findings import family_probabilities
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
@@ -27,7 +27,9 @@ from estimation.causes.search import Found, search
 from estimation.causes.sources import sources_at
 from estimation.causes.verdict import answer, diagnose
 from estimation.derived import CAMPAIGN_TIME
+from estimation.diagnosis.result import Finding
 from estimation.diagnosis.split import split
+from estimation.model import Model
 from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
 from tests.estimation.causes.synthetic import (
@@ -45,6 +47,20 @@ from tests.estimation.causes.synthetic import (
 )
 
 
+def _only(runs: list[Recording], *models: Model) -> Finding:
+    """Return the only finding of a diagnosis."""
+    (finding,) = diagnose(runs, models, split(runs)).findings
+    return finding
+
+
+def _laid(runs: list[Recording], *models: Model) -> Layout:
+    """Return equations fitted on all runs, with the instruments."""
+    names = [run.name for run in runs]
+    layout = lay_out(models, runs, names)
+    add_instruments(layout, names)
+    return layout
+
+
 def _asymmetric(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArray:
     return 4e-4 * np.abs(speed)
 
@@ -53,22 +69,28 @@ def _rippled(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArr
     return 0.01 * np.sin(3 * angle)
 
 
-def test_drag_is_found_where_the_speed_never_changes_its_sign() -> None:
-    """The friction that the fit declares there must not take the form of the drag."""
-    runs = turning(lambda angle, speed, _: 0.02 * speed**2, always_ahead=True, size=3.0)
-    (finding,) = diagnose(runs, [axis()], split(runs)).findings
-    assert finding.family == "friction.drag"
-    assert finding.parameters["drag"].value == pytest.approx(0.02, rel=0.05)
+def _linkage(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+    return 0.01 * (np.cos(angle) * acceleration - 0.5 * np.sin(angle) * speed**2)
 
 
-def test_an_inertia_that_follows_the_angle_is_named_with_its_size() -> None:
-    def linkage(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-        return 0.01 * (np.cos(angle) * acceleration - 0.5 * np.sin(angle) * speed**2)
+def _drag(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+    return 0.02 * speed**2
 
-    runs = turning(linkage)
-    (finding,) = diagnose(runs, [axis()], split(runs)).findings
-    assert (finding.family, finding.verdict) == ("inertia.position", "identified")
-    assert finding.parameters["cosine"].value == pytest.approx(0.01, rel=0.05)
+
+@pytest.mark.parametrize(
+    ("runs", "family", "parameter", "value"),
+    [
+        # where the speed never changes its sign, declared friction must not take the drag's form
+        (turning(_drag, always_ahead=True, size=3.0), "friction.drag", "drag", 0.02),
+        (turning(_linkage), "inertia.position", "cosine", 0.01),
+    ],
+)
+def test_a_cause_of_one_axis_is_named_with_its_size(
+    runs: list[Recording], family: str, parameter: str, value: float
+) -> None:
+    finding = _only(runs, axis())
+    assert (finding.family, finding.verdict) == (family, "identified")
+    assert finding.parameters[parameter].value == pytest.approx(value, rel=0.05)
 
 
 def test_an_inertia_over_a_small_angle_is_constant() -> None:
@@ -99,10 +121,6 @@ def test_three_causes_of_two_variables_keep_their_names() -> None:
     assert families == {"spring.position", "ripple.motor", "friction.stribeck"}
 
 
-def _nothing(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-    return np.zeros(len(angle))
-
-
 def _loaded(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
     return 0.008 * acceleration
 
@@ -120,9 +138,9 @@ def test_a_declared_term_may_differ_in_some_of_the_runs(
 ) -> None:
     """A payload's torque, over the frequencies of a run, is nearly that of a spring."""
     has = [k in (1, 2, 5, 8, 9) for k in range(10)]
-    pairs = zip(turning(_nothing), turning(other), has, strict=True)
+    pairs = zip(turning(), turning(other), has, strict=True)
     runs = [two if with_it else one for one, two, with_it in pairs]
-    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    finding = _only(runs, axis())
     assert finding.family == family
     names = {run.name for run, with_it in zip(runs, has, strict=True) if with_it}
     if len(names ^ {*finding.runs_affected}) > 5:  # the others have the opposite change
@@ -134,11 +152,11 @@ def test_a_declared_term_may_differ_in_some_of_the_runs(
 def test_a_drive_that_saturates_is_found_where_it_is_the_target() -> None:
     """Nothing but the drive reads an effort, so it is what the equation explains."""
     runs = []
-    for run in turning(lambda angle, speed, acceleration: 0.0 * speed, size=3.0):
+    for run in turning(size=3.0):
         torque = run["crank_torque_n_m"]
         current = torque / 0.8 * (1.0 + 0.05 * (torque / 0.5) ** 2)
         runs.append(Recording(run.name, run.time_s, run.columns | {"crank_current_a": current}))
-    (finding,) = diagnose(runs, [axis("crank_current_a")], split(runs)).findings
+    finding = _only(runs, axis("crank_current_a"))
     assert finding.family == "motor.saturation"
     assert "sensor.gain_nonlinear" in finding.alternatives  # of the current: the same column
 
@@ -146,10 +164,10 @@ def test_a_drive_that_saturates_is_found_where_it_is_the_target() -> None:
 def test_a_drive_may_give_another_torque_an_ampere_in_some_of_the_runs() -> None:
     has = (1, 4, 5, 8)
     runs = []
-    for k, run in enumerate(turning(lambda angle, speed, acceleration: 0.0 * speed, size=3.0)):
+    for k, run in enumerate(turning(size=3.0)):
         current = run["crank_torque_n_m"] / (0.75 if k in has else 0.8)
         runs.append(Recording(run.name, run.time_s, run.columns | {"crank_current_a": current}))
-    (finding,) = diagnose(runs, [axis("crank_current_a")], split(runs)).findings
+    finding = _only(runs, axis("crank_current_a"))
     assert finding.family == "motor.torque_constant"
     assert finding.parameters["change"].value == pytest.approx(0.75 / 0.8 - 1.0, rel=0.15)
     assert {*finding.runs_affected} == {runs[k].name for k in has}
@@ -160,8 +178,7 @@ def test_a_tight_spot_in_every_turn_depends_on_the_angle_and_the_direction() -> 
         spot = np.exp(-(((np.mod(angle, 2 * np.pi) - 3.0) / 0.4) ** 2))
         return 1.5 * spot * np.tanh(speed / 0.2)
 
-    runs = turning(rubs, size=12.0)
-    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    finding = _only(turning(rubs, size=12.0), axis())
     assert finding.verdict == "depends_on"
     assert {*finding.depends_on} == {"velocity_sign", "crank_angle"}
 
@@ -176,7 +193,7 @@ def test_coloured_noise_of_a_torque_is_no_other_compliance_in_some_of_the_runs()
 def test_a_part_of_a_period_is_named_by_its_variables() -> None:
     """Over fewer than two periods a wave is any smooth function of the position."""
     runs = list(draw(1_120_002, "outside", gear_ratio=35.0).recordings)
-    (finding,) = diagnose(runs, model_file.reference_rig(), split(runs)).findings
+    finding = _only(runs, *model_file.reference_rig())
     assert finding.verdict == "depends_on"
     variables = {*finding.depends_on}
     assert variables in ({"spindle_angle", "load"}, {"jaw_angle", "load"})  # of one shaft
@@ -188,7 +205,7 @@ def test_a_weight_behind_a_gear_depends_on_the_angle_that_the_gear_gives() -> No
     gear = '[[transmission]]\nname = "gear"\ninput = "crank"\noutput = "arm"\nratio = 10.0\n'
     text = AXIS.replace("DRIVE", "crank_torque_n_m") + arm + gear
     runs = turning(lambda angle, *_: 3.0 * np.sin(angle / 10.0), size=15.0)
-    (finding,) = diagnose(runs, declared(plant_file.parse(text)), split(runs)).findings
+    finding = _only(runs, *declared(plant_file.parse(text)))
     assert finding.family == "gravity.payload"
     assert finding.depends_on == ("arm_angle",)
     assert finding.parameters["sine"].value == pytest.approx(3.0, rel=0.05)
@@ -196,35 +213,15 @@ def test_a_weight_behind_a_gear_depends_on_the_angle_that_the_gear_gives() -> No
 
 TWO_ENCODERS = """
 schema = "rig.machine/1"
-[machine]
-name = "joint"
-[[axis]]
-name = "motor"
-unit = "rad"
-[[axis]]
-name = "arm"
-unit = "rad"
-[[transmission]]
-name = "belt"
-input = "motor"
-output = "arm"
-ratio = 8.0
-compliant = true
-[[actuator]]
-name = "motor_current_a"
-axis = "motor"
-[[sensor]]
-name = "motor_angle_rad"
-axis = "motor"
-reads = "position"
-[[sensor]]
-name = "arm_angle_rad"
-axis = "arm"
-reads = "position"
-[[sensor]]
-name = "arm_torque_n_m"
-axis = "arm"
-reads = "effort"
+machine = { name = "joint" }
+axis = [{ name = "motor", unit = "rad" }, { name = "arm", unit = "rad" }]
+transmission = [{ name = "belt", input = "motor", output = "arm", ratio = 8.0, compliant = true }]
+actuator = [{ name = "motor_current_a", axis = "motor" }]
+sensor = [
+  { name = "motor_angle_rad", axis = "motor", reads = "position" },
+  { name = "arm_angle_rad", axis = "arm", reads = "position" },
+  { name = "arm_torque_n_m", axis = "arm", reads = "effort" },
+]
 """
 
 
@@ -246,14 +243,13 @@ def test_a_belt_that_stiffens_is_the_only_explanation_of_the_angle_between_two_e
             "arm_torque_n_m": load + random.normal(0, 2e-3, len(time)),
         }
         runs.append(Recording(f"{k:02d}", time, channels, started_at_ns=int(1e10 * k) + 1))
-    (finding,) = diagnose(runs, declared(plant_file.parse(TWO_ENCODERS)), split(runs)).findings
+    finding = _only(runs, *declared(plant_file.parse(TWO_ENCODERS)))
     assert (finding.family, finding.verdict) == ("transmission.stiffening", "identified")
 
 
 def test_the_width_of_a_declared_friction_is_another_next_to_a_cause() -> None:
     """Fitted without the drag, the width makes up for a part of it."""
-    runs = turning(lambda angle, speed, _: 0.1 * speed * np.abs(speed))
-    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    finding = _only(turning(lambda angle, speed, _: 0.1 * speed * np.abs(speed)), axis())
     assert finding.family == "friction.drag"
     assert finding.rmse_after < 0.05 * finding.rmse_before
 
@@ -261,7 +257,7 @@ def test_the_width_of_a_declared_friction_is_another_next_to_a_cause() -> None:
 def test_no_axis_of_the_reference_rig_is_apart_from_another() -> None:
     """The equations relate its shafts one after the other, so none is an axis of its own."""
     runs = list(draw(1_000_000, "clean").recordings)[:6]
-    layout = lay_out(model_file.reference_rig(), runs, [run.name for run in runs])
+    layout = _laid(runs, *model_file.reference_rig())
     assert not any(place.others for place in places_of(layout))
 
 
@@ -302,8 +298,7 @@ def test_many_runs_take_no_more_samples_than_some() -> None:
 @pytest.mark.long
 def test_an_effect_is_found_in_many_runs() -> None:
     runs = recordings(_asymmetric, 90)
-    answer = diagnose(runs, [motor()], split(runs))
-    assert [f.family for f in answer.findings] == ["friction.viscous_asymmetry"]
+    assert _only(runs, motor()).family == "friction.viscous_asymmetry"
 
 
 def _coarse(seed: int, count_rad: float = 0.01) -> list[Recording]:
@@ -350,7 +345,9 @@ def test_a_noisy_encoder_is_no_slow_one() -> None:
 )
 def test_nothing_is_found_where_nothing_is_missing(made: Callable[[], list[Recording]]) -> None:
     runs = made()
-    assert diagnose(runs, [motor()], split(runs)).verdict == "nothing_missing"
+    found = diagnose(runs, [motor()], split(runs))
+    assert found.verdict == "nothing_missing"
+    assert found.errors["motor"].after == found.errors["motor"].before
 
 
 def test_a_run_with_a_swapped_sign_is_remarked_on() -> None:
@@ -372,11 +369,13 @@ def test_a_run_with_a_swapped_sign_is_remarked_on() -> None:
 def test_a_test_run_decides_itself_where_the_training_runs_do_not(having: tuple[int, ...]) -> None:
     plain, rippled = recordings(), recordings(_rippled)
     runs = [rippled[k] if k in having else plain[k] for k in range(12)]
-    answer = diagnose(runs, [motor()], split(runs))
-    (finding,) = answer.findings
+    found = answer(runs, [motor()], split(runs))
+    (finding,) = found.diagnosis.findings
     assert finding.family == "ripple.motor"
     assert {*finding.runs_affected} == {f"{k:02d}" for k in having}
-    assert any("these test runs themselves" in note for note in answer.notes)
+    assert any("these test runs themselves" in note for note in found.diagnosis.notes)
+    # the runs without it would be worse with it, so it is in no model file
+    assert [len(written.terms) for written in found.models] == [len(motor().terms)]
 
 
 def test_a_loss_at_a_spot_that_grows_with_the_load_is_found_with_both_variables() -> None:
@@ -385,10 +384,13 @@ def test_a_loss_at_a_spot_that_grows_with_the_load_is_found_with_both_variables(
         return 0.3 * load * there * np.tanh(speed / 2.0)
 
     runs = recordings(spot)
-    finding = diagnose(runs, [motor()], split(runs)).findings[0]
-    assert finding.verdict == "depends_on"
+    found = answer(runs, [motor()], split(runs))
+    finding = found.diagnosis.findings[0]
+    assert (finding.family, finding.verdict, finding.confidence) == ("unknown", "depends_on", None)
     assert {*finding.depends_on} == {"velocity_sign", "motor_angle", "load"}
     assert finding.rmse_after < 0.7 * finding.rmse_before
+    assert [len(written.terms) for written in found.models] == [len(motor().terms)]
+    assert any("not added to the model file" in note for note in found.diagnosis.notes)
 
 
 @pytest.mark.parametrize(
@@ -402,8 +404,7 @@ def test_a_loss_at_a_spot_that_grows_with_the_load_is_found_with_both_variables(
     ],
 )
 def test_a_gear_and_its_sensors_are_kept_apart(fault: dict[str, float], family: str) -> None:
-    runs = geared(**fault)
-    (finding,) = diagnose(runs, [motor(), gearbox()], split(runs)).findings
+    finding = _only(geared(**fault), motor(), gearbox())
     assert finding.family == family
     assert finding.rmse_after < (0.6 if "slow" in fault else 1.0) * finding.rmse_before
 
@@ -475,8 +476,7 @@ def test_a_cause_of_some_runs_does_not_free_a_slope_within_runs_from_their_means
         runs.append(
             run.with_columns(distal_torque_n_m=load + 0.003 * way, proximal_torque_n_m=torque)
         )
-    layout = lay_out(cable(), runs, [run.name for run in runs])
-    add_instruments(layout, [run.name for run in runs])
+    layout = _laid(runs, *cable())
     joint = Joint(layout)
     (place,) = [p for p in places_of(layout) if p.name == "cable"]
     # as good as constant while the cable moves, and present where the load is large
@@ -491,8 +491,7 @@ def test_runs_without_a_cause_show_nothing_of_its_size() -> None:
     """Fitted without the runs that have it, a cause predicts as little for them as no cause."""
     rubs = recordings(lambda angle, speed, load: 0.01 * np.tanh(speed / 2.0))
     runs = [*rubs[:3], *recordings()[3:]]
-    layout = lay_out([motor()], runs, [run.name for run in runs])
-    add_instruments(layout, [run.name for run in runs])
+    layout = _laid(runs, motor())
     joint = Joint(layout)
     place = next(p for p in places_of(layout) if p.name == "motor")
     acts = tuple(k < 3 for k in range(len(runs)))
@@ -603,8 +602,7 @@ def _assert_not_read(copy: Copy) -> None:
         values = np.convolve(values, np.ones(9) / 9, "same") if copy.filtered else values
         noisy = copy.scale * values + random.normal(0, copy.noise, len(values))
         runs.append(run.with_columns(**{copy.name: noisy}))
-    layout = lay_out([motor()], runs, [r.name for r in runs])
-    add_instruments(layout, [r.name for r in runs])
+    layout = _laid(runs, motor())
     read = {
         channel
         for place in places_of(layout)
@@ -622,8 +620,7 @@ def test_no_candidate_carries_the_noise_of_its_own_equations_torque_sensor() -> 
         noise = random.normal(0, np.std(torque), len(torque))
         noisy.append(run.with_columns(proximal_torque_n_m=torque + noise))
     names = [r.name for r in quiet]
-    layouts = [lay_out([motor()], runs, names) for runs in (quiet, noisy)]
-    add_instruments(layouts[1], names)
+    layouts = [lay_out([motor()], quiet, names), _laid(noisy, motor())]
     run, channel = layouts[1].runs[0], "proximal_torque_n_m"
     added = (run.channels[channel] - layouts[0].runs[0].channels[channel])[run.grid]
     for place in places_of(layouts[1]):
@@ -668,9 +665,7 @@ def test_a_wave_in_an_encoder_is_differentiated_as_the_channels_are(every: int) 
 
 
 def test_each_family_of_folds_leaves_every_run_out_once() -> None:
-    runs = recordings(runs=9)
-    layout = lay_out([motor()], runs, [r.name for r in runs])
-    families = folds_of(layout)
+    families = folds_of(_laid(recordings(runs=9), motor()))
     assert len(families) >= 2
     for family in families:
         assert sorted(k for fold in family for k in fold) == list(range(9))
