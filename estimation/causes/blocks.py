@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.causes.folds import Folds
-from estimation.causes.joint import Joint, Next, Part
-from estimation.causes.laid import Columns, Laid, products
+from estimation.causes.joint import Joint, Next
+from estimation.causes.laid import Laid, Part, products
 from estimation.recording import FloatArray
 
 
@@ -82,10 +82,8 @@ def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
     """Return causes' products with a regression; those with a part of its base may be known."""
     of, runs, k = {}, len(joint.runs), laid.size.shape[1]
     for p in joint.parts:
-        name, kind = p
-        if name not in laid.inner:
+        if (columns := laid.part(p)) is None:
             continue
-        columns: Columns = laid.inner[name] if kind == "within" else laid.means[name][:, :, None]
         table, places = joint.tables[p].astype(columns.dtype), [*joint.at[p]]
         base = np.zeros((runs, len(laid), joint.size, k))
         if known is None:

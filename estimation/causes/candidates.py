@@ -89,13 +89,10 @@ Raw = tuple[Claim, OfRuns, OfRuns | None]
 
 @dataclass(frozen=True)
 class Group:
-    """Candidates of one place with as many columns each.
+    """Candidates of one place with as many columns each, laid out together.
 
-    Attributes:
-        candidates: The candidates.
-        laid: Their columns.
-        precision: Prior precision of their amplitudes, shape (candidates, k).
-        block: Their products with the regression that they were laid out for.
+    The prior precision of their amplitudes has the shape (candidates, k); the block is their
+    products with the regression that they were laid out for.
     """
 
     candidates: Sequence[Candidate]

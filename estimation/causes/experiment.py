@@ -29,13 +29,9 @@ MOST = 4
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One explanation of a finding.
+    """One explanation of a finding, with its probability among those compared.
 
-    Attributes:
-        label: Its family, or the variables of an unknown form.
-        probability: Its probability among those compared.
-        cause: The cause.
-        amplitudes: Fitted on the training runs together with the other causes, shape (k,).
+    Its amplitudes, shape (k,), were fitted on the training runs together with the other causes.
     """
 
     label: str
@@ -46,13 +42,10 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Question:
-    """The hypotheses of one finding, ready to predict.
+    """Two hypotheses of one finding at least, ready to predict.
 
-    Attributes:
-        hypotheses: Two at least.
-        noise: Equation to the variance of its residual with the likeliest hypothesis, on runs left
-            out.
-        layout: The equations.
+    The noise is, for each equation, the variance of its residual with the likeliest one, on runs
+    left out.
     """
 
     hypotheses: tuple[Hypothesis, ...]

@@ -44,12 +44,8 @@ ANGLES_OF_ROLE = ("position", "output_angle", "motor_angle", "encoder", "stop", 
 class Probability:
     """A family's share of the posterior in one slot of the leading hypothesis.
 
-    Attributes:
-        family: The family.
-        share: Its probability.
-        best: Its best candidate.
-        gain: Of that candidate, before the price of what was chosen: over the training runs, or
-            over all runs once the test runs are opened.
+    The gain is that of its best candidate, before the price of what was chosen: over the training
+    runs, or over all runs once the test runs are opened.
     """
 
     family: str
@@ -60,13 +56,9 @@ class Probability:
 
 @dataclass(frozen=True)
 class Kept:
-    """A cause that the test runs confirmed.
+    """A cause that the test runs confirmed, with the families and all candidates in its place.
 
-    Attributes:
-        scored: The cause.
-        likely: The probabilities of the families in its place.
-        ranked: Every candidate in its place, given the other causes, best first.
-        part: What it adds to its home equation.
+    They are given the other causes, best first. The part is what it adds to its home equation.
     """
 
     scored: Scored

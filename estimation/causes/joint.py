@@ -16,12 +16,9 @@ from numpy.typing import NDArray
 from estimation.causes.equations import SHAPE_STEP, Layout
 from estimation.causes.folds import Folds
 from estimation.causes.instruments import declared_of
-from estimation.causes.laid import TINY, Columns, Laid, Projection, Stacks, inverse
+from estimation.causes.laid import TINY, Laid, Part, Projection, centred, inverse
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.recording import FloatArray
-
-Part = tuple[str, str]
-"""An equation and `within` runs or `between` them."""
 
 Family = Sequence[Sequence[int]]
 """Folds of one kind: each is the runs that are left out together."""
@@ -67,6 +64,7 @@ class Joint:
         parts: The residuals, in one order.
         samples: Part to the samples of each run, shape (runs,).
         error: Part to the mean squared residual of the declared model.
+        weights: Part to the weight of one of its squared residuals.
         tables: Part to the columns of the base and, last, the target: (runs, samples, columns).
         at: Part to the parameters of the base whose columns are in its table.
         gram: Part to the cross-products of all parameters and, last, the target, of each run.
@@ -78,29 +76,26 @@ class Joint:
     def __init__(self, layout: Layout, numbers: Numbers = DEFAULT) -> None:
         self.layout, self.numbers = layout, numbers
         self.runs = layout.runs
-        self.parts: list[Part] = [
-            (name, kind) for name in layout.equations for kind in ("within", "between")
-        ]
-        stacks = Stacks(layout)
         counts = [len(equation.kinds) for equation in layout.equations.values()]
         ends = itertools.pairwise(itertools.accumulate(counts, initial=0))
         self._equations_at = {n: range(*at) for n, at in zip(layout.equations, ends, strict=True)}
         self._added, self.taken = np.zeros(0), np.zeros((self._declared_size, 0))
-        self.tables, self.at, self.samples = self._laid_out(stacks)
+        self.tables: dict[Part, FloatArray] = {}
+        self.at: dict[Part, Sequence[int]] = {}
+        self.samples: dict[Part, FloatArray] = {}
+        for name in layout.equations:
+            self._lay_out(name)
+        self.parts = [*self.tables]
         self.gram = self._products()
         noise = {
-            name: stacks.centred(
-                name,
-                stacks.stacked(name, [e.noise(r)[r.grid[r.used[name]]] for r in self.runs]),
-            )[0]
+            name: centred([e.noise(r)[r.grid[r.used[name]]] for r in self.runs])[0]
             for name, e in layout.equations.items()
         }
         self._white, self._noise = noise, self._noise_products(noise)
-        self.error: Mapping[Part, float] = self._declared_error()
+        self._weigh()
         self.declared = self.left_out(((),)).base[0]
         weights = self.weights
         self.projection = Projection(
-            stacks,
             {e.name: [declared_of(e, r) for r in self.runs] for e in layout.equations.values()},
             noise,
             {n: (weights[n, "within"], weights[n, "between"]) for n in layout.equations},
@@ -111,15 +106,6 @@ class Joint:
             for p in self.parts
             if p[1] == "within"
         )
-
-    @property
-    def weights(self) -> Mapping[Part, float]:
-        """Weight of one squared residual of each part."""
-        return {
-            p: (self.numbers.samples_a_run / self.samples[p].mean() if p[1] == "within" else 1.0)
-            / self.error[p]
-            for p in self.parts
-        }
 
     @property
     def size(self) -> int:
@@ -138,25 +124,20 @@ class Joint:
 
     # ---- the base
 
-    def _laid_out(
-        self, stacks: Stacks
-    ) -> tuple[Mapping[Part, FloatArray], Mapping[Part, Sequence[int]], Mapping[Part, FloatArray]]:
-        tables, at, samples = {}, {}, {}
-        for name, equation in self.layout.equations.items():
-            columns = []
-            for run in self.runs:
-                used = run.grid[run.used[name]]
-                target = run.channels[equation.target][used, None]
-                columns.append(np.hstack([equation.columns(run.channels)[used], target]))
-            inner, means = stacks.centred(name, stacks.stacked(name, columns))
-            one = np.ones((len(means), 1))
-            tables[name, "within"] = inner
-            tables[name, "between"] = np.hstack([means[:, :-1], one, means[:, -1:]])[:, None]
-            at[name, "within"] = [*self._equations_at[name]]
-            at[name, "between"] = [*self._equations_at[name], self._offset_at(name)]
-            samples[name, "within"] = stacks.counts[name].astype(np.float64)
-            samples[name, "between"] = np.ones(len(means))
-        return tables, at, samples
+    def _lay_out(self, name: str) -> None:
+        """Add the tables of an equation, within runs and between them."""
+        equation, columns, at = self.layout.equations[name], [], [*self._equations_at[name]]
+        for run in self.runs:
+            used = run.grid[run.used[name]]
+            target = run.channels[equation.target][used, None]
+            columns.append(np.hstack([equation.columns(run.channels)[used], target]))
+        inner, means = centred(columns)
+        one = np.ones((len(means), 1))
+        self.tables[name, "within"], self.at[name, "within"] = inner, at
+        self.tables[name, "between"] = np.hstack([means[:, :-1], one, means[:, -1:]])[:, None]
+        self.at[name, "between"] = [*at, self._offset_at(name)]
+        self.samples[name, "within"] = np.array([float(len(own)) for own in columns])
+        self.samples[name, "between"] = np.ones(len(means))
 
     def _products(self) -> Mapping[Part, FloatArray]:
         out = {}
@@ -167,25 +148,27 @@ class Joint:
             out[p][:, rows, columns] = table.transpose(0, 2, 1) @ table
         return out
 
-    def _declared_error(self) -> Mapping[Part, float]:
-        """Return the mean squared residual of the declared model in each part."""
-        error, count = dict.fromkeys(self.parts, 1.0), len(self.runs)
+    def _weigh(self) -> None:
+        """Work out the mean squared residual of the declared model in each part, and the fits."""
+        self.error, count = dict.fromkeys(self.parts, 1.0), len(self.runs)
+        self._prepare()
         for _ in range(5):
-            self.error = dict(error)
-            self._prepare()
-            vector = np.append(self.left_out(((),)).base[0], -1.0)
+            vector, error = np.append(self.left_out(((),)).base[0], -1.0), dict[Part, float]()
             for p in self.parts:
                 value = float(np.einsum("i,rij,j->", vector, self.gram[p], vector))
                 spare = count / max(1, count - 3) if p[1] == "between" else 1.0
                 error[p] = max(spare * value / self.samples[p].sum(), TINY)
-        self.error = dict(error)
-        self._prepare()
-        return error
+            self.error = error
+            self._prepare()
 
     def _prepare(self) -> None:
         """Work out what all fits of this base share."""
-        weights, zero = self.weights, np.zeros(())
-        self._run_grams = np.asarray(sum((weights[p] * self.gram[p] for p in self.parts), zero))
+        each = self.numbers.samples_a_run
+        self.weights = {
+            p: (each / self.samples[p].mean() if p[1] == "within" else 1.0) / self.error[p]
+            for p in self.parts
+        }
+        self._run_grams = np.asarray(sum(self.weights[p] * self.gram[p] for p in self.parts))
         self._fits: dict[tuple[tuple[int, ...], ...], LeftOut] = {}
         whole = self._run_grams.sum(axis=0)
         # no term exceeds half of all signals, and a shape is known to within its own size
@@ -264,10 +247,10 @@ class Joint:
             if kind == "within":
                 usual = np.append(self.declared[[*self._equations_at[name]]], -1.0)
                 table[..., -1] = table[..., :-1] @ base[self.at[p]] - self._white[name] @ usual
-            if (columns := _columns(laid, p)) is not None:
+            if (columns := laid.part(p)) is not None:
                 table[..., -1] += columns[:, 0] @ amplitudes
         made.gram = made._products()
-        made.error = made._declared_error()
+        made._weigh()
         made.declared = made.whole(made.left_out(((),)).base[0])
         made.__dict__.pop("largest_linear", None)
         return made
@@ -282,7 +265,7 @@ class Joint:
         new = range(self.size, self.size + len(precision))
         for p, table in self.tables.items():
             made.tables[p], made.at[p] = table, self.at[p]
-            if (columns := _columns(laid, p)) is not None:
+            if (columns := laid.part(p)) is not None:
                 parts = [table[..., :-1], columns[:, 0], table[..., -1:]]
                 made.tables[p], made.at[p] = np.concatenate(parts, axis=2), [*self.at[p], *new]
         made.gram = made._products()
@@ -451,14 +434,6 @@ class Joint:
             weight = numbers.between
             floor += numbers.between * self.error[part[0], "within"]
         return np.asarray(weight * np.log((before + floor) / (after + floor)))
-
-
-def _columns(laid: Laid, part: Part) -> Columns | None:
-    """Return causes' columns of a part, (runs, causes, samples, k); None where they have none."""
-    name, kind = part
-    if name not in laid.inner:
-        return None
-    return laid.inner[name] if kind == "within" else laid.means[name][:, :, None]
 
 
 def _at_most(noise: FloatArray, gram: FloatArray) -> FloatArray:

@@ -7,11 +7,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.causes.equations import Layout
 from estimation.recording import FloatArray
 
 Columns = NDArray[np.floating[Any]]
 """Columns of causes; of 32 bits within runs: there are thousands, and the noise is far larger."""
+
+Part = tuple[str, str]
+"""An equation and `within` runs or `between` them."""
 
 Scale = Literal["each", "first", "none"]
 """Of which columns the norm is one: of each, of the first, or of none."""
@@ -47,6 +49,13 @@ class Laid:
     def __len__(self) -> int:
         return len(self.size)
 
+    def part(self, part: Part) -> Columns | None:
+        """Return the columns of a part, (runs, causes, samples, k); None where there are none."""
+        name, kind = part
+        if name not in self.inner:
+            return None
+        return self.inner[name] if kind == "within" else self.means[name][:, :, None]
+
     def only(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> "Laid":
         """Return some of the causes."""
         return Laid(
@@ -67,30 +76,19 @@ class Laid:
         return Laid(inner, means, taken, self.size, noise, own_noise)
 
 
-class Stacks:
-    """The samples that each equation counts, of all runs in one array that zeros fill up."""
+def centred(columns: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return columns of every run, (n, k) each, less each run's mean, and the means, (runs, k).
 
-    def __init__(self, layout: Layout) -> None:
-        self.counts = {
-            name: np.array([len(run.used[name]) for run in layout.runs])
-            for name in layout.equations
-        }
-
-    def stacked(self, name: str, columns: Sequence[FloatArray]) -> FloatArray:
-        """Return an equation's columns of every run, (n, k) each, as (runs, samples, k)."""
-        counts = self.counts[name]
-        out = np.zeros((len(counts), counts.max(), columns[0].shape[1]))
-        for own, values in zip(out, columns, strict=True):
-            own[: len(values)] = values
-        return out
-
-    def centred(self, name: str, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return columns (runs, ..., samples, k) less each run's mean, in place, and the means."""
-        counts = self.counts[name]
-        means = stacked.sum(axis=-2) / counts.reshape(-1, *[1] * (stacked.ndim - 2))
-        for own, mean, count in zip(stacked, means, counts, strict=True):
-            own[..., :count, :] -= mean[..., None, :]
-        return stacked, means
+    The runs are in one array that zeros fill up, (runs, samples, k).
+    """
+    counts = np.array([len(own) for own in columns])
+    out = np.zeros((len(counts), counts.max(), columns[0].shape[1]))
+    for inner, own in zip(out, columns, strict=True):
+        inner[: len(own)] = own
+    means = out.sum(axis=1) / counts[:, None]
+    for inner, mean, count in zip(out, means, counts, strict=True):
+        inner[:count] -= mean
+    return out, means
 
 
 class Projection:
@@ -99,7 +97,6 @@ class Projection:
     A candidate does not profit from reading a quieter sensor.
 
     Args:
-        samples: How samples are stacked.
         declared: Equation to the declared columns of instrumented signals, of every run.
         noise: Equation to the noise of the declared columns and of the target, of every run.
         weights: Equation to the weights of one squared residual within runs and between them.
@@ -109,7 +106,6 @@ class Projection:
 
     def __init__(
         self,
-        samples: Stacks,
         declared: Mapping[str, Sequence[FloatArray]],
         noise: Mapping[str, FloatArray],
         weights: Mapping[str, tuple[float, float]],
@@ -119,7 +115,7 @@ class Projection:
         self._inner, self._means, self._inverse = dict[str, Columns](), {}, {}
         self._noise = {name: x.astype(np.float32) for name, x in noise.items()}
         for name, columns in declared.items():
-            inner, means = samples.centred(name, samples.stacked(name, columns))
+            inner, means = centred(columns)
             means = np.column_stack([means, np.ones(len(means))])
             within, between = weights[name]
             gram = between * means.T @ means
@@ -160,14 +156,11 @@ class Projection:
             inner -= times(base[:, None], slope[None, :, :-1].astype(np.float32))
             inners[name], taken[name] = inner, slope[:, :-1]
             middles[name] = means - np.einsum("ri,cik->rck", middle, slope)
-        if unit == "none":
-            _, means = next(iter(columns.values()))
-            size = np.ones((means.shape[1], means.shape[2]))
-        else:
-            size = np.sqrt(norm) + TINY
-        if unit == "first":
-            size = np.repeat(size[:, :1], size.shape[1], axis=1)
+        size = np.ones(next(iter(middles.values())).shape[1:])
         if unit != "none":
+            size = np.sqrt(norm) + TINY
+            if unit == "first":
+                size = np.repeat(size[:, :1], size.shape[1], axis=1)
             for name, inner in inners.items():
                 inner /= size[:, None]
                 middles[name] /= size

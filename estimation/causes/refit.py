@@ -160,7 +160,7 @@ class Refit:
             return None
         run, judged = known
         target = run.whole[self.model.target][judged]
-        table = self._table(solved.parts, solved.declared, name, judged)
+        table = _table(solved.parts, solved.declared, run, judged)
         return judged, target, target - table @ solved.weights - solved.level
 
     def errors(self, solved: Solved, without: Collection[str] = ()) -> Errors:
@@ -222,8 +222,8 @@ class Refit:
 
     def _amplitudes(self, parts: tuple[Part, ...], declared: tuple[Term, ...]) -> Solved:
         grams, means, samples = [], [], 0
-        for name, run in self._train_runs(parts):
-            table = self._table(parts, declared, name, run.places)
+        for run in self._train_runs(parts):
+            table = _table(parts, declared, run, run.places)
             whole = np.column_stack([table, run.whole[self.model.target][run.places]])
             means.append(whole.mean(axis=0))
             grams.append(self._products(whole))
@@ -241,18 +241,18 @@ class Refit:
     def _moved(self, solved: Solved, share: float) -> tuple[Term, ...]:
         """Return the declared terms with their shapes a share of a Gauss-Newton step further."""
         products = []
-        for name, run in self._train_runs(solved.parts):
-            table = self._table(solved.parts, solved.declared, name, run.places)
+        for run in self._train_runs(solved.parts):
+            table = _table(solved.parts, solved.declared, run, run.places)
             left = run.whole[self.model.target][run.places] - table @ solved.weights
             own = shapes.slopes(solved.declared, solved.weights, partial(_columns, run=run))
             products.append(self._products(np.column_stack([table, own, left])))
         return shapes.moved(solved.declared, np.sum(products, axis=0), share)
 
-    def _train_runs(self, parts: Sequence[Part]) -> Iterator[tuple[str, FitRun]]:
+    def _train_runs(self, parts: Sequence[Part]) -> Iterator[FitRun]:
         """Yield the training runs that have a sample of the equation."""
         for name in self.train_names:
             if (known := self._run(parts, name)) is not None:
-                yield name, known[0]
+                yield known[0]
 
     def _products(self, whole: FloatArray) -> FloatArray:
         """Return products of columns, each run's mean removed where offsets are a nuisance."""
@@ -274,26 +274,6 @@ class Refit:
                 rows += [(part.precision, -np.inf, np.inf)] * count
         penalty, low, high = np.array(rows).T
         return penalty, low, high
-
-    def _table(
-        self,
-        parts: Sequence[Part],
-        declared: Sequence[Term],
-        name: str,
-        places: NDArray[np.intp],
-    ) -> FloatArray:
-        """Return the signed columns of a run: declared, found, and those without a term, (n, k)."""
-        known = self._run(parts, name)
-        assert known is not None  # noqa: S101 - narrows the type
-        run, _ = known
-        blocks = [_columns(term, run, places) for term in declared]
-        for part in parts:
-            if part.term is not None:
-                acts = part.acts is None or name in part.acts
-                blocks.append(_columns(part.term, run, places) * float(acts))
-        since_s = run.whole.time_s[places] - run.whole.time_s[0]
-        blocks += [p.unwritten(name, since_s) for p in parts if p.unwritten is not None]
-        return np.hstack(blocks)
 
     def _run(self, parts: Sequence[Part], name: str) -> tuple[FitRun, NDArray[np.intp]] | None:
         """Return a run and the samples that its error counts; None without a sample to fit."""
@@ -319,6 +299,20 @@ class Refit:
 
 def _rms(squares: Mapping[str, float], samples: Mapping[str, int]) -> float:
     return float(np.sqrt(sum(squares.values()) / max(1, sum(samples.values()))))
+
+
+def _table(
+    parts: Sequence[Part], declared: Sequence[Term], run: FitRun, places: NDArray[np.intp]
+) -> FloatArray:
+    """Return the signed columns of a run: declared, found, and those without a term, (n, k)."""
+    name, blocks = run.whole.name, [_columns(term, run, places) for term in declared]
+    for part in parts:
+        if part.term is not None:
+            acts = part.acts is None or name in part.acts
+            blocks.append(_columns(part.term, run, places) * float(acts))
+    since_s = run.whole.time_s[places] - run.whole.time_s[0]
+    blocks += [p.unwritten(name, since_s) for p in parts if p.unwritten is not None]
+    return np.hstack(blocks)
 
 
 def _columns(term: Term, run: FitRun, places: NDArray[np.intp] | None = None) -> FloatArray:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.causes.held_out import HeldOut
-from estimation.causes.numbers import Numbers
 from estimation.recording import FloatArray
 
 KNOTS = 12
@@ -44,9 +43,9 @@ class Unsteady:
     fall: float
 
 
-def unsteady(held_out: HeldOut, numbers: Numbers) -> Unsteady | None:
+def unsteady(held_out: HeldOut) -> Unsteady | None:
     """Return the friction term whose level changes most; None without evidence on the test runs."""
-    errors = dict(_errors(held_out))
+    errors, numbers = _errors(held_out), held_out.numbers
     if not errors:
         return None
     test = np.zeros(len(held_out.layout.runs), dtype=np.bool_)

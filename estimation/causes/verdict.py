@@ -48,13 +48,8 @@ MOST_NOISE = 0.3
 class Answer:
     """A diagnosis with what a report, a model file and the next experiment need.
 
-    Attributes:
-        diagnosis: The diagnosis.
-        layout: The equations on all runs.
-        found: The search on the training runs.
-        kept: The cause of each finding.
-        refits: The equations before and after.
-        models: The models with the causes that a file can hold.
+    These are the equations on all runs, the search on the training runs, the cause of each finding,
+    the equations refitted before and after, and the models with the causes that a file can hold.
     """
 
     diagnosis: Diagnosis
@@ -114,7 +109,7 @@ def answer(
     findings = [
         replace(f, parameters=parameters_of(kept, f.balance, written)) for kept, f in judged
     ]
-    if not findings and sealed.may_name and (changing := unsteady(held_out, numbers)):
+    if not findings and sealed.may_name and (changing := unsteady(held_out)):
         findings = [unpredicted(changing, refits)]
         notes.append(
             f"{changing.equation}: the level of {changing.effect} changes within runs, at times"
@@ -144,7 +139,7 @@ def _judged(
     found: Found, held_out: HeldOut, refits: Refits
 ) -> tuple[list[tuple[Kept, Finding]], list[str]]:
     """Return the causes that the test runs confirm with their findings, and notes on the others."""
-    confirmed, notes = _confirmed(found, held_out, refits.numbers)
+    confirmed, notes = _confirmed(found, held_out)
     opened: dict[int, tuple[Kept, Finding]] = {}
     spread = [len(one.scored.candidate.cause.place.equations) for one in confirmed]
     # each equation is refitted on its own, where a cause of several ones could stand in for another
@@ -204,18 +199,18 @@ def _opened(
     return finding, notes
 
 
-def _confirmed(found: Found, held_out: HeldOut, numbers: Numbers) -> tuple[list[Kept], list[str]]:
+def _confirmed(found: Found, held_out: HeldOut) -> tuple[list[Kept], list[str]]:
     """Return the causes with evidence on the test runs next to the others, and notes on the rest.
 
     The one with the least evidence goes first: two effects may need one another.
     """
-    left, notes = list[Kept](), list[str]()
+    left, notes, numbers = list[Kept](), list[str](), held_out.numbers
     for ranked in found.conditional:
         likely = family_probabilities(ranked, numbers)
         left.append(Kept(likely[0].best, likely, ranked))
     while left:
         tested = [
-            _tested(one, [o.scored.candidate for o in left if o is not one], held_out, numbers)
+            _tested(one, [o.scored.candidate for o in left if o is not one], held_out)
             for one in left
         ]
         least = min(range(len(left)), key=lambda k: tested[k][1])
@@ -229,15 +224,13 @@ def _confirmed(found: Found, held_out: HeldOut, numbers: Numbers) -> tuple[list[
     return [], notes
 
 
-def _tested(
-    one: Kept, others: Sequence[Candidate], held_out: HeldOut, numbers: Numbers
-) -> tuple[Kept, float]:
+def _tested(one: Kept, others: Sequence[Candidate], held_out: HeldOut) -> tuple[Kept, float]:
     """Return a cause with probabilities from all runs, and the log e-value of the test runs.
 
     The e-value is the mean over the families, by their probabilities on the training runs.
     Each of these families then has the mean gain over all runs; the test runs add no family.
     """
-    known = [p for p in one.likely if p.share >= LEAST_SHARE]
+    known, numbers = [p for p in one.likely if p.share >= LEAST_SHARE], held_out.numbers
     count, train = len(held_out.layout.runs), len(held_out.layout.runs) - len(held_out.at)
     gains, logs = np.array([(p.gain, 0.0) for p in known]).T
     for k, p in enumerate(known):

@@ -54,11 +54,7 @@ def look_at(recordings: Sequence[Recording], sealed: Sealed) -> Look:
 
 @dataclass(frozen=True)
 class Ledger:
-    """The uses so far, one line of JSON each.
-
-    Attributes:
-        path: The file; made at the first use.
-    """
+    """The uses so far, one line of JSON each in a file that the first one makes."""
 
     path: Path
 

@@ -34,12 +34,7 @@ SPENT = "the budget is spent"
 
 @dataclass(frozen=True)
 class Budget:
-    """What a loop may use.
-
-    Attributes:
-        rounds: Campaigns at most.
-        minutes: Time after which no further round begins.
-    """
+    """What a loop may use: so many rounds, and minutes after which no further one begins."""
 
     rounds: int
     minutes: float

@@ -16,13 +16,7 @@ from rig.simulation.campaign import simulate_reference_campaign
 
 @dataclass(frozen=True)
 class Plan:
-    """The effects that runs can distinguish.
-
-    Attributes:
-        source: Protocol or recordings.
-        runs: Number of runs.
-        effects: The expected conclusion on each effect, the vaguest first.
-    """
+    """The expected conclusion on each effect, the vaguest first, from so many runs of a source."""
 
     source: str
     runs: int

@@ -19,12 +19,7 @@ from rig.machines.shipped import equations_of
 
 @dataclass(frozen=True)
 class Subject:
-    """What is diagnosed.
-
-    Attributes:
-        campaign: The recordings.
-        models: Declared models, one an equation.
-    """
+    """What is diagnosed: recordings, and the models that are declared of them, one an equation."""
 
     campaign: Campaign
     models: Sequence[Model]

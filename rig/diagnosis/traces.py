@@ -41,12 +41,7 @@ class RunTrace:
 
 @dataclass(frozen=True)
 class EquationTraces:
-    """The held-out test runs in one equation.
-
-    Attributes:
-        model: The declared model.
-        runs: The runs, in the order of the campaign.
-    """
+    """The held-out test runs, in the order of the campaign, in one declared equation."""
 
     model: Model
     runs: tuple[RunTrace, ...]
