@@ -277,18 +277,17 @@ def _is_noisy(layout: Layout, claim: Claim) -> bool:
 
 def _noise_share(layout: Layout, channel: str) -> float:
     """Return the noise of a channel over its range in all runs."""
-    known = layout.runs[0].memo
-    key = ("noise share", channel)
-    if key not in known:
+
+    def share() -> FloatArray:
         values = [run.on_grid(channel) for run in layout.runs]
         noise = [
             float(np.mean((shaken.on_grid(channel) - own) ** 2))
             for shaken, own in zip(layout.shaken, values, strict=True)
         ]
         span = max(x.max() for x in values) - min(x.min() for x in values)
-        known[key] = np.array(np.sqrt(np.mean(noise)) / (span or 1.0))
-    found = known[key]
-    return 0.0 if found is None else float(found)
+        return np.array(np.sqrt(np.mean(noise)) / (span or 1.0))
+
+    return float(layout.runs[0].once(("noise share", channel), share))
 
 
 def _unit(cause: Source | Function) -> Scale:

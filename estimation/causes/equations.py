@@ -6,7 +6,7 @@ grid that all equations of a run share.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -101,10 +101,13 @@ class RunSignals:
 
     def on_grid(self, channel: str) -> FloatArray:
         """Return a channel at the places regressed on, shape (len(grid),)."""
-        key = ("grid", channel)
+        return self.once(("grid", channel), lambda: self.channels[channel][self.grid])
+
+    def once(self, key: object, make: Callable[[], FloatArray]) -> FloatArray:
+        """Return the array that was worked out under a key, or work it out now."""
         found = self.memo.get(key)
         if found is None:
-            found = self.memo[key] = self.channels[channel][self.grid]
+            found = self.memo[key] = make()
         return found
 
 

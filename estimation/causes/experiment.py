@@ -54,7 +54,7 @@ class Question:
 
 
 def question(answer: Answer, place: int) -> Question | None:
-    """Return what an experiment should separate of the finding at a place; None if it is sure."""
+    """Return the hypotheses of a finding that an experiment should separate; None if it is sure."""
     if answer.diagnosis.findings[place].verdict == "identified":
         return None
     joint = answer.found.joint

@@ -1,7 +1,7 @@
 """The findings of a diagnosis: what is claimed of a cause, and its parameters."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from estimation.causes.candidates import Candidate
 from estimation.causes.declared import Moved
@@ -81,30 +81,28 @@ def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Pro
 
 def named(one: Kept, may_name: bool) -> Finding:
     """Return the claim of a cause, without its errors."""
-    cause = one.scored.candidate.cause
-    home = cause.place.home
-    lead = one.likely[0]
-    others = others_in_set(lead.family, {p.family: p.share for p in one.likely})
-    unknown = isinstance(lead.best.candidate.cause, Function)
-    if not may_name:
-        verdict = "something_missing"
-    elif unknown:
-        verdict = "depends_on"
-    else:
-        verdict = "identified" if lead.share >= SURE else "one_of"
-    return Finding(
-        balance=home,
-        also_in=tuple(name for name in cause.place.equations if name != home),
-        place=cause.place.name,
-        family=lead.family if may_name else "unknown",
-        verdict=verdict,
-        alternatives=tuple(others) if may_name else (),
-        probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]}
-        if may_name
-        else {},
+    place, lead = one.scored.candidate.cause.place, one.likely[0]
+    finding = Finding(
+        balance=place.home,
+        also_in=tuple(name for name in place.equations if name != place.home),
+        place=place.name,
+        family="unknown",
+        verdict="something_missing",
         depends_on=_variables(lead.best.candidate),
-        confidence=None if unknown or not may_name else round(lead.share, 4),
     )
+    if not may_name:
+        return finding
+    others = others_in_set(lead.family, {p.family: p.share for p in one.likely})
+    claimed = replace(
+        finding,
+        family=lead.family,
+        alternatives=tuple(others),
+        probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]},
+    )
+    if lead.best.candidate.is_function:
+        return replace(claimed, verdict="depends_on")
+    verdict = "identified" if lead.share >= SURE else "one_of"
+    return replace(claimed, verdict=verdict, confidence=round(lead.share, 4))
 
 
 def unpredicted(found: Unsteady, refits: Refits) -> Finding:
@@ -138,7 +136,7 @@ def parameters_of(kept: Kept, home: str, written: Sequence[Model]) -> Mapping[st
         unit = Term(cause.effect, channels=dict(cause.channels)).unit(p, model.target)
         return {"change": Value(float(scored.amplitudes[0] / scored.candidate.size[0]), unit, None)}
     own = kept.part.term if kept.part is not None else None
-    for term in model.terms if own is not None else ():
+    for term in model.terms:
         if own is not None and _same(term, own):
             return {
                 p.name: Value(known.value, term.unit(p, model.target), known.ci95)

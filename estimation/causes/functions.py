@@ -90,11 +90,7 @@ class Function:
                 return values[:, None]
             return np.column_stack([np.ones(len(values)), values])
         channel = _channel(run, self.place, variable, equation)
-        key = ("hats", variable, channel, knots)
-        found = run.memo.get(key)
-        if found is None:
-            found = run.memo[key] = _hats(values, knots)
-        return found
+        return run.once(("hats", variable, channel, knots), lambda: _hats(values, knots))
 
 
 def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
@@ -166,10 +162,7 @@ def variable_of(
         return run.on_grid(CAMPAIGN_TIME)
     name = _channel(run, place, variable, equation)
     key = (variable, name, width if variable == "velocity_sign" else 0.0)
-    found = run.memo.get(key)
-    if found is None:
-        found = run.memo[key] = _worked_out(run, variable, name, width)
-    return found
+    return run.once(key, lambda: _worked_out(run, variable, name, width))
 
 
 def _channel(run: RunSignals, place: Place, variable: str, equation: str) -> str:

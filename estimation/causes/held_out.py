@@ -46,20 +46,20 @@ class Gains:
         In each run it is that of the mean of acting and not acting, and `per_score` for one unit of
         score.
         """
-        return float(
-            sum(
-                np.logaddexp(
-                    _log(self.acting[name]) + per_score * gain,
-                    _log(1.0 - self.acting[name]) + per_score * self.without[name],
-                )
-                for name, gain in self.by_run.items()
-            )
-        )
+        return float(sum(np.logaddexp(*self._odds(name, per_score)) for name in self.by_run))
 
     def acts_in(self, name: str, per_score: float) -> bool:
         """Whether the cause more probably acts in a run than not, the run itself included."""
-        odds = _log(self.acting[name]) + per_score * self.by_run[name]
-        return odds > _log(1.0 - self.acting[name]) + per_score * self.without[name]
+        acting, not_acting = self._odds(name, per_score)
+        return acting > not_acting
+
+    def _odds(self, name: str, per_score: float) -> tuple[float, float]:
+        """Return the log likelihood of acting in a run, and that of not acting."""
+        acting = self.acting[name]
+        return (
+            _log(acting) + per_score * self.by_run[name],
+            _log(1.0 - acting) + per_score * self.without[name],
+        )
 
 
 class HeldOut:

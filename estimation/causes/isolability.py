@@ -14,13 +14,14 @@ from estimation.causes.acting import solved
 from estimation.causes.blocks import block_of
 from estimation.causes.candidates import Candidate, Group, candidates
 from estimation.causes.equations import lay_out
+from estimation.causes.findings import family_probabilities
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.levels import with_levels
 from estimation.causes.nuisances import skews, with_skews
-from estimation.causes.scoring import assessed, best_of_each, probabilities
+from estimation.causes.scoring import assessed, best_of_each
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
 
@@ -123,16 +124,11 @@ def _amplitudes(joint: Joint, one: Candidate) -> FloatArray:
 
 def _shares(joint: Joint, pool: Sequence[Group], folds: Folds) -> dict[str, float]:
     """Return each family's probability, and that of no cause."""
-    best: dict[str, tuple[float, float]] = {}
     near = [g for group in pool if (g := _near(joint, group)) is not None]
-    for one in best_of_each(assessed(joint, near, folds)):
-        best.setdefault(one.candidate.cause.family, (one.score, one.gain))
-    if not best:
-        return {NOTHING: 1.0}
-    scores, gains = np.array(list(best.values())).T
-    shares = probabilities(scores, gains, joint.numbers.sharpness)
-    found = {f: float(s) for f, s in zip(best, shares, strict=True) if s > 0.0}
-    return found | {NOTHING: 1.0 - float(shares.sum())}
+    ranked = best_of_each(assessed(joint, near, folds))
+    likely = family_probabilities(ranked, joint.numbers) if ranked else []
+    found = {one.family: one.share for one in likely}
+    return found | {NOTHING: 1.0 - sum(found.values())}
 
 
 def _near(joint: Joint, group: Group) -> Group | None:

@@ -5,7 +5,7 @@ error of one reading, or to a torque at one shaft. A sensor's error enters every
 the sensor; a torque beyond a compliance bends it as well.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -79,9 +79,9 @@ def places_of(layout: Layout) -> list[Place]:
         if (actuator := _actuator(equation, own)) is not None:
             found.append(actuator)
     sensors = [n for n in layout.measured if n not in _computed(layout)]
-    found += [
-        p for n in sensors for p in (*_behind(layout, n, angles), *_levers(layout, n, angles))
-    ]
+    for sensor in sensors:
+        if (both := _both(layout, sensor)) is not None:
+            found += [_behind(layout, sensor, *both, angles), *_levers(sensor, *both, angles)]
     found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
     warmth = tuple(n for n in signals_of(layout).temperatures if n in layout.measured)
     if warmth:
@@ -151,21 +151,13 @@ def _own_angle(equation: Equation, angles: Sequence[str]) -> str:
     return angles[0]
 
 
-def _effort(equation: Equation) -> str:
-    """Return the torque a place's load is: the equation's regressor, else its target."""
-    for name in equation.channels:
-        if name.endswith(("_n_m", "_n")):
-            return name
-    return equation.target
-
-
 def _own(
     layout: Layout, equation: Equation, angles: Sequence[str], everywhere: Sequence[str]
 ) -> Place:
     """Return the place of an equation, by the angles of its shafts and those of all."""
     angle = _own_angle(equation, angles)
     roles = _motion(angle) | _shared(angles, _position(angles, angle))
-    effort = _effort(equation)
+    effort = next((n for n in equation.channels if n.endswith(("_n_m", "_n"))), equation.target)
     roles |= {"load": (effort,)}
     if not angle:  # a curve over a force has the history of that force
         roles |= {"travel": (effort,)}
@@ -211,64 +203,52 @@ def _both(layout: Layout, sensor: str) -> tuple[Equation, Equation] | None:
     return torque[0], next(e for e in reading if e.of_angle)
 
 
-def _behind(layout: Layout, sensor: str, angles: Sequence[str]) -> list[Place]:
+def _behind(
+    layout: Layout, sensor: str, torque: Equation, bent: Equation, angles: Sequence[str]
+) -> Place:
     """Return the place of a torque between a compliance and a torque sensor behind it."""
-    if (both := _both(layout, sensor)) is None:
-        return []
-    torque, bent = both
     reading = [e for e in layout.equations.values() if sensor in e.channels]
     enters = tuple(Entry(e.name, e.channels[sensor]) for e in reading)
     angle = bent.target if bent.target in angles else _own_angle(torque, angles)
     roles = _motion(angle) | _shared(angles, angle) | {"load": (sensor,)}
-    return [Place(f"torque at {sensor}", "loss", torque.name, enters, roles)]
+    return Place(f"torque at {sensor}", "loss", torque.name, enters, roles)
 
 
-def _levers(layout: Layout, sensor: str, angles: Sequence[str]) -> list[Place]:
-    """Return the places of a wheel that is not round, between a torque equation and a sensor.
+def _levers(
+    sensor: str, torque: Equation, bent: Equation, angles: Sequence[str]
+) -> Iterator[Place]:
+    """Yield the places of a wheel that is not round, between a torque equation and a sensor.
 
     With the travel A(angle) the bend's equation c_in angle_in + c_out angle_out = A + ... has the
     ratio of its angles, and by virtual work of its torques, changed by the factor 1 - A'/c_in where
     the wheel turns with the driving side, and by 1 + A'/c_out where it turns with the driven one.
     """
-    if (both := _both(layout, sensor)) is None:
-        return []
-    torque, bent = both
-    found = []
     for angle in angles[1:]:
-        if not angle.endswith("_angle_rad"):
-            continue  # a carriage does not turn
         share = _share(bent, angle)
-        if not share:
+        if not share or not angle.endswith("_angle_rad"):  # a carriage does not turn
             continue
         side = -1.0 if torque.speed in _motion(angle)["speed"] else 1.0
         gain = side * torque.channels[sensor] / share
         enters = (Entry(bent.name, 1.0), Entry(torque.name, gain, load=sensor))
         roles = {"output_angle": (angle,)}
-        found.append(Place(f"wheel of {angle} at {sensor}", "lever", bent.name, enters, roles))
-    return found
+        yield Place(f"wheel of {angle} at {sensor}", "lever", bent.name, enters, roles)
+
+
+def _entries(equation: Equation, channel: str) -> Iterator[Entry]:
+    """Yield how an error of a channel enters an equation's target less its right-hand side."""
+    sides = [(equation.target, 1.0), *((n, -w) for n, w in equation.channels.items())]
+    for name, weight in sides:
+        if (found := sensitivity(name, channel, equation.model.signals)) is not None:
+            yield Entry(equation.name, weight * found[0], found[1])
 
 
 def _share(equation: Equation, angle: str) -> float:
     """Return the factor of an angle in an equation's target less its right-hand side."""
-    known = equation.model.signals
-    total = 0.0
-    for name, weight in ((equation.target, 1.0), *((n, -w) for n, w in equation.channels.items())):
-        found = sensitivity(name, angle, known)
-        if found is not None and found[1] == 0:
-            total += weight * found[0]
-    return total
+    return sum(entry.gain for entry in _entries(equation, angle) if not entry.order)
 
 
 def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None:
-    enters = []
-    for equation in layout.equations.values():
-        found = sensitivity(equation.target, channel, equation.model.signals)
-        if found is not None:
-            enters.append(Entry(equation.name, found[0], found[1]))
-        for name, weight in equation.channels.items():
-            found = sensitivity(name, channel, equation.model.signals)
-            if found is not None:
-                enters.append(Entry(equation.name, -weight * found[0], found[1]))
+    enters = [entry for e in layout.equations.values() for entry in _entries(e, channel)]
     if not enters:
         return None
     angle = channel.endswith(ANGLES)

@@ -109,14 +109,9 @@ class Errors:
 
 
 class Refit:
-    """One equation on all runs.
+    """One equation, fitted on the training runs, on all runs, which have the campaign's time.
 
-    Args:
-        model: The declared model, fitted on the training runs.
-        recordings: All runs, with the campaign's time.
-        train: Names of the training runs.
-        test: Names of the test runs.
-        numbers: The prior of amplitudes without a term.
+    The numbers hold the prior of amplitudes without a term.
 
     Raises:
         FitError: No training run has a sample of the equation.

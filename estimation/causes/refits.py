@@ -25,13 +25,7 @@ DRAWS = 1000
 
 
 class Refits:
-    """Every equation with the causes kept so far.
-
-    Args:
-        layout: The declared equations, fitted on the training runs, on all runs.
-        recordings: The runs, with the campaign's time.
-        sealed: Which runs train and which test.
-        numbers: What decides.
+    """Every equation on all runs, which have the campaign's time, with the causes kept so far.
 
     Attributes:
         open: Test runs not counted in errors: a cause that begins at one time of the campaign may

@@ -447,13 +447,13 @@ def _bent(columns: FloatArray, bend: Bend) -> FloatArray:
 
 def _passed(run: RunSignals, angle: str, order: float) -> FloatArray:
     """Return the gain that the channels' filter, forwards and backwards, has on a wave."""
-    key = ("turns", angle)
-    turns_s = run.memo.get(key)
-    if turns_s is None:
+
+    def turns_s() -> FloatArray:
         speed = np.abs(np.gradient(run.channels[angle])) * run.rate_hz
-        turns_s = run.memo[key] = speed / (2.0 * math.pi)
+        return np.asarray(speed / (2.0 * math.pi))
+
     low_pass = run.low_pass
-    relative = order * turns_s / low_pass.cutoff_hz
+    relative = order * run.once(("turns", angle), turns_s) / low_pass.cutoff_hz
     return np.asarray(1.0 / (1.0 + relative ** (2 * low_pass.order)))
 
 

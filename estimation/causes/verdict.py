@@ -77,14 +77,9 @@ def answer(
     numbers: Numbers = DEFAULT,
     on_stage: Callable[[str], None] = lambda _: None,
 ) -> Answer:
-    """Identify what the declared equations lack.
+    """Identify what declared equations lack on all runs, some of which are sealed as test runs.
 
-    Args:
-        recordings: All runs.
-        models: Declared equations.
-        sealed: Which runs train and which test.
-        numbers: What decides.
-        on_stage: Called with what begins, in words.
+    `on_stage` is called with what begins, in words.
 
     Raises:
         LayoutError: No equation can be laid out on these runs.

@@ -88,12 +88,9 @@ def of_calibration(declared: Declared, balance: str | None = None) -> Subject:
 
 
 def declared_models(path: Path | None, balance: str | None) -> list[Model]:
-    """Return the declared models to diagnose.
+    """Return the models of a file or of a shipped name, or those of one equation alone.
 
-    Args:
-        path: A model file or the name of a shipped one; the equations of the reference rig when
-            None.
-        balance: Only this equation.
+    They are the equations of the reference rig when the path is None.
 
     Raises:
         UsageError: No model of that equation.
