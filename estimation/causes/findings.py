@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from estimation.causes.acting import Moved
 from estimation.causes.candidates import Candidate
-from estimation.causes.declared import Moved
 from estimation.causes.functions import Function, name_of_channel, names
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Part

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.causes.acting import Moved
 from estimation.causes.candidates import Candidate
-from estimation.causes.declared import Moved
 from estimation.causes.equations import Equation, Layout, RunSignals
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Errors, Part, Refit, Solved

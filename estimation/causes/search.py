@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.causes.acting import TURNS, on_some_runs, one_run_changed
+from estimation.causes.acting import TURNS, moved_terms, on_some_runs, one_run_changed
 from estimation.causes.angles import groups_apart
 from estimation.causes.blocks import Products
 from estimation.causes.candidates import Candidate, Claim, Group, candidates, groups_of
-from estimation.causes.declared import moved_terms
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function

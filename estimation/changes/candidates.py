@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from estimation.causes.acting import Moved, amplitudes_of
 from estimation.causes.candidates import Claim
-from estimation.causes.declared import Moved, amplitudes_of
 from estimation.causes.equations import Layout
 from estimation.causes.places import places_of
 from estimation.causes.sources import Source, sources_at
