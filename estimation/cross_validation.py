@@ -1,10 +1,11 @@
 """The error of a model or an estimator on runs it was not fitted on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from estimation.bank.interval import of_new_run
 from estimation.campaign import Campaign, in_folds
 from estimation.closing import is_closing, processed
 from estimation.estimator import Estimator, Recipe
@@ -25,6 +26,7 @@ class HeldOutError:
         rmse_by_run: Run to its own error, mean removed.
         runs: Number of runs.
         folds: Number of folds; every run is in just one of them.
+        half_width: Half the 95 % interval of the estimate live; see `live_half_width`.
     """
 
     rmse: float
@@ -32,6 +34,7 @@ class HeldOutError:
     rmse_by_run: dict[str, float]
     runs: int
     folds: int
+    half_width: float | None
 
 
 def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 0) -> HeldOutError:
@@ -44,9 +47,11 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
         FitError: The model's parameters are not identifiable from a fold's runs.
     """
     errors: dict[str, FloatArray] = {}
+    live: list[FloatArray] = []
     for split in campaign.folds(folds, seed):
         fitted = fit(declared, split.train, bootstrap=0)
         errors |= {run.name: counted_error(fitted, run) for run in split.test}
+        live += [counted_error(fitted, run, causal=True) for run in split.test]
     centred = {name: error - error.mean() for name, error in errors.items() if error.size}
     return HeldOutError(
         rmse=rmse(np.concatenate(list(centred.values())), 0.0),
@@ -54,7 +59,19 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
         rmse_by_run={name: rmse(error, 0.0) for name, error in sorted(centred.items())},
         runs=len(errors),
         folds=folds,
+        half_width=live_half_width(live),
     )
+
+
+def live_half_width(errors: Sequence[FloatArray]) -> float | None:
+    """Return half the 95 % interval of a live estimate in a new run; None without two runs.
+
+    Args:
+        errors: Errors of each run with causal filters, of a model that was not fitted on it.
+    """
+    known = [error[np.isfinite(error)] for error in errors]
+    squares = [float(np.mean(error**2)) for error in known if error.size]
+    return of_new_run(squares) if len(squares) > 1 else None
 
 
 def closing_score(

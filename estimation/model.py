@@ -131,6 +131,8 @@ class Evidence:
             single run was fitted or the file does not contain it.
         target_range: Least and greatest value of the target in the fit; None where the file does
             not contain it.
+        half_width: Half the 95 % interval of the estimate live, of errors on runs not fitted on;
+            None where not known.
         sample_rate_hz: Median rate of the runs, Hz; None where the file does not contain it.
         made_at: When it was fitted, ISO 8601 with offset from UTC; empty if unknown.
         rig: Names of the rigs of the runs, with commas between; empty if unknown.
@@ -144,6 +146,7 @@ class Evidence:
     seed: int
     run_spread: float | None = None
     target_range: tuple[float, float] | None = None
+    half_width: float | None = None
     sample_rate_hz: float | None = None
     made_at: str = ""
     rig: str = ""
@@ -254,16 +257,18 @@ def estimate(model: Model, channels: Mapping[str, FloatArray] | Recording) -> Fl
     return total
 
 
-def counted_error(model: Model, recording: Recording) -> FloatArray:
+def counted_error(model: Model, recording: Recording, causal: bool = False) -> FloatArray:
     """Return the target less the estimate at the samples that count for a model, shape (k,).
+
+    The target is without lag. With `causal` the estimate is the live one, see `predict`.
 
     Raises:
         NotFittedError: A parameter has no value.
         MissingChannelError: The recording lacks a channel.
     """
     channels = balance_channels(model, recording)
-    error = channels[model.target] - estimate(model, channels)
-    return error[settled(model, channels)]
+    found = predict(model, recording, causal) if causal else estimate(model, channels)
+    return (channels[model.target] - found)[settled(model, channels)]
 
 
 def predict(model: Model, recording: Recording, causal: bool = False) -> FloatArray:

@@ -105,9 +105,15 @@ def calibrate(
     nothing = replace(grid, values=np.zeros_like(grid.values))
     shape = Interval(columns, weights, NARROWEST * float(np.concatenate(sizes).mean()), nothing)
     usual = [shape.usual(design) for design in designs]
-    squares = [np.mean((size / width) ** 2) for size, width in zip(sizes, usual, strict=True)]
-    variance = (1 + 1 / len(sizes)) * float(np.mean(squares))
-    return scaled(shape, student(len(sizes) - 1) * variance**0.5)
+    pairs = zip(sizes, usual, strict=True)
+    squares = [float(np.mean((size / width) ** 2)) for size, width in pairs]
+    return scaled(shape, of_new_run(squares))
+
+
+def of_new_run(squares: Sequence[float]) -> float:
+    """Return half the interval of a new run, of the mean squared errors of runs not fitted on."""
+    variance = (1 + 1 / len(squares)) * float(np.mean(squares))
+    return student(len(squares) - 1) * float(np.sqrt(variance))
 
 
 def with_scores(interval: Interval, scores: FloatArray, doubt: float = 1.0) -> Interval:

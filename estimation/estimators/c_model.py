@@ -85,15 +85,18 @@ def model_text(model: Model, place: Callable[[str], int]) -> str:
                 raise NotInCError(
                     f"{term.effect.id} depends on the time.", "C has no clock of the campaign."
                 )
-    error = usual_half_width(model)
-    width = "NAN" if error is None else f"{error:.9g}f"
+    half_width = usual_half_width(model)
+    width = "NAN" if half_width is None else repr(half_width)
+    for speed, slowest in model.signals.rest.items():
+        if speed in model.channels and slowest > 0.0:  # as live, none at rest
+            width = f"fabs((double)row[{place(speed)}]) < {slowest!r} ? NAN : {width}"
     return "\n".join(
         [
             "static inline name_estimate name_model(const float *row) {",
             "    double total = 0;",
             "    (void)row;",
             *lines,
-            f"    name_estimate found = {{ (float)total, {width}, 1 }};",
+            f"    name_estimate found = {{ (float)total, (float)({width}), 1 }};",
             "    return found;",
             "}",
         ]

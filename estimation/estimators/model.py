@@ -66,12 +66,8 @@ class Stream(Stepper):
 
 
 def usual_half_width(model: Model) -> float | None:
-    """Return half the 95 % interval of a model's errors in motion; None where it has no evidence.
-
-    Two standard errors of the runs it was fitted on, their means left in: what a person at the
-    bench has to reckon with on a rig that is as it was then.
-    """
-    return 2 * model.evidence.rmse_with_means if model.evidence else None
+    """Return half the 95 % interval of a model's live errors in motion; None where not known."""
+    return model.evidence.half_width if model.evidence else None
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def demo(
     from rig.diagnosis.ledger import Ledger
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import Subject
-    from rig.diagnosis.traces import written_models
+    from rig.diagnosis.traces import with_cost_of_causal_filters
     from rig.importers.registry import open_campaign
     from rig.reports.diagnosis import write
     from rig.reports.diagnosis_words import sentences
@@ -100,7 +100,7 @@ def demo(
         looks = Ledger(ledger)
         asked = Subject(campaign, [declared])
         done, look = run_diagnosis(asked, looks, seed=number, quick=True, on_stage=say)
-    model_file.write_all(written_models(done), model)
+    model_file.write_all(with_cost_of_causal_filters(done).models, model)
     kept = logs / DIAGNOSIS
     report = write(done, number, kept.with_suffix(".html"), kept)
     looks.enter(look)

@@ -96,10 +96,10 @@ def _with_models(
 ) -> "tuple[Answer, list[str]]":
     """Write the models; return the diagnosis with their errors as they run live, and the lines."""
     from estimation import model_file
-    from rig.diagnosis.traces import with_cost_of_causal_filters, written_models
+    from rig.diagnosis.traces import with_cost_of_causal_filters
 
     done = with_cost_of_causal_filters(done)
-    model_file.write_all(written_models(done), model_out)
+    model_file.write_all(done.models, model_out)
     # a model in use is one of a configured rig, which a machine of a file alone has not
     use = ["rig", "model", "use", str(model_out)]
     if machine is not None:

@@ -150,6 +150,7 @@ def export(
     from estimation.estimators.c_header import header
     from estimation.estimators.model import ModelEstimator
     from estimation.estimators.network import NetworkEstimator
+    from rig.live.estimator import without_interval
 
     estimator = load(model)
     if equation is not None and model.suffix == ".toml":
@@ -170,4 +171,7 @@ def export(
         rate = (fitted and fitted.sample_rate_hz) or USUAL_HZ
     write_text_atomic(out, header(estimator, out.stem.replace("-", "_").lower(), rate))
     said = f"Header: {out}, for {rate:g} calls a second"
-    present(json, {"header": out, "rate_hz": rate}, said)
+    unknown = []
+    if isinstance(estimator, ModelEstimator):
+        unknown = without_interval([estimator.model], model)
+    present(json, {"header": out, "rate_hz": rate}, said, *unknown)

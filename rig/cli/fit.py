@@ -181,10 +181,11 @@ def _fitted(
             bar.update(task, description=declared.name)
             fitted = fit_model(declared, campaign, seed=seed)
             assert fitted.evidence is not None  # noqa: S101  a fit sets its evidence
-            fitted = replace(fitted, evidence=replace(fitted.evidence, made_at=now_utc()))
             bar.advance(task)
             error = held_out_error(declared, campaign, folds=folds, seed=seed) if several else None
-            done.append((fitted, error))
+            half_width = error.half_width if error else None
+            evidence = replace(fitted.evidence, made_at=now_utc(), half_width=half_width)
+            done.append((replace(fitted, evidence=evidence), error))
             bar.advance(task)
     return done
 

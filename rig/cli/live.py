@@ -72,7 +72,13 @@ def live(
     from rig.bench.logger import open_logger
     from rig.configuration.check import refuse_problems
     from rig.live.block import Sink, through
-    from rig.live.estimator import estimators_of, half_widths, require_channels, shown_channels
+    from rig.live.estimator import (
+        estimators_of,
+        half_widths,
+        require_channels,
+        shown_channels,
+        without_interval,
+    )
     from rig.live.keys import OF_SESSION, display_keys, no_keys
     from rig.live.options import ShowOptions
     from rig.live.session_blocks import session_blocks
@@ -97,6 +103,8 @@ def live(
     estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
     if model_path:
         require_channels(estimators, settings, model_path)
+        for line in without_interval((e.model for e in estimators), model_path):
+            remarks().print(line)
     wanted = ShowOptions(
         title=f"rig live: {settings.name}",
         channels=shown_channels(estimators, machine.shown),
@@ -260,7 +268,7 @@ def _estimators(
     """Begin the estimates of the named model, else of that in use, at the recording's rate."""
     from estimation.estimators.instrument import require_own
     from rig.configuration.model_in_use import model_in_use
-    from rig.live.estimator import estimators_of
+    from rig.live.estimator import estimators_of, without_interval
 
     path = model or model_in_use(recording.rig)
     if path is None:
@@ -268,6 +276,8 @@ def _estimators(
     if model is None and not quiet:
         remarks().print(f"Estimate of the model in use, {path.name}.")
     estimators = estimators_of(path, recording.sample_rate_hz, recording.conditions)
+    for line in () if quiet else without_interval((e.model for e in estimators), path):
+        remarks().print(line)
     for name, level in estimators[0].other_levels.items() if not quiet else ():
         remarks().print(
             f"No interval: {path.name} was fitted at one level of {name}, and this run is at"

@@ -11,11 +11,12 @@ import numpy as np
 
 from estimation.causes.findings import ANGLES_OF_ROLE, VARIABLE_OF_ROLE, Kept
 from estimation.causes.functions import Function
-from estimation.causes.refit import Refit
 from estimation.causes.verdict import Answer
+from estimation.cross_validation import live_half_width
 from estimation.derived import zero_phase_channels
-from estimation.model import Model, predict
+from estimation.model import Model, counted_error
 from estimation.recording import FloatArray
+from estimation.scores import rmse
 
 
 @dataclass(frozen=True)
@@ -102,14 +103,19 @@ def _channels(kept: Kept, most: int = 2) -> tuple[str, ...]:
 
 
 def with_cost_of_causal_filters(found: Answer) -> Answer:
-    """Return the diagnosis with a note on the error of each written model with causal filters.
+    """Return the diagnosis with the error of each written model with causal filters.
 
-    Both estimates are compared with the target as the zero-phase filter gives it, on the test runs,
-    over the samples that reported errors count, each run's mean removed.
+    A note states it next to that of zero-phase filters. Both estimates are compared with the target
+    as the zero-phase filter gives it, on the test runs, each run's mean removed. The models contain
+    their interval live, and their date.
     """
-    notes = []
+    notes, models = [], []
+    now = datetime.now(UTC).isoformat(timespec="seconds")
     for model in found.models:
-        zero_phase, causal = _held_out_errors(model, found.refits.of[model.balance])
+        refit = found.refits.of[model.balance]
+        runs = [refit.recordings[name] for name in refit.test_names]
+        errors = [[counted_error(model, run, causal) for run in runs] for causal in (False, True)]
+        zero_phase, causal = (_spread(one) for one in errors)
         small = model.unit == "N m" and causal < 1.0
         scale, unit = (1e3, "mN m") if small else (1.0, model.unit)
         notes.append(
@@ -118,36 +124,15 @@ def with_cost_of_causal_filters(found: Answer) -> Answer:
             f" causal ones it runs with live ({causal / max(zero_phase, 1e-300):.2f} times as"
             " much)."
         )
+        half_width = live_half_width(errors[1])
+        evidence = model.evidence and replace(model.evidence, made_at=now, half_width=half_width)
+        models.append(replace(model, evidence=evidence))
     diagnosis = replace(found.diagnosis, notes=(*found.diagnosis.notes, *notes))
-    return replace(found, diagnosis=diagnosis)
+    return replace(found, diagnosis=diagnosis, models=tuple(models))
 
 
-def written_models(found: Answer) -> list[Model]:
-    """Return the models with the causes found, each with its date and its errors.
-
-    A watch then has from the first run on the usual error, and a display the uncertainty of an
-    estimate.
-    """
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    return [
-        replace(model, evidence=model.evidence and replace(model.evidence, made_at=now))
-        for model in found.models
-    ]
-
-
-def _held_out_errors(model: Model, refit: Refit) -> tuple[float, float]:
-    """Return a model's root mean square errors on the test runs: zero-phase, then causal."""
-    squares, samples = np.zeros(2), 0
-    for name in refit.test_names:
-        counted = refit.residuals(refit.solve([]), name)
-        if counted is None:
-            continue
-        places, recording = counted[0], refit.recordings[name]
-        filtered = zero_phase_channels(recording, [model.target], model.low_pass, model.signals)
-        target = filtered[model.target]
-        both = np.array([target - predict(model, recording, causal) for causal in (False, True)])
-        known = both[:, places][:, np.isfinite(both[:, places]).all(axis=0)]
-        squares += np.sum((known - known.mean(axis=1, keepdims=True)) ** 2, axis=1)
-        samples += known.shape[1]
-    zero_phase, live = np.sqrt(squares / max(samples, 1))
-    return float(zero_phase), float(live)
+def _spread(errors: Sequence[FloatArray]) -> float:
+    """Return the root mean square of the errors of runs, each run's mean removed."""
+    known = [error[np.isfinite(error)] for error in errors]
+    centred = [error - error.mean() for error in known if error.size]
+    return rmse(np.concatenate(centred), 0.0) if centred else 0.0

@@ -1,7 +1,7 @@
 """A fitted estimator as the stream of estimates the display shows, and whether it suits a rig."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -148,6 +148,16 @@ def models_in_use(path: Path) -> list[Model]:
     if not of_axes and models[0].signals.rest != reference().rest:
         return list({model.target: model for model in reversed(models)}.values())[::-1]
     return of_axes or models[:1]
+
+
+def without_interval(models: Iterable[Model | None], path: Path) -> list[str]:
+    """Return a line where a file states no interval of its models' live estimates."""
+    if all(model is None or usual_half_width(model) is not None for model in models):
+        return []
+    return [
+        f"No interval: {path.name} does not state the error of its live estimate on runs that it"
+        " was not fitted on. Write it again with `rig fit` or `rig diagnose` on more runs."
+    ]
 
 
 def half_widths(estimators: Sequence[ModelEstimator]) -> dict[str, float]:

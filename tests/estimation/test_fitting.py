@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
+from estimation.cross_validation import held_out_error, live_half_width
 from estimation.effects import effect
 from estimation.estimators.model import Stream
 from estimation.fit_problem import FitError
 from estimation.fitting import fit
-from estimation.model import Model, NotFittedError, Term, predict
+from estimation.model import Model, NotFittedError, Term, counted_error, predict
 from estimation.model_file import read
 from estimation.plant_models import declared
 from estimation.recording import Flag, MissingChannelError, Recording, Stretch
@@ -19,7 +20,7 @@ from estimation.shape_search import descended
 from estimation.within_bounds import solve_within
 from tests.estimation import campaigns
 from tests.estimation.synthetic import TRUE, campaign, run
-from tests.estimation.test_plant import SLIDE
+from tests.estimation.test_plant import SLIDE, slide
 
 
 def numbers(model: Model) -> dict[str, float]:
@@ -184,3 +185,33 @@ def test_friction_has_the_form_of_its_change_of_sign_where_no_viscous_friction_i
     terms = tuple(term for term in model.terms if term.effect.id != "friction.viscous")
     found = fit(replace(model, terms=terms), Campaign.of([recording]), bootstrap=0)
     assert numbers(found)["width"] == pytest.approx(1.2, rel=0.05)
+
+
+STAGE = """
+schema = "rig.machine/1"
+[machine]
+name = "stage"
+run_offsets = false
+[[axis]]
+name = "stage"
+unit = "m"
+[[actuator]]
+name = "drive_force_n"
+axis = "stage"
+[[sensor]]
+name = "stage_position_m"
+axis = "stage"
+reads = "position"
+"""
+
+
+def test_the_interval_is_that_of_live_errors_in_runs_not_fitted_on():
+    """A causal filter lags by more than a fit on filtered channels leaves."""
+    (carriage,) = declared(SLIDE)
+    found = held_out_error(carriage, Campaign.of([slide(k) for k in range(4)]), folds=2)
+    fitted = fit(carriage, Campaign.of([slide(k) for k in range(4)]), bootstrap=0)
+    error = np.abs(counted_error(fitted, slide(9), causal=True))
+    assert np.mean(error < 2 * fitted.evidence.rmse_with_means) < 0.8
+    assert np.mean(error < found.half_width) > 0.95
+    assert live_half_width([np.ones(9)]) is None
+    assert live_half_width([np.ones(9)] * 20) < live_half_width([np.ones(9)] * 3)

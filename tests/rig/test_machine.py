@@ -2,12 +2,14 @@
 
 import io
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks.rigs import draw
+from estimation import model_file
 from estimation.plant_file import parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from rig.errors import ExitCode
@@ -89,11 +91,15 @@ def test_a_table_in_millimetres_and_volts_is_fitted_in_metres_and_newtons(
     words = ("replay", table, "--machine", file, "--model", model)
     assert "drive_force_n" in said(*words, "--speed 0 --json").out
     header = tmp_path / "slide.h"
+    assert "No interval" not in said(*words, "--speed 0 --json").err
     assert "500 calls a second" in said("export", model, "--out", header).out
     assert "then every 1 / 500.0 s" in header.read_text()
     assert "opening" not in header.read_text()
     said("export", model, "--out", header, "--rate 1000")
     assert "then every 1 / 1000.0 s" in header.read_text()
+    model.write_text(re.sub("half_width = .*", "", model.read_text()))
+    assert "No interval: slide.model.toml" in said(*words, "--speed 0 --plain").err
+    assert "No interval: slide.model.toml" in said("export", model, "--out", header).out
 
 
 def test_a_diagnosis_ends_with_the_replay_of_its_model(slide, tmp_path, said, monkeypatch):
@@ -104,6 +110,8 @@ def test_a_diagnosis_ends_with_the_replay_of_its_model(slide, tmp_path, said, mo
     command = f"rig replay {table} --machine {file} --model {model}"
     assert command in " ".join(printed.split())
     assert "model use" not in printed
+    evidence = model_file.read(model).evidence
+    assert evidence.half_width > 4 * evidence.rmse_with_means  # of live errors, on two runs
     assert "estimate against sensor" in said(command.removeprefix("rig "), "--speed 0").out
 
 
