@@ -18,7 +18,7 @@ from estimation.bank.beyond import STANDING_RAD_S
 from estimation.errors import EstimationError
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.c_model import model_text
-from estimation.estimators.model import ModelEstimator
+from estimation.estimators.model import ModelEstimator, fitted_range
 from estimation.estimators.network import NetworkEstimator
 from estimation.kalman import tracker
 from estimation.recording import FloatArray
@@ -49,11 +49,12 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         raise ExportError(
             f"{name!r} cannot name things in C.", fix="Use small letters, digits and underscores."
         )
-    model, signals = "", reference()
+    model, ranged, signals = "", False, reference()
     channels: Sequence[str]
     if isinstance(estimator, ModelEstimator):
         channels = [c for c in estimator.model.channels if c != "time_s"]
         model = model_text(estimator.model, channels.index)
+        ranged = fitted_range(estimator.model) is not None
         low_pass, signals = estimator.model.low_pass, estimator.model.signals
     else:
         low_pass = estimator.low_pass
@@ -67,6 +68,7 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         bank=estimator.bank if isinstance(estimator, BankEstimator) else None,
         network=estimator.network if isinstance(estimator, NetworkEstimator) else None,
         model=model,
+        ranged=ranged,
         channels=channels,
         measured=program.measured,
         windows=program.windows,

@@ -70,6 +70,15 @@ def usual_half_width(model: Model) -> float | None:
     return model.evidence.half_width if model.evidence else None
 
 
+def fitted_range(model: Model) -> tuple[float, float] | None:
+    """Return the target's range in the fit, wider by half the interval; None where not stated."""
+    known = model.evidence
+    if known is None or known.target_range is None:
+        return None
+    margin = known.half_width or 0.0
+    return known.target_range[0] - margin, known.target_range[1] + margin
+
+
 @dataclass(frozen=True)
 class ModelEstimator:
     """A fitted model as an estimator."""

@@ -11,6 +11,7 @@ from calibration.rules import judge_range
 from calibration.store import active_lines
 from estimation.channels import unit_of
 from estimation.errors import EstimationError
+from estimation.estimators.model import fitted_range
 from estimation.model import Model
 from estimation.recording import FloatArray, Recording
 from estimation.watch import ResidualWatch, Sight
@@ -76,14 +77,11 @@ class ModelStatus:
 
     def __init__(self, models: Sequence[Model], estimators: Sequence[ModelEstimator] = ()) -> None:
         self._estimators = estimators
-        evidence = {model.target: model.evidence for model in models if model.evidence}
-        self._ranges = {
-            target: (*known.target_range, 2 * known.rmse_with_means)
-            for target, known in evidence.items()
-            if known.target_range is not None
-        }
-        made = [datetime.fromisoformat(one.made_at) for one in evidence.values() if one.made_at]
-        self._days = max((_days(at, datetime.now(UTC)) for at in made), default=None)
+        ranges = {model.target: fitted_range(model) for model in models}
+        self._ranges = {target: known for target, known in ranges.items() if known is not None}
+        made = [model.evidence.made_at for model in models if model.evidence is not None]
+        days = [_days(datetime.fromisoformat(at), datetime.now(UTC)) for at in made if at]
+        self._days = max(days, default=None)
 
     def step(self, block: SampleBlock) -> SampleBlock:
         """Return a block with the status, and with where its estimates are within their range."""
@@ -100,8 +98,8 @@ class ModelStatus:
         """
         beyond = [
             _beyond(name, low, high)
-            for name, (low, high, margin) in self._ranges.items()
-            if name in estimates and not _within(estimates[name], low - margin, high + margin)
+            for name, (low, high) in self._ranges.items()
+            if name in estimates and not _within(estimates[name], low, high)
         ]
         if outside:
             names = ", ".join(words.name_of(name) for name in outside)
@@ -175,7 +173,7 @@ def _error_words(sight: Sight) -> str:
 
 
 def _beyond(channel: str, low: float, high: float) -> str:
-    """Return a message for an estimate outside the range of its fit."""
+    """Return a message for an estimate outside the range of its fit and its interval."""
     unit = unit_of(channel)
     ends = words.digits(Value(low), unit), words.with_unit(Value(high), unit)
     return f"{words.name_of(channel)} beyond its fit, {ends[0]} to {ends[1]}"

@@ -24,6 +24,7 @@ from estimation.networks.network import Network
 from estimation.plant_models import declared
 from estimation.predicted import predicted_of, with_prediction
 from estimation.recording import Recording
+from rig.live.status import ModelStatus
 from tests.estimation.test_plant import SLIDE, slide
 
 TARGET = "proximal_torque_n_m"
@@ -95,14 +96,23 @@ def test_a_compiled_model_of_any_machine_gives_the_same(tmp_path):
         {p.name: Estimate(30.0) for p in effect("friction.viscous_asymmetry").amplitudes},
     )
     model = replace(fitted, terms=(*fitted.terms, asymmetric))
-    found = compiled(ModelEstimator(model), runs[0], tmp_path)
-    wanted = predict(model, runs[0], causal=True)
+    position = runs[0]["carriage_position_m"] * np.linspace(1.0, 1.5, len(runs[0]))
+    run = runs[0].with_columns(carriage_position_m=position)  # it goes further than any run fitted
+    found = compiled(ModelEstimator(model), run, tmp_path)
+    wanted = predict(model, run, causal=True)
     assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
     ((speed, slowest),) = model.signals.rest.items()
-    live = causal_channels(runs[0], [speed], model.low_pass)[speed]
+    live = causal_channels(run, [speed], model.low_pass)[speed]
     at_rest = np.isnan(found[:, 1])
     assert 0 < at_rest.sum() == np.sum(np.abs(live) < slowest)
     assert np.all(found[~at_rest, 1] == 3.0)
+    inside = found[:, 2] == 1
+    assert 0.9 < inside.mean() < 1
+    low, high = model.evidence.target_range
+    assert np.all(inside == ((wanted > low - 3.0) & (wanted < high + 3.0)))
+    status = ModelStatus([model])
+    assert status.of({model.target: wanted[inside]}).state == "ok"
+    assert status.of({model.target: wanted[wanted > high + 3.0]}).state == "suspect"
 
 
 def test_a_model_with_a_gear_is_written_with_its_ratio(runs, tmp_path):
