@@ -12,7 +12,8 @@ channels.speed = "motor_velocity_rad_s"
 parameters.friction = { value = 0.012, unit = "N m", spread = 0.0003 }
 
 A model of another machine than the reference rig states that machine's derived channels, its speeds
-of standstill and its sensors under `[[signals.derived]]`, `[signals.rest]` and `[signals.sensors]`.
+of standstill, its sensors and the positions that are integrals of a speed under
+`[[signals.derived]]`, `[signals.rest]`, `[signals.sensors]` and `[signals.integrals]`.
 
 A file of several equations contains each under `[[models]]`, with `[models.processing]`,
 `[[models.effects]]`, `[models.signals]` and `[models.fit]`, and has the schema `rig.models/1`.
@@ -166,7 +167,9 @@ def _signals(top: Table) -> Signals:
     sensors = table.table("sensors")
     readings = {channel: sensors.table(channel).made(Reading) for channel in sensors.content}
     derived, joined = (read_combinations(table.tables(key, [])) for key in ("derived", "joined"))
-    found = Signals(derived, slowest, readings, joined)
+    integrals = table.table("integrals")
+    speeds = {position: integrals.take(position, str) for position in integrals.content}
+    found = Signals(derived, slowest, readings, joined, speeds)
     table.finish()
     return found
 
@@ -200,6 +203,8 @@ def _lines(model: Model, within: str = "") -> list[str]:
         lines += ["", f"[{within}signals.rest]", *entries(model.signals.rest)]
         lines += ["", f"[{within}signals.sensors]"] if model.signals.readings else []
         lines += entries({name: _known(one) for name, one in model.signals.readings.items()})
+        lines += ["", f"[{within}signals.integrals]"] if model.signals.integrals else []
+        lines += entries(model.signals.integrals)
         lines += combination_lines(model.signals.combinations, f"{within}signals.derived")
         lines += combination_lines(model.signals.joined, f"{within}signals.joined")
     for term in model.terms:

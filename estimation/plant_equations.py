@@ -119,7 +119,7 @@ def signals(plant: Plant) -> Signals:
     joined = _joined(plant)
     own = {*(s.name for s in plant.sensors), *plant.integrals, *(c.name for c in plant.derived)}
     positions = (c for c in joined if c.name not in own)
-    return Signals((*bends, *positions, *plant.derived), rest, readings, joined)
+    return Signals((*bends, *positions, *plant.derived), rest, readings, joined, plant.integrals)
 
 
 def _joined(plant: Plant) -> tuple[Combination, ...]:

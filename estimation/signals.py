@@ -93,12 +93,14 @@ class Signals:
             that it is one.
         joined: Positions that follow from another's by the ratio of a transmission. One whose axis
             has no encoder is among the combinations, too; else a reading can be compared with it.
+        integrals: Positions that no sensor reads, to the speeds that they are the integrals of.
     """
 
     combinations: tuple[Combination, ...] = ()
     rest: Mapping[str, float] = field(default_factory=dict)
     readings: Mapping[str, Reading] = field(default_factory=dict)
     joined: tuple[Combination, ...] = ()
+    integrals: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def temperatures(self) -> tuple[str, ...]:

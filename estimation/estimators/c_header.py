@@ -18,7 +18,7 @@ from estimation.bank.beyond import STANDING_RAD_S
 from estimation.errors import EstimationError
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.c_model import model_text
-from estimation.estimators.model import ModelEstimator, fitted_range
+from estimation.estimators.model import ModelEstimator, fitted_range, rest_speeds
 from estimation.estimators.network import NetworkEstimator
 from estimation.kalman import tracker
 from estimation.recording import FloatArray
@@ -49,12 +49,13 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         raise ExportError(
             f"{name!r} cannot name things in C.", fix="Use small letters, digits and underscores."
         )
-    model, ranged, signals = "", False, reference()
+    model, ranged, rests, signals = "", False, False, reference()
     channels: Sequence[str]
     if isinstance(estimator, ModelEstimator):
         channels = [c for c in estimator.model.channels if c != "time_s"]
         model = model_text(estimator.model, channels.index)
         ranged = fitted_range(estimator.model) is not None
+        rests = bool(rest_speeds(estimator.model))
         low_pass, signals = estimator.model.low_pass, estimator.model.signals
     else:
         low_pass = estimator.low_pass
@@ -63,14 +64,19 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         else:
             channels = estimator.network.inputs
     program = _Program(channels, sample_rate_hz, signals)
+    measured = program.measured
+    integrated = [f"i == {k}" for k, c in enumerate(measured) if c in signals.integrals]
     text = _template().render(
         estimator=estimator,
         bank=estimator.bank if isinstance(estimator, BankEstimator) else None,
         network=estimator.network if isinstance(estimator, NetworkEstimator) else None,
         model=model,
         ranged=ranged,
+        rests=rests,
         channels=channels,
-        measured=program.measured,
+        measured=measured,
+        read=[signals.integrals.get(c, c) for c in measured],
+        integrated=" || ".join(integrated),
         windows=program.windows,
         pasts=program.pasts,
         rate_hz=sample_rate_hz,

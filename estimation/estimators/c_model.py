@@ -8,7 +8,7 @@ import numpy as np
 from estimation.effects import Effect
 from estimation.effects.effect import Pointwise
 from estimation.errors import EstimationError
-from estimation.estimators.model import fitted_range, usual_half_width
+from estimation.estimators.model import fitted_range, rest_speeds, usual_half_width
 from estimation.model import Model
 
 UNARY: Mapping[np.ufunc, str] = {
@@ -87,9 +87,8 @@ def model_text(model: Model, place: Callable[[str], int]) -> str:
                 )
     half_width = usual_half_width(model)
     width = "NAN" if half_width is None else repr(half_width)
-    for speed, slowest in model.signals.rest.items():
-        if speed in model.channels and slowest > 0.0:  # as live, none at rest
-            width = f"fabs((double)row[{place(speed)}]) < {slowest!r} ? NAN : {width}"
+    for speed, slowest in rest_speeds(model).items():  # as live, none at rest
+        width = f"fabs((double)row[{place(speed)}]) < {slowest!r} ? NAN : {width}"
     known = fitted_range(model)
     valid = "1" if known is None else f"total >= {known[0]!r} && total <= {known[1]!r}"
     return "\n".join(

@@ -36,7 +36,7 @@ class Stream(Stepper):
         self._weights = [np.array(term.weights) for term in model.terms]
         self._shapes = [term.numbers(term.effect.shape) for term in model.terms]
         self._states = [term.effect.start() for term in model.terms]
-        self._rest = {k: v for k, v in model.signals.rest.items() if k in model.channels}
+        self._rest = rest_speeds(model)
         self.half_width = usual_half_width(model)
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
@@ -68,6 +68,12 @@ class Stream(Stepper):
 def usual_half_width(model: Model) -> float | None:
     """Return half the 95 % interval of a model's live errors in motion; None where not known."""
     return model.evidence.half_width if model.evidence else None
+
+
+def rest_speeds(model: Model) -> dict[str, float]:
+    """Return the speeds below which a part that the model reads is at rest, where one is stated."""
+    rest = model.signals.rest.items()
+    return {speed: slowest for speed, slowest in rest if speed in model.channels and slowest > 0}
 
 
 def fitted_range(model: Model) -> tuple[float, float] | None:

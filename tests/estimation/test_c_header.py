@@ -21,10 +21,12 @@ from estimation.fitting import fit
 from estimation.live_channels import causal_channels
 from estimation.model import Estimate, Model, Term, predict
 from estimation.networks.network import Network
+from estimation.plant import Sensor
 from estimation.plant_models import declared
 from estimation.predicted import predicted_of, with_prediction
 from estimation.recording import Recording
 from rig.live.status import ModelStatus
+from rig.machines.recordings import with_positions
 from tests.estimation.test_plant import SLIDE, slide
 
 TARGET = "proximal_torque_n_m"
@@ -48,7 +50,7 @@ int main(void) {
 """
 
 
-def compiled(estimator, run: Recording, folder) -> np.ndarray:
+def compiled(estimator, run: Recording, folder, channels=None) -> np.ndarray:
     """Return value, half width and validity of each sample as the compiled header gives them."""
     (folder / "grip.h").write_text(header(estimator, "grip", run.sample_rate_hz))
     (folder / "main.c").write_text(MAIN)
@@ -56,7 +58,7 @@ def compiled(estimator, run: Recording, folder) -> np.ndarray:
     command = [COMPILER, *flags, "main.c", "-o", "main", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
     stepper = estimator.stepper(run.sample_rate_hz)
-    samples = np.column_stack([run[name] for name in stepper.channels])
+    samples = np.column_stack([run[name] for name in channels or stepper.channels])
     done = subprocess.run(
         [folder / "main"], input=samples.tobytes(), capture_output=True, check=True
     )
@@ -113,6 +115,26 @@ def test_a_compiled_model_of_any_machine_gives_the_same(tmp_path):
     status = ModelStatus([model])
     assert status.of({model.target: wanted[inside]}).state == "ok"
     assert status.of({model.target: wanted[wanted > high + 3.0]}).state == "suspect"
+
+
+def test_a_machine_that_measures_a_speed_alone_is_estimated_from_the_speed(tmp_path):
+    speed, position = "carriage_velocity_m_s", "carriage_position_m"
+    plant = replace(SLIDE, sensors=(Sensor(speed, "carriage", "speed"),))
+    whole = [slide(k) for k in range(2)]
+    moved = [np.gradient(run[position], run.time_s) for run in whole]
+    columns = [
+        {speed: v, "drive_force_n": r["drive_force_n"]} for v, r in zip(moved, whole, strict=True)
+    ]
+    runs = [replace(r, columns=c) for r, c in zip(whole, columns, strict=True)]
+    campaign = with_positions(Campaign.of(runs), plant)
+    (carriage,) = declared(plant)
+    model = model_file.parse(model_file.to_toml(fit(carriage, campaign, bootstrap=0)))
+    found = compiled(ModelEstimator(model), runs[0], tmp_path, [speed])
+    text = (tmp_path / "grip.h").read_text()
+    assert "from carriage_velocity_m_s." in text
+    assert "at rest" not in text  # the machine states no speed of standstill
+    wanted = predict(model, campaign.runs[0].recording(), causal=True)
+    assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
 
 
 def test_a_model_with_a_gear_is_written_with_its_ratio(runs, tmp_path):
