@@ -21,12 +21,17 @@ from estimation.estimators.c_model import model_text
 from estimation.estimators.model import ModelEstimator, fitted_range, rest_speeds
 from estimation.estimators.network import NetworkEstimator
 from estimation.kalman import tracker
+from estimation.model import Model
 from estimation.recording import FloatArray
 from estimation.signals import Signals, reference
 
 TURNING_TRAVEL, TURNING_TURNED = (
     derived.TURNING.replace("_angle_rad", suffix) for suffix in (derived.TRAVEL, derived.TURNED)
 )
+
+
+USUAL_HZ = 1000.0
+"""Rate of a header whose estimator's file contains none."""
 
 
 class ExportError(EstimationError):
@@ -87,6 +92,16 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         fill="\n".join(program.fill(k, name) for k, name in enumerate(channels)),
     )
     return text.replace("NAME", name.upper()).replace("name_", f"{name}_")
+
+
+def refused(model: Model) -> str:
+    """Return the reason why a fitted model cannot be written as C; empty where it can."""
+    rate_hz = (model.evidence and model.evidence.sample_rate_hz) or USUAL_HZ
+    try:
+        header(ModelEstimator(model), "model", rate_hz)
+    except EstimationError as error:
+        return error.what
+    return ""
 
 
 @cache

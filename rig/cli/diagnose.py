@@ -96,6 +96,7 @@ def _with_models(
 ) -> "tuple[Answer, list[str]]":
     """Write the models; return the diagnosis with their errors as they run live, and the lines."""
     from estimation import model_file
+    from estimation.estimators.c_header import refused
     from rig.diagnosis.traces import with_cost_of_causal_filters
 
     done = with_cost_of_causal_filters(done)
@@ -104,7 +105,11 @@ def _with_models(
     use = ["rig", "model", "use", str(model_out)]
     if machine is not None:
         use = ["rig", "replay", str(path), "--machine", str(machine), "--model", str(model_out)]
-    return done, [f"Model: {model_out}", f"To estimate with it: {shlex.join(use)}"]
+    lines = [f"Model: {model_out}", f"To estimate with it: {shlex.join(use)}"]
+    for model in done.models:
+        if why := refused(model):
+            lines.append(f"{model.balance}: `rig export` cannot write it: {why}")
+    return done, lines
 
 
 def _kept_with(path: Path) -> Path | None:

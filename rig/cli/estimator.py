@@ -16,9 +16,6 @@ from rig.output.table import TextTable
 if TYPE_CHECKING:
     from rig.models.adapt import Adaptation
 
-USUAL_HZ = 1000.0
-"""Rate of a header whose estimator's file contains none."""
-
 estimator_app = options.group("estimator", "Compare estimators.")
 
 
@@ -147,7 +144,7 @@ def export(
     from estimation import model_file
     from estimation.estimator import load
     from estimation.estimators.bank import BankEstimator
-    from estimation.estimators.c_header import header
+    from estimation.estimators.c_header import USUAL_HZ, header
     from estimation.estimators.model import ModelEstimator
     from estimation.estimators.network import NetworkEstimator
     from rig.live.estimator import without_interval

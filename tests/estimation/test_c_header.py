@@ -13,7 +13,7 @@ from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.effects import effect
 from estimation.estimators.bank import BankEstimator, BankRecipe
-from estimation.estimators.c_header import ExportError, header
+from estimation.estimators.c_header import ExportError, header, refused
 from estimation.estimators.c_model import NotInCError
 from estimation.estimators.model import ModelEstimator
 from estimation.estimators.network import NetworkEstimator
@@ -132,6 +132,7 @@ def test_a_machine_that_measures_a_speed_alone_is_estimated_from_the_speed(tmp_p
     found = compiled(ModelEstimator(model), runs[0], tmp_path, [speed])
     text = (tmp_path / "grip.h").read_text()
     assert "from carriage_velocity_m_s." in text
+    assert refused(model) == ""
     assert "at rest" not in text  # the machine states no speed of standstill
     wanted = predict(model, campaign.runs[0].recording(), causal=True)
     assert np.abs(found[:, 0] - wanted).max() <= 1e-4 * np.abs(wanted).max()
@@ -160,6 +161,7 @@ def test_an_effect_with_memory_is_refused_by_name():
     model = Model("m", "motor", "proximal_torque_n_m", (Term(remembering, values=values),))
     with pytest.raises(NotInCError, match=r"friction\.dwell remembers"):
         header(ModelEstimator(model), "grip", 1000.0)
+    assert refused(model) == "friction.dwell remembers the samples before."
 
 
 def test_an_unknown_interval_and_a_pose_come_through(bank, runs, tmp_path):

@@ -104,12 +104,15 @@ def test_a_table_in_millimetres_and_volts_is_fitted_in_metres_and_newtons(
 
 def test_a_diagnosis_ends_with_the_replay_of_its_model(slide, tmp_path, said, monkeypatch):
     monkeypatch.setenv("RIG_STATE_DIR", str(tmp_path / "state"))
+    why = "friction.dwell remembers the samples before."
+    monkeypatch.setattr("estimation.estimators.c_header.refused", lambda _: why)
     file, table = slide
     model = tmp_path / "found.toml"
     printed = said("diagnose", table, "--quick --machine", file, "--model-out", model).out
     command = f"rig replay {table} --machine {file} --model {model}"
     assert command in " ".join(printed.split())
     assert "model use" not in printed
+    assert f"carriage: `rig export` cannot write it: {why}" in " ".join(printed.split())
     evidence = model_file.read(model).evidence
     assert evidence.half_width > 4 * evidence.rmse_with_means  # of live errors, on two runs
     assert "estimate against sensor" in said(command.removeprefix("rig "), "--speed 0").out
