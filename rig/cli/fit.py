@@ -129,7 +129,9 @@ def fit(
     from estimation import model_file
     from estimation.opposed import FIX, opposed
     from estimation.travel import off_ratio
+    from rig.importers.questions import questions
     from rig.machines.recordings import open_recordings
+    from rig.machines.shipped import read_machine
     from rig.reports.fit import held_out_sentence, parameter_table
 
     options.require_new(out)
@@ -140,7 +142,9 @@ def fit(
         _learn(_recipe(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)
         return
     done = _fitted(declared_models(model, machine), campaign, folds, seed)
-    said: list[str | TextTable] = []
+    derived = () if machine is None else read_machine(machine).integrals
+    asked = questions(list(campaign.evidence), derived)
+    said: list[str | TextTable] = [f"Check: {line}" for line in asked]
     one = "One run: there is no error on runs that it was not fitted on."
     for fitted, error in done:
         said += [parameter_table(fitted), held_out_sentence(fitted, error) if error else one]

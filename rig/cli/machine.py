@@ -68,14 +68,16 @@ def check(
     contradict the file, or where nothing can be identified.
     """
     from estimation.plant_check import check as check_plant
+    from rig.importers.questions import questions
     from rig.machines.recordings import open_recordings
     from rig.machines.shipped import read_machine
 
     plant = read_machine(file)
     campaign = None if data is None else open_recordings(data, file, format_)
     found = check_plant(plant, campaign, file)
-    result = {"machine": plant.name, "check": found, "sound": found.is_sound}
-    present(json_, result, *check_lines(plant, found))
+    asked = [] if campaign is None else questions(list(campaign.evidence), plant.integrals)
+    result = {"machine": plant.name, "check": found, "sound": found.is_sound, "questions": asked}
+    present(json_, result, *check_lines(plant, found), *(f"Check: {line}" for line in asked))
     return ExitCode.OK if found.is_sound else ExitCode.FAILED
 
 

@@ -22,6 +22,7 @@ from estimation.recording import FloatArray, Recording
 from rig.diagnosis.ledger import Ledger, Look, look_at
 from rig.diagnosis.propose import propose
 from rig.diagnosis.subject import Subject
+from rig.importers.questions import questions
 from rig.output.table import counted
 
 LEAST_SHARED = 200
@@ -74,7 +75,8 @@ def run_diagnosis(
     if not quick:
         on_stage("choosing the experiment that separates the alternatives")
         proposed = propose(found, recordings, executor)
-    notes = [*lost, *found.diagnosis.notes]
+    asked_of = (f"Check: {line}" for line in questions(whole, asked.derived))
+    notes = [*lost, *asked_of, *found.diagnosis.notes]
     if limit := claim(sealed):
         notes.insert(0, limit)
     if seen:

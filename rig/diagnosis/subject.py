@@ -1,6 +1,6 @@
 """What is diagnosed: the recordings at a path, and the models that are declared of them."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from rig.calibrate.declared import Declared, declared_by_folder, is_raw
 from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 from rig.machines.recordings import open_recordings, with_motion
-from rig.machines.shipped import equations_of
+from rig.machines.shipped import equations_of, read_machine
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,8 @@ class Subject:
 
     campaign: Campaign
     models: Sequence[Model]
+    derived: Collection[str] = ()
+    """Channels of the recordings that were not read but follow from others."""
 
 
 def subject(
@@ -57,7 +59,7 @@ def subject(
         own = equations_of(machine)
         models = _of(own, balance) if model is None else declared_models(model, balance)
         campaign = open_recordings(path, machine, format_name, skip_bad)
-        return Subject(with_motion(campaign, models), models)
+        return Subject(with_motion(campaign, models), models, read_machine(machine).integrals)
     if model is not None:
         models = declared_models(model, balance)
         return Subject(open_campaign(path, format_name, skip_bad), models)

@@ -166,6 +166,25 @@ def test_a_load_that_is_a_condition_is_named(slide, said):
         assert move in " ".join(printed.split())
 
 
+def test_a_clipped_channel_is_asked_about_at_every_step(slide, tmp_path, said, answered):
+    """Of tables and of logs; samples that are flagged as invalid do not count."""
+    file, table = slide
+    rows = np.loadtxt(table, delimiter=",", skiprows=1)
+    rows[:, 2] = np.clip(rows[:, 2], -1.2, 1.2)
+    np.savetxt(table, rows, delimiter=",", header="t,x,volts", comments="", fmt="%.9g")
+    logs = tmp_path / "logs"
+    asked = said("import", table, "--machine", file, "--out", logs).err
+    assert "drive_force_n: " in asked
+    for data in (table, logs):
+        assert "is it clipped?" in said("machine check", file, data).out
+    assert "is it clipped?" in said("fit", logs, "--machine", file).out
+    notes = answered("diagnose --quick", logs, "--machine", file)["notes"]
+    assert any(note.startswith("Check: drive_force_n: ") for note in notes)
+    flagged = '[[data.invalid]]\nwhen = "abs(drive_force_n) >= 42"\nreason = "clipped"\n'
+    file.write_text(file.read_text() + flagged)
+    assert "clipped" not in said("machine check", file, table).out
+
+
 def test_a_column_that_was_not_recorded_is_named(slide, said):
     file, table = slide
     file.write_text(SLIDE.replace('drive_force_n = "volts:35 N"', 'motor_force_n = "volts:35 N"'))

@@ -12,25 +12,10 @@ import numpy as np
 from estimation.channels import unit_of
 from estimation.recording import FloatArray, Recording
 from rig.importers.derivatives import fault, pairs
+from rig.importers.questions import of_channel
 from rig.importers.table.raw import Remark
 from rig.output.table import counted
 
-PLAUSIBLE: dict[str, tuple[float, str]] = {
-    "rad": (200.0, "degrees or counts"),
-    "rad/s": (2000.0, "degrees a second, revolutions a minute or counts"),
-    "m": (20.0, "millimetres or counts"),
-    "m/s": (50.0, "millimetres a second"),
-    "N m": (2000.0, "millinewton metres or counts"),
-    "N": (50000.0, "counts"),
-    "A": (200.0, "milliamperes or counts"),
-    "V": (1000.0, "millivolts or counts"),
-    "1": (10.0, "per cent or counts"),
-}
-"""Size above which values of a bench machine are unusual, and what the column may be in instead.
-
-The sizes are those of machines that fit a room: 32 turns of a shaft, 20000 revolutions a minute."""
-
-COLDEST_K, HOTTEST_K = 200.0, 600.0
 GAP_PERIODS = 1.5
 """Step of time, in median steps, from which samples are missing between two; as for derivatives."""
 
@@ -46,17 +31,11 @@ FAR = 10.0
 LONG_PERIODS = 20.0
 """Step of time, in median steps, from which a gap is a pause between runs, not lost samples."""
 
-PLATEAU = 3
-"""Equal samples in a row that make a plateau."""
-
 NUMBER = re.compile(r"(?<![\w.])\d[\d.]*(e[-+]?\d+)?(?!\w)")
 """A number in a sentence; not one in the name of a channel."""
 
 ROWS = 5
 """Samples shown of the first run."""
-
-CLIPPED = 0.005
-"""Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +98,7 @@ def preview(recordings: Sequence[Recording], remarks: Sequence[Remark]) -> Previ
 
     The runs are not yet checked against their derivatives; `remarks` is what reading them remarked.
     """
-    names = dict.fromkeys(name for r in recordings for name in r.columns)
-    views = [_channel(name, [r[name] for r in recordings if name in r]) for name in names]
+    names = list(dict.fromkeys(name for r in recordings for name in r.columns))
     first = recordings[0]
     shown = {n: np.asarray(first[n])[:ROWS].tolist() for n in ("time_s", *first.columns)}
     together = [
@@ -128,7 +106,7 @@ def preview(recordings: Sequence[Recording], remarks: Sequence[Remark]) -> Previ
     ]
     return Preview(
         tuple(_run(recording) for recording in recordings),
-        tuple(views),
+        tuple(_channel(name, recordings) for name in names),
         shown,
         tuple(_grouped(together, "runs")),
         tuple(_grouped(remarks, "files")),
@@ -195,70 +173,9 @@ def _clock(time_s: FloatArray) -> Iterator[str]:
         )
 
 
-def _channel(name: str, parts: Sequence[FloatArray]) -> ChannelView:
-    values = np.concatenate(parts)
+def _channel(name: str, recordings: Sequence[Recording]) -> ChannelView:
+    values = np.concatenate([r[name] for r in recordings if name in r])
     values = values[np.isfinite(values)]
-    unit = unit_of(name)
-    least, greatest = float(values.min()), float(values.max())
-    wrong = [*_implausible(unit, least, greatest)]
-    if least == greatest:
-        wrong.append(f"it is constant at {with_unit(least, unit)}; is the sensor connected?")
-    else:
-        wrong += _clipped(parts, least, greatest, unit)
-        if unit == "rad":
-            wrong += _wrapped(parts)
-    return ChannelView(name, unit, least, greatest, float(values.mean()), tuple(wrong))
-
-
-def _implausible(unit: str, least: float, greatest: float) -> Iterator[str]:
-    if unit == "K":
-        if least < COLDEST_K or greatest > HOTTEST_K:
-            yield f"{least:g} to {greatest:g} K is unusual; is the column in degC?"
-    elif unit in PLAUSIBLE:
-        limit, instead = PLAUSIBLE[unit]
-        size = max(abs(least), abs(greatest))
-        if size > limit:
-            yield f"{with_unit(size, unit)} is unusually large; is the column in {instead}?"
-
-
-def _clipped(
-    parts: Sequence[FloatArray], least: float, greatest: float, unit: str
-) -> Iterator[str]:
-    """Yield the ends of the range that are reached abruptly and held: a limit, not a standstill."""
-    steps = np.concatenate([np.abs(np.diff(part)) for part in parts])
-    moving = steps[steps > 0]
-    usual = float(np.median(moving)) if moving.size else 0.0
-    total = sum(map(len, parts))
-    if len(np.unique(np.concatenate(parts))) <= PLATEAU:  # a switch
-        return
-    for end, word in ((least, "least"), (greatest, "greatest")):
-        held = sum(_held(part, end, usual / 2) for part in parts)
-        if held > CLIPPED * total:
-            yield (
-                f"{100 * held / total:.1f} % of the samples are held at the {word} value,"
-                f" {with_unit(end, unit)}; is it clipped?"
-            )
-
-
-def _held(values: FloatArray, end: float, abrupt: float) -> int:
-    """Return the samples on plateaus at a value that are entered by a step of at least this."""
-    at = np.flatnonzero(np.diff(np.concatenate([[False], values == end, [False]])))
-    held = 0
-    for first, stop in at.reshape(-1, 2):
-        if stop - first >= PLATEAU and first >= 2:
-            # the step before the last one: the last is cut short by the limit itself
-            entered = abs(values[first - 1] - values[first - 2])
-            held += int(stop - first) if entered >= abrupt and entered > 0 else 0
-    return held
-
-
-def with_unit(value: float, unit: str) -> str:
-    """Return a value with its unit; a ratio has none."""
-    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
-
-
-def _wrapped(parts: Sequence[FloatArray]) -> Iterator[str]:
-    steps = np.concatenate([np.diff(part) for part in parts])
-    jumps = int((np.abs(np.abs(steps) - 2 * np.pi) < 0.2).sum())
-    if jumps and np.nanmedian(np.abs(steps)) < 0.5:
-        yield f"it jumps by a turn {jumps} times; wraps_at states the range of the counter"
+    least, greatest, mean = (float(f(values)) for f in (np.min, np.max, np.mean))
+    wrong = tuple(of_channel(name, recordings))
+    return ChannelView(name, unit_of(name), least, greatest, mean, wrong)

@@ -32,7 +32,9 @@ def questions(tmp_path, **columns):
         ("motor_current_a", np.clip(WAVE, -0.8, 0.8), "clipped"),
         ("motor_angle_rad", 400 * WAVE, "unusually large"),
         ("motor_temperature_k", 20 + WAVE, "degC"),
-        ("motor_angle_rad", np.mod(2 * TIME, 2 * np.pi), "wraps_at"),
+        ("motor_angle_rad", np.mod(2 * TIME, 2 * np.pi), "every 6.283 rad? wraps_at"),
+        ("motor_angle_rad", np.mod(20 * WAVE, 5.03), "every 5.03 rad? wraps_at"),
+        ("slide_position_m", np.mod(9 * WAVE + 2, 4) - 2, "every 4 m? wraps_at"),
     ],
 )
 def test_what_looks_wrong_with_a_channel_is_asked(tmp_path, name, values, word):
@@ -48,6 +50,12 @@ def test_a_table_as_it_should_be_raises_no_question(tmp_path):
     there_and_back = 0.5 - 0.5 * np.cos(np.minimum(TIME, np.pi))
     columns = {"motor_angle_rad": WAVE, "motor_velocity_rad_s": 2 * np.cos(2 * TIME)}
     assert questions(tmp_path, time_s=TIME, **columns, jaw_angle_rad=there_and_back) == []
+
+
+def test_a_position_that_switches_to_and_fro_does_not_wrap(tmp_path):
+    noise = np.random.default_rng(0).normal(0, 0.01, TIME.size)
+    angle = np.sign(np.sin(2 * TIME + 0.1)) + noise
+    assert questions(tmp_path, time_s=TIME, motor_angle_rad=angle) == []
 
 
 RANDOM = np.random.default_rng(1)

@@ -1,0 +1,133 @@
+"""What may be wrong with the channels of recordings, as questions to who knows the machine.
+
+`rig import --preview`, `rig machine check`, `rig fit` and `rig diagnose` ask the same ones, of
+tables and of logs. Samples that are flagged do not count. Nothing is corrected here.
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+
+import numpy as np
+
+from estimation.channels import unit_of
+from estimation.recording import FloatArray, Recording
+
+PLAUSIBLE: dict[str, tuple[float, str]] = {
+    "rad": (200.0, "degrees or counts"),
+    "rad/s": (2000.0, "degrees a second, revolutions a minute or counts"),
+    "m": (20.0, "millimetres or counts"),
+    "m/s": (50.0, "millimetres a second"),
+    "N m": (2000.0, "millinewton metres or counts"),
+    "N": (50000.0, "counts"),
+    "A": (200.0, "milliamperes or counts"),
+    "V": (1000.0, "millivolts or counts"),
+    "1": (10.0, "per cent or counts"),
+}
+"""Size above which values of a bench machine are unusual, and what the column may be in instead.
+
+The sizes are those of machines that fit a room: 32 turns of a shaft, 20000 revolutions a minute."""
+
+COLDEST_K, HOTTEST_K = 200.0, 600.0
+
+PLATEAU = 3
+"""Equal samples in a row that make a plateau."""
+
+CLIPPED = 0.005
+"""Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
+
+WHOLE = 0.75
+"""Share of its range that no position crosses between two samples while it moves."""
+
+
+def questions(recordings: Sequence[Recording], derived: Collection[str] = ()) -> list[str]:
+    """Return the doubts about the channels of runs: questions, each with its channel.
+
+    Args:
+        recordings: The runs.
+        derived: Channels that were not read but follow from others; nothing is asked about them.
+    """
+    names = dict.fromkeys(name for r in recordings for name in r.columns if name not in derived)
+    return [f"{n}: {text}" for n in names for text in of_channel(n, recordings)]
+
+
+def of_channel(name: str, recordings: Sequence[Recording]) -> list[str]:
+    """Return the doubts about a channel over all runs: questions."""
+    parts = [np.where(r.valid, r[name], np.nan) for r in recordings if name in r]
+    values = np.concatenate([part[np.isfinite(part)] for part in parts])
+    if not values.size:
+        return []
+    unit = unit_of(name)
+    least, greatest = float(values.min()), float(values.max())
+    wrong = [*_implausible(unit, least, greatest)]
+    if least == greatest:
+        return [*wrong, f"it is constant at {with_unit(least, unit)}; is the sensor connected?"]
+    wrong += _clipped(parts, least, greatest, unit)
+    if unit in ("rad", "m"):
+        wrong += _wrapped(parts, least, greatest, unit)
+    return wrong
+
+
+def _implausible(unit: str, least: float, greatest: float) -> Iterator[str]:
+    if unit == "K":
+        if least < COLDEST_K or greatest > HOTTEST_K:
+            yield f"{least:g} to {greatest:g} K is unusual; is the column in degC?"
+    elif unit in PLAUSIBLE:
+        limit, instead = PLAUSIBLE[unit]
+        size = max(abs(least), abs(greatest))
+        if size > limit:
+            yield f"{with_unit(size, unit)} is unusually large; is the column in {instead}?"
+
+
+def _clipped(
+    parts: Sequence[FloatArray], least: float, greatest: float, unit: str
+) -> Iterator[str]:
+    """Yield the ends of the range that are reached abruptly and held: a limit, not a standstill."""
+    steps = np.concatenate([np.abs(np.diff(part)) for part in parts])
+    moving = steps[steps > 0]
+    usual = float(np.median(moving)) if moving.size else 0.0
+    values = np.concatenate(parts)
+    if len(np.unique(values[np.isfinite(values)])) <= PLATEAU:  # a switch
+        return
+    for end, word in ((least, "least"), (greatest, "greatest")):
+        held = sum(_held(part, end, usual / 2) for part in parts)
+        if held > CLIPPED * len(values):
+            yield (
+                f"{100 * held / len(values):.1f} % of the samples are held at the {word} value,"
+                f" {with_unit(end, unit)}; is it clipped?"
+            )
+
+
+def _held(values: FloatArray, end: float, abrupt: float) -> int:
+    """Return the samples on plateaus at a value that are entered by a step of at least this."""
+    at = np.flatnonzero(np.diff(np.concatenate([[False], values == end, [False]])))
+    held = 0
+    for first, stop in at.reshape(-1, 2):
+        if stop - first >= PLATEAU and first >= 2:
+            # the step before the last one: the last is cut short by the limit itself
+            entered = abs(values[first - 1] - values[first - 2])
+            held += int(stop - first) if entered >= abrupt and entered > 0 else 0
+    return held
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Return a value with its unit; a ratio has none."""
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
+
+def _wrapped(
+    parts: Sequence[FloatArray], least: float, greatest: float, unit: str
+) -> Iterator[str]:
+    """Yield that a position in motion jumps from one end of its range to the other."""
+    turns: list[float] = []
+    for part in parts:
+        steps = np.diff(part[np.diff(part, prepend=np.nan) != 0])
+        before, step, after = steps[:-2], steps[1:-1], steps[2:]
+        onward = (before * step < 0) & (after * step < 0)
+        small = np.maximum(np.abs(before), np.abs(after)) < 0.5 * np.abs(step)
+        there = onward & small & (np.abs(step) > WHOLE * (greatest - least))
+        turns += (np.abs(step) + (np.abs(before) + np.abs(after)) / 2)[there].tolist()
+    if turns:
+        yield (
+            f"it jumps by its whole range {len(turns)} times in motion; does its counter start"
+            f" again every {with_unit(float(np.median(turns)), unit)}? wraps_at states that range"
+            " in the unit of the column"
+        )
