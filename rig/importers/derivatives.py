@@ -32,6 +32,11 @@ CONFUSED = {
     "m/s": ("mm/s", "cm/s", "m/min"),
     "m/s^2": ("mm/s^2",),
     "N m": ("mN m",),
+    "N": ("mN", "kgf"),
+    "A": ("mA",),
+    "V": ("mV",),
+    "Pa": ("kPa", "bar", "psi"),
+    "1": ("%",),
     "N m/s": ("mN m/s",),
 }
 """Unit of a channel to those that its values are often in instead."""

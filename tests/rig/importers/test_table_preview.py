@@ -58,6 +58,43 @@ def test_a_position_that_switches_to_and_fro_does_not_wrap(tmp_path):
     assert questions(tmp_path, time_s=TIME, motor_angle_rad=angle) == []
 
 
+def of_runs(tmp_path, angles, currents):
+    """Return the questions about runs of these sizes of an angle and a current."""
+    for number, (angle, current) in enumerate(zip(angles, currents, strict=True)):
+        wave = np.sin(TIME * (2 + 0.1 * number))
+        columns = {"motor_angle_rad": angle * wave, "motor_current_a": current * wave}
+        text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
+    recordings = list(read_runs(tmp_path, read_mapping(None, []), []))
+    return preview(recordings, []).questions
+
+
+@pytest.mark.parametrize(
+    ("factor", "question"),
+    [
+        (np.pi / 180, "is it stated in deg without being so there?"),
+        (180 / np.pi, "is it in deg there?"),
+        (1 / 20, "are unit and gain right there?"),
+    ],
+)
+def test_one_run_in_another_unit_is_asked_once(tmp_path, factor, question):
+    angles = np.array([1.0, 0.9, 1.2, factor, 1.1, 0.8])
+    (found,) = of_runs(tmp_path, angles, [0.5, 0.6, 0.5, 0.5, 0.6, 0.4])
+    assert "motor_angle_rad: it varies" in found
+    assert "in run3 as in the other runs" in found
+    assert question in found
+
+
+@pytest.mark.parametrize(
+    ("angles", "currents"),
+    [
+        ([1.0, 0.9, 1.2, 0.02, 1.1], [0.5, 0.5, 0.6, 0.01, 0.5]),  # one moves less
+        ([1.0, 0.9, 0.3, 0.02, 5.0], [0.5, 0.5, 0.6, 0.5, 0.5]),  # runs of all sizes
+    ],
+)
+def test_a_run_that_moves_less_is_not_asked_about(tmp_path, angles, currents):
+    assert of_runs(tmp_path, angles, currents) == []
+
+
 RANDOM = np.random.default_rng(1)
 CLOCKS = {
     "a gap": (np.where(TIME > 4, TIME + 1, TIME), ["1 gap in time", "gap_s"]),
