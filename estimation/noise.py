@@ -11,6 +11,9 @@ from estimation.signals import Reading, Signals
 WHOLE = 0.05
 """Part of a count that changes may differ from whole counts by, in the middle of them."""
 
+MOST_NOISE = 0.3
+"""Share of a channel that may be noise of its reading: a term of it is too small by its square."""
+
 
 def white_noise(recording: Recording, measured: Sequence[str], signals: Signals) -> Recording:
     """Return a recording of white noise, as wide in each measured channel as that channel's own.
@@ -26,6 +29,14 @@ def white_noise(recording: Recording, measured: Sequence[str], signals: Signals)
         at = np.arange(len(recording)) // max(held, 1)
         made[name] = noise_width(recording[name], known) * white[at]
     return recording.with_columns(**made)
+
+
+def noisy_sentence(channel: str, share: float, remedy: str) -> str:
+    """Return that a channel is mostly noise of its reading, and the remedy."""
+    return (
+        f"{share:.0%} of {channel} is noise of its reading, so its term comes out too small."
+        f" {remedy}"
+    )
 
 
 def noise_width(values: FloatArray, known: Reading) -> float:

@@ -9,11 +9,11 @@ import numpy as np
 
 from estimation.campaign import Campaign
 from estimation.channels import unit_of
-from estimation.derived import measured_channels
+from estimation.derived import CLOCKS, measured_channels, zero_phase_channels
 from estimation.errors import EstimationError, nearest
 from estimation.fitting import fit
-from estimation.model import Model
-from estimation.noise import noise_width
+from estimation.model import Model, balance_channels, settled
+from estimation.noise import MOST_NOISE, noise_width, noisy_sentence, white_noise
 from estimation.opposed import FIX, opposed, size_of_target
 from estimation.plant import Plant
 from estimation.plant_equations import Missing, missing, unused
@@ -24,6 +24,9 @@ from estimation.travel import FOLLOWS, slope
 
 ALIKE = 3.0
 """Factor between a noise that is stated and that of the recordings."""
+
+CUTOFFS = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+"""The stated cutoff over those that are tried where a channel is mostly noise."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,7 @@ class CheckedEquation:
         between_runs: The same of the runs' means, where the fit ignores them (`run_offsets`); None
             where it does not.
         trouble: Why the recordings do not fit it, or contradict it; empty where they do neither.
+        limits: What the recordings do not separate, or show in noise only, sentences.
     """
 
     name: str
@@ -65,6 +69,7 @@ class CheckedEquation:
     relative_error: float | None = None
     between_runs: float | None = None
     trouble: str = ""
+    limits: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -142,10 +147,11 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
         near = nearest(absent[0], list(columns)) if columns else "There are no runs."
         return replace(plain, trouble=f"{what}. {near}")
     try:
+        plain = replace(plain, limits=(*_one_way(model, campaign), *_noisy(model, campaign)))
         fitted = fit(model, campaign, bootstrap=0)
     except EstimationError as error:
         return replace(plain, trouble=f"{error.what} {error.fix}".strip())
-    found = _described(fitted, values=True)
+    found = replace(_described(fitted, values=True), limits=plain.limits)
     evidence = fitted.evidence
     assert evidence is not None  # noqa: S101  a fit sets its evidence
     size = size_of_target(fitted, campaign)
@@ -155,6 +161,59 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
         return replace(found, relative_error=evidence.rmse_with_means / size)
     means = np.sqrt(max(evidence.rmse_with_means**2 - evidence.rmse**2, 0.0))
     return replace(found, relative_error=evidence.rmse / size, between_runs=float(means) / size)
+
+
+def _one_way(model: Model, campaign: Campaign) -> Iterator[str]:
+    """Yield that Coulomb friction is part of the offset where motion has one direction."""
+    speeds = [t.channels["speed"] for t in model.terms if t.effect.id == "friction.coulomb"]
+    if not speeds or all(t.effect.id != "sensor.offset" for t in model.terms):
+        return
+    for speed in speeds:
+        ways = []
+        for run in campaign.evidence:
+            channels = balance_channels(model, run)
+            ways.append({*np.sign(channels[speed][settled(model, channels)]).tolist()})
+        sides = len(set().union(*ways))
+        if sides == 1 or (sides and model.run_offsets and max(map(len, ways)) == 1):
+            yield (
+                f"{speed} never changes its sign{' within a run' * model.run_offsets}: Coulomb"
+                " friction and the offset cannot be separated, only their sum is identified."
+                " Record motion in the other direction, too."
+            )
+
+
+def _noisy(model: Model, campaign: Campaign) -> Iterator[str]:
+    """Yield the channels that are mostly noise of their readings, and the cutoff that helps."""
+    shares = _noise_shares(model, campaign)
+    stated_hz = model.low_pass.cutoff_hz
+    tried = [float(f"{stated_hz / part:.2g}") for part in CUTOFFS]
+    for channel, share in shares.items():
+        if share <= MOST_NOISE:
+            continue
+        remedy = f"No cutoff_hz above {tried[-1]:g} removes enough: read it finer, or move faster."
+        for cutoff_hz in tried:
+            filtered = replace(model, low_pass=replace(model.low_pass, cutoff_hz=cutoff_hz))
+            if _noise_shares(filtered, campaign)[channel] <= MOST_NOISE:
+                remedy = f"cutoff_hz = {cutoff_hz:g} under [machine] removes enough of it."
+                break
+        yield noisy_sentence(channel, share, remedy)
+
+
+def _noise_shares(model: Model, campaign: Campaign) -> dict[str, float]:
+    """Return the noise of each channel over all that it holds, the median over runs."""
+    names = [name for name in model.channels if name not in CLOCKS]
+    measured = measured_channels(names, model.signals)
+    shares: dict[str, list[float]] = {name: [] for name in names}
+    for run in campaign.evidence:
+        channels = balance_channels(model, run)
+        places = settled(model, channels)
+        noise = zero_phase_channels(
+            white_noise(run, measured, model.signals), names, model.low_pass, model.signals
+        )
+        for name in names if places.size else ():
+            size = float(np.std(channels[name][places]))
+            shares[name].append(float(np.std(noise[name][places])) / size if size else 0.0)
+    return {name: float(np.median(found or [0.0])) for name, found in shares.items()}
 
 
 def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) -> Iterator[str]:

@@ -262,13 +262,14 @@ def _deflections(plant: Plant, chain: Chain) -> Iterator[Written]:
 def missing(plant: Plant) -> Iterator[Missing]:
     """Yield the gaps of these sensors: quantities without an equation, and the sensor for each."""
     efforts = [sensor.name for sensor in plant.sensors if sensor.reads == "effort"]
-    if not plant.actuators and efforts and not equations(plant):
+    undriven = not plant.actuators and not equations(plant)
+    if undriven and efforts:
         yield Missing(
             "No [[actuator]] drives the machine: no equation has an effort on its left.",
             "An [[actuator]] in place of the [[sensor]] that reads the driving effort, such as"
             f" {efforts[0]}.",
         )
-    if not plant.actuators and not efforts:
+    if undriven and not efforts:
         yield Missing(
             "Nothing drives the machine and no effort is read.",
             "An [[actuator]], or a [[sensor]] that reads an effort (N or N m).",

@@ -35,13 +35,11 @@ from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.split import Sealed
 from estimation.model import Model
+from estimation.noise import MOST_NOISE, noisy_sentence
 from estimation.recording import Recording
 
 LEAST_SHARE = 0.001
 """Probability from which a family is held against the test runs."""
-
-MOST_NOISE = 0.3
-"""Share of a channel that may be noise of its reading: a term of it is too small by its square."""
 
 
 @dataclass(frozen=True)
@@ -307,8 +305,6 @@ def _noisy(layout: Layout) -> list[str]:
             share = noise_share(layout.runs, channel)
             cutoff = equation.model.low_pass.cutoff_hz
             if share > MOST_NOISE:
-                found.append(
-                    f"{equation.name}: {share:.0%} of {channel} is noise of its reading, so its"
-                    f" term comes out too small. A cutoff_hz below {cutoff:g} removes more of it."
-                )
+                remedy = f"A cutoff_hz below {cutoff:g} removes more of it."
+                found.append(f"{equation.name}: {noisy_sentence(channel, share, remedy)}")
     return found

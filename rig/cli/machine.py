@@ -89,8 +89,11 @@ def check_lines(plant: "Plant", found: "CheckedPlant") -> list[str]:
     if found.missing:
         lines += ["", "Not identified:"]
         lines += [f"  {gap.what} Needed: {gap.needed}" for gap in found.missing]
-    if found.unused:
-        lines += ["", f"Read by no equation: {', '.join(found.unused)}."]
+    warm = {sensor.name for sensor in plant.sensors if sensor.reads == "temperature"}
+    if others := [name for name in found.unused if name not in warm]:
+        lines += ["", f"Read by no equation: {', '.join(others)}."]
+    if causes := [name for name in found.unused if name in warm]:
+        lines += ["", f"Read by causes of a diagnosis alone: {', '.join(causes)}."]
     if found.contradictions:
         lines += ["", "The recordings contradict the file:"]
         lines += [f"  {sentence}" for sentence in found.contradictions]
@@ -119,6 +122,7 @@ def _parameter_lines(equation: "CheckedEquation") -> list[str]:
                 " ignores it (run_offsets = true). State false where a load differs from run to"
                 " run: without its differences gain and friction may be confused."
             )
+    lines += [f"  {limit}" for limit in equation.limits]
     if equation.trouble:
         is_fitted = equation.relative_error is not None
         lead = "Contradicted by the recordings" if is_fitted else "Cannot be fitted"

@@ -154,6 +154,64 @@ def test_without_a_drive_and_without_a_reading_of_effort_both_are_named(tmp_path
     assert "An [[actuator]], or a [[sensor]] that reads an effort" in printed
 
 
+def test_what_equations_of_ones_own_identify_needs_no_actuator(tmp_path, said):
+    file = tmp_path / "own.toml"
+    own = """[[equation]]
+name = "carriage"
+target = "drive_force_n"
+[[equation.effects]]
+id = "friction.viscous"
+channels.speed = "carriage_velocity_m_s"
+[data]
+"""
+    drive = """[[actuator]]
+name = "drive_force_n"
+axis = "carriage"
+"""
+    assert drive in SLIDE
+    file.write_text(SLIDE.replace(drive, "").replace("[data]\n", own, 1))
+    printed = said("machine check", file).out
+    assert "friction.viscous, damping" in printed
+    assert "Not identified" not in printed
+
+
+def test_a_temperature_that_causes_may_read_is_not_unused(tmp_path, said):
+    file = tmp_path / "warm.toml"
+    warm = '[[sensor]]\nname = "nut_temperature_k"\naxis = "carriage"\nreads = "temperature"\n'
+    file.write_text(SLIDE.replace("[data]\n", warm + "[data]\n", 1))
+    printed = said("machine check", file).out
+    assert "Read by no equation" not in printed
+    assert "Read by causes of a diagnosis alone: nut_temperature_k." in printed
+
+
+@pytest.mark.parametrize("one_way", [True, False])
+def test_friction_and_offset_of_a_machine_that_moves_one_way_are_not_separated(
+    slide, said, one_way
+):
+    file, table = slide
+    rows = np.loadtxt(table, delimiter=",", skiprows=1)
+    if one_way:
+        rows[:, 1] += 500.0 * rows[:, 0]
+        np.savetxt(table, rows, delimiter=",", header="t,x,volts", comments="", fmt="%.9g")
+    printed = " ".join(said("machine check", file, table).out.split())
+    reason = "carriage_velocity_m_s never changes its sign: Coulomb friction and the offset cannot"
+    assert (reason in printed) == one_way
+
+
+def test_an_acceleration_that_is_mostly_noise_is_reported_with_a_cutoff_that_helps(slide, said):
+    file, table = slide
+    rows = np.loadtxt(table, delimiter=",", skiprows=1)
+    rows[:, 1] += np.random.default_rng(2).normal(0.0, 0.02, len(rows))
+    np.savetxt(table, rows, delimiter=",", header="t,x,volts", comments="", fmt="%.9g")
+    printed = " ".join(said("machine check", file, table).out.split())
+    (cutoff_hz,) = re.findall(
+        r"of carriage_acceleration_m_s2 is noise of .* cutoff_hz = (\d+) under", printed
+    )
+    text = SLIDE.replace("[machine]\n", f"[machine]\ncutoff_hz = {cutoff_hz}\n")
+    file.write_text(text)
+    assert "is noise of its reading" not in said("machine check", file, table).out
+
+
 def test_a_load_that_is_a_condition_is_named(slide, said):
     file, table = slide
     text = SLIDE.replace("[data]", '[[load]]\nname = "weight_n"\naxis = "carriage"\n[data]', 1)
