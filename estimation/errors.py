@@ -42,5 +42,5 @@ class UnknownNameError(EstimationError):
 
 def nearest(name: str, allowed: Sequence[str]) -> str:
     """Return a suggestion of the probable name; all names when none is near."""
-    near = difflib.get_close_matches(name, allowed, n=1, cutoff=0.4)
+    near = difflib.get_close_matches(name, allowed, n=1)
     return f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(allowed)}."

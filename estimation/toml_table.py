@@ -168,7 +168,8 @@ class Table:
         for key in self.content:
             if key not in self._read:
                 raise self.error(
-                    f"{self.at(key)} has an unknown key {key!r}.", fix=nearest(key, self._read)
+                    f"{self.at(key)} has an unknown key {key!r}.",
+                    fix=nearest(key, list(dict.fromkeys(self._read))),
                 )
 
 

@@ -118,6 +118,7 @@ def test_a_declared_model_of_any_machine_survives_its_file(plant):
     ("old", "new", "message"),
     [
         ('reads = "position"', 'reads = "positon"', r"line \d+: reads.*Did you mean 'position'"),
+        ("compliant =", "step =", r"has an unknown key 'step'. Known: name, input, output, ratio,"),
         ("compliant =", "compliannt =", r"line \d+ has an unknown key.*Did you mean 'compliant'"),
         ('input = "motor"', 'input = "moter"', r"line \d+: There is no axis 'moter'.*'motor'"),
         ('unit = "rad"', 'unit = "deg"', r"line \d+: The axis 'motor' has the unit 'deg'.*\"rad\""),
