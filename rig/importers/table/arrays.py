@@ -6,9 +6,11 @@ the library for its format is not installed.
 
 import fnmatch
 import io
+import re
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,9 @@ from rig.importers.matlab import read_variables
 from rig.importers.table.data import Layout
 from rig.importers.table.raw import Raw, Values, nested
 from rig.log.order import by_number
+
+NUMBERED = re.compile(r"(?P<stem>[^.]*?\.?)(?P<number>\d+)\.(?P<rest>.+)")
+"""Name of a field of one of several structs: `trial3.q`, `trial.3.q`."""
 
 TRIAL = "trial"
 """Column with the number of the trial, from 1."""
@@ -96,7 +101,8 @@ def _of_trials(path: Path, values: Mapping[str, Any], pattern: str) -> Raw:
         DataError: No name fits the pattern, or no column is in all trials.
     """
     if not pattern:
-        return _of_arrays(path, values)
+        raw = _of_arrays(path, values)
+        return replace(raw, remarks=(*raw.remarks, *_likely_trials(values)))
     depth = pattern.count(".") + 1
     trials: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
@@ -120,6 +126,22 @@ def _of_trials(path: Path, values: Mapping[str, Any], pattern: str) -> Raw:
     columns = {n.lstrip("."): np.concatenate([table[n] for table in tables]) for n in shared}
     numbers = [np.full(len(table[shared[0]]), k + 1.0) for k, table in enumerate(tables)]
     return Raw(path, {**columns, TRIAL: np.concatenate(numbers)})
+
+
+def _likely_trials(names: Iterable[str]) -> Iterator[str]:
+    """Yield the pattern of structs that differ in their number alone and hold the same names."""
+    found: dict[str, dict[str, list[str]]] = {}
+    for match in filter(None, map(NUMBERED.match, names)):
+        trials = found.setdefault(match["stem"], {})
+        trials.setdefault(match["number"], []).append(match["rest"])
+    for stem, trials in found.items():
+        first, *others = trials.values()
+        if others and all(one == first for one in others):
+            yield (
+                f"{len(trials)} variables such as {stem}{next(iter(trials))} hold the same names;"
+                f' where each is a run, state trials = "{stem}*" under [data], and the columns are'
+                f" {', '.join(first)}"
+            )
 
 
 def _with_fields(raw: Raw) -> dict[str, Values]:

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from estimation.files import write_text_atomic
 from rig.cli.main import main
@@ -177,6 +178,15 @@ def test_a_table_of_which_nothing_is_mapped_is_listed(tmp_path, said, answered):
     assert shown["columns"]["t"][:2] == [0.0, 10.0]
     refused = said("import", table, "--out", tmp_path / "logs", code=5).err
     assert f"rig import {table} --preview" in " ".join(refused.split())
+
+
+@pytest.mark.parametrize("names", [("trial1", "trial2"), ("trial", "reference")])
+def test_structs_that_differ_in_their_number_are_proposed_as_trials(tmp_path, said, names):
+    path = tmp_path / "lab.mat"
+    savemat(path, {name: {"t": TIME, "q": WAVE} for name in names})
+    printed = " ".join(said("import", path, "--preview").out.split())
+    proposed = 'state trials = "trial*" under [data], and the columns are t, q'
+    assert (proposed in printed) == (names[1] == "trial2")
 
 
 def test_a_campaign_of_this_program_is_named_as_one(tmp_path, capsys):
