@@ -78,6 +78,8 @@ KNOWN: dict[str, tuple[str, ExitCode]] = {
     "calibration.UnknownNameError": ("a-command-is-refused", ExitCode.USAGE),
     "calibration.CalibrationError": ("a-calibration-is-refused", ExitCode.DATA),
     "estimation.OutputError": ("an-output-is-refused", ExitCode.USAGE),
+    "estimation.PlantFileError": ("a-command-is-refused", ExitCode.USAGE),
+    "estimation.PlantError": ("a-command-is-refused", ExitCode.USAGE),
     "estimation.UnknownNameError": ("a-command-is-refused", ExitCode.USAGE),
     "estimation.EstimationError": ("recordings-or-a-model-do-not-fit", ExitCode.DATA),
     "rig.SafetyTripError": ("the-rig-stops", ExitCode.SAFETY),

@@ -154,6 +154,17 @@ def test_without_a_drive_and_without_a_reading_of_effort_both_are_named(tmp_path
     assert "An [[actuator]], or a [[sensor]] that reads an effort" in printed
 
 
+def test_a_faulty_machine_file_is_a_slip_in_every_command(slide, said):
+    file, table = slide
+    file.write_text(SLIDE.replace('reads = "position"', 'reads = "position"\nstep = 3'))
+    for command in (
+        ["machine check"],
+        ["fit", table, "--machine"],
+        ["diagnose", table, "--machine"],
+    ):
+        assert "unknown key 'step'" in said(*command, file, code=ExitCode.USAGE).err
+
+
 def test_what_equations_of_ones_own_identify_needs_no_actuator(tmp_path, said):
     file = tmp_path / "own.toml"
     own = """[[equation]]
