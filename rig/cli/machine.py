@@ -146,7 +146,10 @@ def new(
     ] = None,
     sensor: Annotated[
         list[str] | None,
-        Option(help="AXIS:CHANNEL; what it reads follows from the channel's unit."),
+        Option(
+            help="AXIS:CHANNEL, or CHANNEL alone of no axis, such as air_temperature_k; what it"
+            " reads follows from the channel's unit."
+        ),
     ] = None,
     from_: Annotated[
         Path | None, Option("--from", help="Table: its columns are listed under [data].")

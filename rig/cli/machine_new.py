@@ -18,7 +18,7 @@ PARTS = {
     "axis": ("NAME:rad or NAME:m", ""),
     "transmission": ("INPUT:OUTPUT:RATIO", ""),
     "actuator": ("AXIS:CHANNEL", ", such as motor:motor_current_a"),
-    "sensor": ("AXIS:CHANNEL", ", such as motor:motor_angle_rad"),
+    "sensor": ("AXIS:CHANNEL", ", such as motor:motor_angle_rad, or CHANNEL of no axis"),
 }
 """Kind of a part of a machine to the form of the words that state one, and an example."""
 
@@ -32,6 +32,9 @@ READS: Mapping[str, Reads] = {
     "K": "temperature",
 }
 """Unit of a channel to the quantity that its sensor reads."""
+
+OF_AN_AXIS = ("position", "speed", "effort")
+"""What a sensor reads of an axis; any other may be of none."""
 
 
 def asked(table: Path | None) -> dict[str, list[str]]:
@@ -70,6 +73,8 @@ def plant_of(name: str, words: Mapping[str, Sequence[str]]) -> Plant:
 
 def _parts(kind: str, word: str) -> list[str]:
     parts, (form, _) = word.split(":"), PARTS[kind]
+    if kind == "sensor" and len(parts) == 1 and reads_of(word) not in OF_AN_AXIS:
+        return ["", word]
     most = 3 if kind == "transmission" else 2
     if not 2 <= len(parts) <= most or not all(parts[:2]):
         fix = f"Write --{kind} {form}."

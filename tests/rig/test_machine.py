@@ -317,6 +317,15 @@ def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_te
     said("machine new", out, words, table, code=2)
 
 
+def test_a_sensor_of_no_axis_is_written_from_an_option(tmp_path, said):
+    out = tmp_path / "new.toml"
+    words = "--axis carriage:m --actuator carriage:drive_force_n"
+    words += " --sensor carriage:carriage_position_m"
+    assert "AXIS:CHANNEL" in said("machine new", out, words, "--sensor carriage_2_m", code=2).err
+    said("machine new", out, words, "--sensor nut_temperature_k")
+    assert "Read by causes of a diagnosis alone: nut_temp" in said("machine check", out).out
+
+
 @pytest.fixture(scope="module")
 def geared(tmp_path_factory):
     """Return a rig of ratio 20 drawn at random: its machine file and its recordings."""
