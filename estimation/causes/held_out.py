@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,15 +73,24 @@ class HeldOut:
         self._last: tuple[tuple[Candidate, ...], Joint, Mapping[Part, FloatArray]] | None = None
         self.at = [k for k, run in enumerate(layout.runs) if run.name in set(sealed.confirm)]
 
-    def apart(self) -> list[tuple[str, str, float]]:
+    def apart(
+        self, kept: Sequence[tuple[Candidate, Collection[str]]]
+    ) -> list[tuple[str, str, float]]:
         """Return equation, run and factor where a run's target is not what the others predict.
 
         The factor is the slope of the target over the prediction of the other runs: -1 where a sign
         is swapped, 57 where degrees were taken for radians.
+
+        Args:
+            kept: The causes found, each with the runs in which it acts; they predict too.
         """
-        fits, found = self.joint.left_out([[k] for k in range(len(self.layout.runs))]), []
+        joint = self.joint
+        for candidate, runs in kept:
+            some = tuple(run.name in runs for run in self.layout.runs)
+            joint = self._grown(joint, candidate, None if candidate.acts is None else some)
+        fits, found = joint.left_out([[k] for k in range(len(self.layout.runs))]), []
         for name in self.layout.equations:
-            gram = self.joint.gram[name, "within"]
+            gram = joint.gram[name, "within"]
             both = np.einsum("rb,rb->r", fits.base, gram[:, :-1, -1])
             predicted = np.einsum("rb,rbc,rc->r", fits.base, gram[:, :-1, :-1], fits.base) + TINY
             alike = np.abs(both) / np.sqrt(predicted * gram[:, -1, -1] + TINY)
@@ -177,11 +186,16 @@ class HeldOut:
 
     def _with(self, joint: Joint, candidate: Candidate, in_test: bool = True) -> Joint:
         """Return a regression with a cause, as if it acted in every test run, or in none."""
-        acts, given = None, candidate.given or candidate.acts is None
+        acts = None
         if candidate.acts is not None or not in_test:
             count = len(self.layout.runs)
             trained = iter(candidate.acts or itertools.repeat(True, count))
             acts = tuple(in_test if k in self.at else next(trained) for k in range(count))
+        return self._grown(joint, candidate, acts)
+
+    def _grown(self, joint: Joint, candidate: Candidate, acts: tuple[bool, ...] | None) -> Joint:
+        """Return a regression with a cause that acts in some runs; in all when None."""
+        given = candidate.given or candidate.acts is None
         laid = laid_out(self.joint, Claim(candidate.cause, acts, given=given))
         return joint if laid is None else joint.with_cause(laid.laid, laid.precision)
 

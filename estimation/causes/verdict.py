@@ -111,7 +111,9 @@ def answer(
     notes += [
         f"{run}: {layout.equations[name].target} is {factor:.2g} times what the other runs predict"
         " for it. Check its sign and unit in this run, or exclude the run."
-        for name, run, factor in held_out.apart()
+        for name, run, factor in held_out.apart(
+            [(k.scored.candidate, f.runs_affected) for k, f in zip(kept, findings, strict=True)]
+        )
     ]
     diagnosis = Diagnosis(
         findings=tuple(findings),

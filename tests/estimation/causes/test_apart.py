@@ -1,0 +1,28 @@
+"""Runs that are not as the others predict: remarked on unless what was found explains them."""
+
+import numpy as np
+
+from estimation.causes.verdict import diagnose
+from estimation.diagnosis.split import split
+from estimation.recording import Recording
+from tests.estimation.causes.synthetic import axis
+
+REMARK = "times what the other runs predict"
+
+
+def ahead(k: int, scale: float) -> Recording:
+    """Return a run of a crank that turns one way, with friction that is larger at low speed."""
+    random, time = np.random.default_rng(k), np.arange(2000) / 250.0
+    speed = scale * (2.0 + np.sin(0.8 * time + k) + 0.5 * np.sin(2.3 * time))
+    angle = np.cumsum(speed) / 250.0
+    torque = 0.02 * np.gradient(speed, time) + 0.05 * speed + 0.3 + np.exp(-((speed / 0.3) ** 2))
+    torque += random.normal(0, 0.005, len(time))
+    columns = {"crank_torque_n_m": torque, "crank_angle_rad": angle}
+    return Recording(f"{k:02d}", time, columns, started_at_ns=int(1e10 * k) + 1)
+
+
+def test_slow_runs_are_not_remarked_on_where_a_finding_explains_them() -> None:
+    runs = [ahead(k, 0.15 if k in (0, 7) else 1.0 + 0.5 * (k % 4)) for k in range(12)]
+    found = diagnose(runs, [axis()], split(runs))
+    assert [f.family for f in found.findings] == ["friction.stribeck"]
+    assert not [note for note in found.notes if REMARK in note]
