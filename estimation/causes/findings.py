@@ -122,19 +122,24 @@ def unpredicted(found: Unsteady, refits: Refits) -> Finding:
     )
 
 
-def parameters_of(kept: Kept, home: str, written: Sequence[Model]) -> Mapping[str, Value]:
+def parameters_of(
+    kept: Kept, home: str, written: Sequence[Model], refits: Refits
+) -> Mapping[str, Value]:
     """Return amplitudes and shape of a named cause from the written model of its home equation.
 
-    Of a cause that no file holds, the shape alone.
+    Of a declared term, its change; of another cause that no file holds, the shape alone.
     """
     cause = kept.scored.candidate.cause
     if isinstance(cause, Function):
         return {}
     model = next(m for m in written if m.balance == home)
-    if isinstance(cause, Moved):  # by how much it differs in the runs in which it acts
-        p, scored = cause.effect.amplitudes[cause.parts[0]], kept.scored
-        unit = Term(cause.effect, channels=dict(cause.channels)).unit(p, model.target)
-        return {"change": Value(float(scored.amplitudes[0] / scored.candidate.size[0]), unit, None)}
+    if isinstance(cause, Moved) and kept.part is not None:  # in the runs in which it acts
+        (k,) = cause.parts
+        unit = Term(cause.effect, channels=dict(cause.channels)).unit(
+            cause.effect.amplitudes[k], model.target
+        )
+        change = refits.of[home].amplitudes(kept.part, refits.parts[home])[k]
+        return {"change": Value(float(change), unit, None)}
     own = kept.part.term if kept.part is not None else None
     for term in model.terms:
         if own is not None and _same(term, own):

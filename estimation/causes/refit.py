@@ -143,6 +143,14 @@ class Refit:
             self._solved[key] = self._fitted(tuple(parts))
         return self._solved[key]
 
+    def amplitudes(self, part: Part, parts: Sequence[Part]) -> FloatArray:
+        """Return the amplitudes of one of some causes."""
+        in_order = sorted(parts, key=lambda p: p.term is None)  # that of their columns
+        widths = [self._width(p) for p in in_order]
+        after = sum(widths[in_order.index(part) :])
+        weights = self.solve(parts).weights
+        return weights[len(weights) - after :][: self._width(part)]
+
     def residuals(
         self, solved: Solved, name: str
     ) -> tuple[NDArray[np.intp], FloatArray, FloatArray] | None:
@@ -265,10 +273,15 @@ class Refit:
         ]
         for part in parts:
             if part.unwritten is not None:
-                count = part.unwritten(self.train_names[0], np.zeros(1)).shape[1]
-                rows += [(part.precision, -np.inf, np.inf)] * count
+                rows += [(part.precision, -np.inf, np.inf)] * self._width(part)
         penalty, low, high = np.array(rows).T
         return penalty, low, high
+
+    def _width(self, part: Part) -> int:
+        """Return the number of a cause's amplitudes."""
+        if part.unwritten is not None:
+            return part.unwritten(self.train_names[0], np.zeros(1)).shape[1]
+        return len(part.term.effect.amplitudes) if part.term is not None else 0
 
     def _run(self, parts: Sequence[Part], name: str) -> tuple[FitRun, NDArray[np.intp]] | None:
         """Return a run and the samples that its error counts; None without a sample to fit."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from estimation.causes.acting import Moved
 from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Layout, lay_out, on_one_clock
 from estimation.causes.findings import (
@@ -33,7 +34,7 @@ from estimation.causes.search import Found, search
 from estimation.causes.unsteady import unsteady
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding
-from estimation.diagnosis.split import Sealed
+from estimation.diagnosis.split import Sealed, claim
 from estimation.model import Model
 from estimation.noise import MOST_NOISE, noisy_sentence
 from estimation.recording import Recording
@@ -100,7 +101,7 @@ def answer(
     judged, notes = _judged(found, held_out, refits)
     written = refits.models()
     findings = [
-        replace(f, parameters=parameters_of(kept, f.balance, written)) for kept, f in judged
+        replace(f, parameters=parameters_of(kept, f.balance, written, refits)) for kept, f in judged
     ]
     if not findings and sealed.may_name and (changing := unsteady(held_out)):
         findings = [unpredicted(changing, refits)]
@@ -108,7 +109,7 @@ def answer(
             f"{changing.equation}: the level of {changing.effect} changes within runs, at times"
             " that no recorded signal predicts."
         )
-    notes += [
+    apart = [
         f"{run}: {layout.equations[name].target} is {factor:.2g} times what the other runs predict"
         " for it. Check its sign and unit in this run, or exclude the run."
         for name, run, factor in held_out.apart(
@@ -123,7 +124,7 @@ def answer(
         moved={m.balance: _moved(layout.equations[m.balance].model, m) for m in written},
         sealed=sealed,
         undecided=dict(layout.undecided),
-        notes=(*_limits(timed, layout, sealed), *notes),
+        notes=(*apart, *_limits(timed, layout, sealed), *notes),
         seconds=time.perf_counter() - began,
     )
     kept = tuple(one for one, _ in judged)
@@ -164,6 +165,8 @@ def _opened(
     """
     candidate, sealed = one.scored.candidate, refits.sealed
     acts_in, settled = held_out.acts_in([k.scored.candidate for k in kept], candidate)
+    if isinstance(candidate.cause, Moved) and 2 * sum(acts_in.values()) > len(acts_in):
+        acts_in = {name: not acts for name, acts in acts_in.items()}  # most runs are the usual ones
     parts, uncounted, notes = dict(refits.parts), refits.open, list[str]()
     if settled:
         more = refits.open | {*settled}
@@ -284,7 +287,7 @@ def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
 def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> list[str]:
     """Return the limits of these runs, one sentence each."""
     training = [r for r in recordings if r.name in sealed.discover]
-    found = audit(training)
+    found = [*filter(None, [claim(sealed)]), *audit(training)]
     if not sealed.may_name:
         found.append(
             f"{len(sealed.discover)} training runs: with fewer than {DEFAULT.least_to_name} no"

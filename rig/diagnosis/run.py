@@ -17,7 +17,7 @@ from estimation.causes.equations import on_one_clock
 from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.audit import steady
-from estimation.diagnosis.split import claim, cut_and_split, path_of
+from estimation.diagnosis.split import cut_and_split, path_of
 from estimation.recording import FloatArray, Recording
 from rig.diagnosis.ledger import Ledger, Look, look_at
 from rig.diagnosis.propose import propose
@@ -76,9 +76,7 @@ def run_diagnosis(
         on_stage("choosing the experiment that separates the alternatives")
         proposed = propose(found, recordings, executor)
     asked_of = (f"Check: {line}" for line in questions(whole, asked.derived))
-    notes = [*lost, *asked_of, *found.diagnosis.notes]
-    if limit := claim(sealed):
-        notes.insert(0, limit)
+    notes = [*found.diagnosis.notes, *lost, *asked_of]
     if seen:
         share = f"{len(seen)} of the {counted(len(sealed.confirm), 'test run')}"
         was = "was" if len(seen) == 1 else "were"

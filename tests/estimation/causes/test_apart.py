@@ -1,11 +1,12 @@
 """Runs that are not as the others predict: remarked on unless what was found explains them."""
 
 import numpy as np
+import pytest
 
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
-from tests.estimation.causes.synthetic import axis
+from tests.estimation.causes.synthetic import axis, turning
 
 REMARK = "times what the other runs predict"
 
@@ -26,3 +27,19 @@ def test_slow_runs_are_not_remarked_on_where_a_finding_explains_them() -> None:
     found = diagnose(runs, [axis()], split(runs))
     assert [f.family for f in found.findings] == ["friction.stribeck"]
     assert not [note for note in found.notes if REMARK in note]
+
+
+def test_a_run_with_a_swapped_sign_is_the_first_note() -> None:
+    runs = turning(lambda angle, speed, acceleration: 0.0 * speed, runs=6)
+    runs[4] = runs[4].with_columns(crank_torque_n_m=-runs[4]["crank_torque_n_m"])
+    found = diagnose(runs, [axis()], split(runs))
+    assert found.notes[0].startswith(f"04: crank_torque_n_m is -1 {REMARK}")
+    assert len(found.notes) > 1
+
+
+def test_a_term_that_differs_is_stated_of_the_fewer_runs() -> None:
+    pairs = zip(turning(lambda *_: 0.0), turning(lambda _, speed, __: 0.02 * speed), strict=True)
+    runs = [one if k in (1, 5, 8) else two for k, (one, two) in enumerate(pairs)]
+    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    assert (finding.family, finding.runs_affected) == ("friction.viscous", ("01", "05", "08"))
+    assert finding.parameters["change"].value == pytest.approx(-0.02, rel=0.1)
