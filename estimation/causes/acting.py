@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from estimation.causes.blocks import Products
 from estimation.causes.candidates import Candidate, Claim
-from estimation.causes.equations import Layout
-from estimation.causes.instruments import instrumented
+from estimation.causes.equations import Layout, RunSignals
+from estimation.causes.instruments import instrumented, signal
 from estimation.causes.joint import Joint
 from estimation.causes.places import places_of
 from estimation.causes.sources import Source
@@ -129,14 +129,16 @@ class Moved(Source):
 
     Attributes:
         column: Number of its equation's declared column; None of an offset or a sensor's gain.
+        of_all: Whether all terms of its equation differ alike.
     """
 
     column: int | None = None
+    of_all: bool = False
 
     @property
     def is_declared(self) -> bool:
-        """A declared term; an offset and a sensor's gain are in no column."""
-        return self.column is not None
+        """A declared term, or all; an offset and another sensor's gain are in no column."""
+        return self.column is not None or self.of_all
 
     @property
     def is_bounded(self) -> bool:
@@ -147,6 +149,26 @@ class Moved(Source):
     def side(self) -> int:
         """The sign of its term is in how it enters."""
         return 1
+
+    def change(self, amplitude: float, runs: Sequence[RunSignals]) -> float:
+        """Return by how much the factor differs; of a gain, as a share of the usual one.
+
+        A gain is fitted as a share of what stands for its reading in the equation.
+
+        Args:
+            amplitude: Of its column.
+            runs: Those in which it acts.
+        """
+        if self.effect.id != "sensor.gain" and not self.of_all:
+            return amplitude
+        (channel,), home = self.reads, self.place.home
+        both = [
+            [run.channels[name][run.grid[run.used[home]]] for run in runs]
+            for name in (channel, signal(runs[0], channel, home))
+        ]
+        read, stands = (np.concatenate([x - x.mean() for x in of_runs]) for of_runs in both)
+        share = amplitude * float(stands @ stands) / float(read @ stands)
+        return share if self.place.kind == "actuator" else share / (1.0 - share)
 
 
 def amplitudes_of(layout: Layout) -> Iterator[Moved]:
@@ -168,30 +190,39 @@ def amplitudes_of(layout: Layout) -> Iterator[Moved]:
                 column += len(own_effect.amplitudes) + len(own_effect.shape)
 
 
-def drives_of(layout: Layout) -> Iterator[Moved]:
-    """Yield the gain of every drive that is an equation's target, read as the equation predicts."""
+def gains_of(layout: Layout) -> Iterator[Moved]:
+    """Yield the gain of what reads an equation's target, read as the equation predicts it.
+
+    That is a drive, or a sensor that no other equation reads.
+    """
     for place in places_of(layout):
         target = layout.equations[place.home].target
-        known = layout.runs[0].channels
-        if place.name == f"actuator {target}" and instrumented(target, place.home) in known:
-            yield Moved(place, effect("motor.torque_constant"), (("source", target),), (), (0,))
+        if instrumented(target, place.home) not in layout.runs[0].channels:
+            continue
+        if place.name == f"actuator {target}":
+            gain, role = effect("motor.torque_constant"), "source"
+        elif place.name == f"sensor {target}" and len(place.enters) == 1:
+            gain, role = effect("sensor.gain"), "reading"
+        else:
+            continue
+        yield Moved(place, gain, ((role, target),), (), (0,), of_all=True)
 
 
 def moved_terms(joint: Joint) -> list[tuple[Claim, Products]]:
     """Return the declared terms as causes that act in no run yet, with their products by run.
 
     In all runs they are the base itself, so they compete only for acting in some. So does the gain
-    of a drive that is the target, by which all terms differ alike.
+    of what reads the target, by which all terms differ alike.
     """
     usual, weights = joint.left_out([[]]).base[0], joint.weights
     out = []
-    for one in (*amplitudes_of(joint.layout), *drives_of(joint.layout)):
+    for one in (*amplitudes_of(joint.layout), *gains_of(joint.layout)):
         part = one.place.home, "within"
         terms = np.zeros(joint.size + 1)
         if one.column is not None:
             terms[joint.at[part][one.column]] = 1.0
-        elif one.place.kind == "actuator":
-            terms[joint.at[part]] = -usual[joint.at[part]]
+        elif one.of_all:
+            terms[joint.at[part]] = one.place.enters[0].gain * usual[joint.at[part]]
         else:
             continue
         products = weights[part] * joint.gram[part] @ terms[:, None]

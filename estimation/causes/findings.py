@@ -123,23 +123,23 @@ def unpredicted(found: Unsteady, refits: Refits) -> Finding:
 
 
 def parameters_of(
-    kept: Kept, home: str, written: Sequence[Model], refits: Refits
+    kept: Kept, finding: Finding, written: Sequence[Model], refits: Refits
 ) -> Mapping[str, Value]:
     """Return amplitudes and shape of a named cause from the written model of its home equation.
 
     Of a declared term, its change; of another cause that no file holds, the shape alone.
     """
-    cause = kept.scored.candidate.cause
+    cause, home = kept.scored.candidate.cause, finding.balance
     if isinstance(cause, Function):
         return {}
     model = next(m for m in written if m.balance == home)
     if isinstance(cause, Moved) and kept.part is not None:  # in the runs in which it acts
         (k,) = cause.parts
-        unit = Term(cause.effect, channels=dict(cause.channels)).unit(
-            cause.effect.amplitudes[k], model.target
-        )
-        change = refits.of[home].amplitudes(kept.part, refits.parts[home])[k]
-        return {"change": Value(float(change), unit, None)}
+        term = Term(cause.effect, channels=dict(cause.channels))
+        unit = "1" if cause.of_all else term.unit(cause.effect.amplitudes[k], model.target)
+        amplitude = float(refits.of[home].amplitudes(kept.part, refits.parts[home])[k])
+        acting = [run for run in refits.layout.runs if run.name in finding.runs_affected]
+        return {"change": Value(cause.change(amplitude, acting), unit, None)}
     own = kept.part.term if kept.part is not None else None
     for term in model.terms:
         if own is not None and _same(term, own):

@@ -101,7 +101,7 @@ def answer(
     judged, notes = _judged(found, held_out, refits)
     written = refits.models()
     findings = [
-        replace(f, parameters=parameters_of(kept, f.balance, written, refits)) for kept, f in judged
+        replace(f, parameters=parameters_of(kept, f, written, refits)) for kept, f in judged
     ]
     if not findings and sealed.may_name and (changing := unsteady(held_out)):
         findings = [unpredicted(changing, refits)]
@@ -113,7 +113,7 @@ def answer(
         f"{run}: {layout.equations[name].target} is {factor:.2g} times what the other runs predict"
         " for it. Check its sign and unit in this run, or exclude the run."
         for name, run, factor in held_out.apart(
-            [(k.scored.candidate, f.runs_affected) for k, f in zip(kept, findings, strict=True)]
+            [(kept.scored.candidate, f.runs_affected) for kept, f in judged]
         )
     ]
     diagnosis = Diagnosis(

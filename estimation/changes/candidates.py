@@ -8,15 +8,7 @@ from estimation.causes.candidates import Claim
 from estimation.causes.equations import Layout
 from estimation.causes.places import places_of
 from estimation.causes.sources import Source, sources_at
-from estimation.effects.effect import Parameter, Proportional
-
-
-class SensorGain(Proportional):
-    """A reading that is wrong by a constant factor."""
-
-    id = "sensor.gain"
-    roles = {"reading": "proximal_torque_n_m"}  # noqa: RUF012 - the class attribute of effects
-    amplitudes = (Parameter("gain", "1", "change of the reading's factor"),)
+from estimation.effects import effect
 
 
 @dataclass(frozen=True)
@@ -49,7 +41,7 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
     for place in places:
         is_drive = place.name == f"actuator {layout.equations[place.home].target}"
         if place.kind in ("torque sensor", "angle sensor") or is_drive:
-            gain, reading = SensorGain(), (("reading", place.roles["reading"][0]),)
+            gain, reading = effect("sensor.gain"), (("reading", place.roles["reading"][0]),)
             changed = Changed(place, gain, reading, (), (0,), key=f"gain of {place.name}")
             yield Claim(changed, later, given=True)
         for source in sources_at(layout, place):

@@ -10,7 +10,7 @@ from estimation.causes.joint import Joint
 from estimation.causes.numbers import Numbers
 from estimation.causes.scoring import Scored, probabilities
 from estimation.causes.sources import Source
-from estimation.changes.candidates import Changed, SensorGain
+from estimation.changes.candidates import Changed
 from estimation.changes.difference import Change
 from estimation.fit_problem import OFFSET
 from estimation.model import Term
@@ -62,7 +62,12 @@ def stated(
         joint = joint.with_cause(cause.candidate.laid, cause.candidate.precision)
     base = joint.fitted_on(np.ones(len(joint.runs)))
     values = [float(x) for x in base[-len(labels) :] / one.candidate.size[: len(labels)]]
-    low, high = np.percentile(_spread(one, joint, random), [2.5, 97.5], axis=0)
+    shared, spread = values[0] * float(np.mean(acts)), _spread(one, joint, random)
+    if isinstance(source, Changed):
+        acting = [run for run, own in zip(joint.runs, acts, strict=True) if own]
+        values = [source.change(x, acting) for x in values]
+        spread = np.array([[source.change(x, acting) for x in row] for row in spread])
+    low, high = np.percentile(spread, [2.5, 97.5], axis=0)
     ends = zip(low, high, values, strict=True)
     return Change(
         verdict=verdict if sure else "one_of",
@@ -79,9 +84,7 @@ def stated(
         unit={
             p.name: term.unit(p, joint.layout.equations[source.place.home].target) for p in chosen
         },
-        before=dict.fromkeys(
-            labels, _before(source, joint, base, values[0] * float(np.mean(acts)))
-        ),
+        before=dict.fromkeys(labels, _before(source, joint, base, shared)),
     )
 
 
@@ -92,7 +95,7 @@ def _before(source: Source, joint: Joint, base: FloatArray, shared: float) -> fl
     """
     if not isinstance(source, Changed):
         return None
-    if isinstance(source.effect, SensorGain):
+    if source.effect.id == "sensor.gain":
         return 1.0
     own = joint.parameter(base, source.place.home, source.column)
     return own - (shared if source.effect.id == OFFSET else 0.0)

@@ -76,7 +76,7 @@ def _unusable(entry: EntryPoint, why: str) -> UnknownEffectError:
 
 def families() -> tuple[str, ...]:
     """Return the families that a diagnosis may report; the last one is `unknown`."""
-    found = {kind.family for kind in catalogue().values() if kind.balances}
+    found = {kind.family for kind in catalogue().values()}
     return (*sorted(found), "unknown")
 
 

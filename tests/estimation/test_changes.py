@@ -90,9 +90,11 @@ def test_a_drive_that_gives_another_torque_an_ampere_is_named_where_it_is_the_ta
         ]
 
     model = replace(axis(), target="drive_current_a")
-    (found,) = compare(currents(1, 1.0), currents(2, 1.06), [model]).changes
+    (found,) = compare(currents(1, 1.0), currents(2, 1.25), [model]).changes
     assert found.name == "gain of actuator drive_current_a"
-    assert found.parameters["gain"] == pytest.approx(-0.057, abs=0.01)  # less torque an ampere
+    assert found.parameters["gain"] == pytest.approx(1 / 1.25 - 1, abs=0.003)  # after over before
+    low, high = found.ci95["gain"]
+    assert low < 1 / 1.25 - 1 < high
 
 
 @pytest.mark.parametrize(

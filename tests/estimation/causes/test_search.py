@@ -169,8 +169,27 @@ def test_a_drive_may_give_another_torque_an_ampere_in_some_of_the_runs() -> None
         runs.append(Recording(run.name, run.time_s, run.columns | {"crank_current_a": current}))
     finding = _only(runs, axis("crank_current_a"))
     assert finding.family == "motor.torque_constant"
-    assert finding.parameters["change"].value == pytest.approx(0.75 / 0.8 - 1.0, rel=0.15)
+    assert finding.parameters["change"].value == pytest.approx(0.75 / 0.8 - 1.0, rel=0.02)
     assert {*finding.runs_affected} == {runs[k].name for k in has}
+
+
+def test_the_gain_of_a_sensor_that_is_the_target_competes_with_that_of_the_drive() -> None:
+    """Nearly all of the reading comes from the drive, and one equation alone reads the sensor."""
+    random, has, runs = np.random.default_rng(0), (1, 3, 5, 8), []
+    for k, run in enumerate(turning(lambda angle, speed, acceleration: 0.0 * speed, size=0.2)):
+        load = (1.0 + 0.1 * (3 * k % 10)) * (2.0 + np.sin(1.3 * run.time_s + k))
+        columns = {
+            "crank_current_a": (load + run["crank_torque_n_m"]) / 0.8,
+            "crank_torque_n_m": (0.92 if k in has else 1.0) * load
+            + random.normal(0, 0.01, len(load)),
+        }
+        runs.append(Recording(run.name, run.time_s, run.columns | columns))
+    sensor = '[[sensor]]\nname = "crank_torque_n_m"\naxis = "crank"\nreads = "effort"\n'
+    models = declared(plant_file.parse(AXIS.replace("DRIVE", "crank_current_a") + sensor))
+    (finding,) = diagnose(runs, models, split(runs)).findings
+    assert {"sensor.gain", "motor.torque_constant"} <= {finding.family, *finding.alternatives}
+    assert {*finding.runs_affected} == {runs[k].name for k in has}
+    assert finding.parameters["change"].value == pytest.approx(-0.08, rel=0.05)
 
 
 def test_a_tight_spot_in_every_turn_depends_on_the_angle_and_the_direction() -> None:
