@@ -88,7 +88,7 @@ def named(one: Kept, may_name: bool) -> Finding:
         place=place.name,
         family="unknown",
         verdict="something_missing",
-        depends_on=_variables(lead.best.candidate),
+        depends_on=variables_of(lead.best.candidate),
     )
     if not may_name:
         return finding
@@ -165,7 +165,8 @@ def others_in_set(name: str, shares: Mapping[str, float]) -> list[str]:
     return others
 
 
-def _variables(candidate: Candidate) -> tuple[str, ...]:
+def variables_of(candidate: Candidate) -> tuple[str, ...]:
+    """Return the variables that a cause depends on, as a finding names them."""
     cause = candidate.cause
     if isinstance(cause, Function):
         return names(cause.place, cause.variables)

@@ -280,7 +280,7 @@ class Refit:
     def _width(self, part: Part) -> int:
         """Return the number of a cause's amplitudes."""
         if part.unwritten is not None:
-            return part.unwritten(self.train_names[0], np.zeros(1)).shape[1]
+            return int(part.unwritten(self.train_names[0], np.zeros(1)).shape[1])
         return len(part.term.effect.amplitudes) if part.term is not None else 0
 
     def _run(self, parts: Sequence[Part], name: str) -> tuple[FitRun, NDArray[np.intp]] | None:

@@ -22,6 +22,8 @@ class Change:
         ci95: Parameter to the 95 % interval of that, over runs.
         unit: Parameter to its unit.
         before: Parameter to its value in A; None of an effect.
+        shape: Shape parameter of an effect to its value, SI.
+        depends_on: Variables that an effect depends on.
     """
 
     verdict: str
@@ -34,6 +36,8 @@ class Change:
     ci95: Mapping[str, tuple[float, float]]
     unit: Mapping[str, str]
     before: Mapping[str, float | None]
+    shape: Mapping[str, float] = field(default_factory=dict)
+    depends_on: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimation.causes.candidates import Group
-from estimation.causes.findings import SURE, others_in_set
+from estimation.causes.findings import SURE, others_in_set, variables_of
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import Numbers
 from estimation.causes.scoring import Scored, probabilities
@@ -85,6 +85,8 @@ def stated(
             p.name: term.unit(p, joint.layout.equations[source.place.home].target) for p in chosen
         },
         before=dict.fromkeys(labels, _before(source, joint, base, shared)),
+        shape={p.name: float(x) for p, x in zip(source.effect.shape, source.shape, strict=True)},
+        depends_on=variables_of(one.candidate),
     )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from estimation.changes.difference import Change, Difference
 from rig.output.table import TextTable
+from rig.reports.diagnosis_words import wave
 
 
 def lines(found: Difference) -> Iterator[str]:
@@ -23,8 +24,11 @@ def _sentence(change: Change) -> str:
         names = f"{change.name}, {others}"
         return f"One of these changed, not distinguishable on these runs: {names} ({sure})."
     how = {"moved": "Moved", "came": "Came", "went": "Went"}[change.verdict]
-    sizes = ", ".join(_size(change, name) for name in change.parameters)
-    return f"{how}: {change.name}, {sizes} ({sure})."
+    sizes = [_size(change, name) for name in change.parameters]
+    if "order" in change.shape:
+        repeats = wave(change.shape["order"], change.depends_on)
+        sizes += [f"{name} {text}".strip() for name, text in repeats.items()]
+    return f"{how}: {change.name}, {', '.join(sizes)} ({sure})."
 
 
 def _size(change: Change, name: str) -> str:

@@ -3,6 +3,7 @@
 import inspect
 import math
 import sys
+from collections.abc import Sequence
 
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.effects import catalogue
@@ -115,11 +116,7 @@ def advice(family: str) -> str:
 
 
 def sizes_of(finding: Finding) -> dict[str, str]:
-    """Return parameters with their units, sine and cosine of one wave as its amplitude.
-
-    How often a wave repeats has no name: so many times per turn of a shaft, or a period of a
-    position.
-    """
+    """Return parameters with their units, sine and cosine of one wave as its amplitude."""
     left = dict(finding.parameters)
     sizes = {}
     if "sine" in left and "cosine" in left:
@@ -127,13 +124,23 @@ def sizes_of(finding: Finding) -> dict[str, str]:
         sizes["amplitude"] = _measured(math.hypot(sine.value, cosine.value), sine.unit)
     for name, known in left.items():
         sizes[name] = _measured(known.value, known.unit)
-    along = next((v for v in finding.depends_on if v.endswith(("_angle", "_position"))), "")
-    if "order" in left and along.endswith("_position"):
+    if "order" in left:
         del sizes["order"]
-        sizes["period"] = f"{2.0 * math.pi / left['order'].value:.3g} m"
-    elif "order" in left and along:
-        sizes[""] = f"{sizes.pop('order')} per turn of the {along.replace('_', ' ')}"
+        sizes |= wave(left["order"].value, finding.depends_on)
     return sizes
+
+
+def wave(order: float, depends_on: Sequence[str]) -> dict[str, str]:
+    """Return how often a wave repeats, by name.
+
+    So many times per turn of a shaft, which needs no name, or a period of a position.
+    """
+    along = next((v for v in depends_on if v.endswith(("_angle", "_position"))), "")
+    if along.endswith("_position"):
+        return {"period": f"{2.0 * math.pi / order:.3g} m"}
+    if along:
+        return {"": f"{order:.3g} per turn of the {along.replace('_', ' ')}"}
+    return {"order": f"{order:.3g}"}
 
 
 def _measured(value: float, unit: str) -> str:

@@ -1,5 +1,6 @@
 """What changed between two campaigns: a planted change is named, and chance is not."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +11,13 @@ from estimation.effects import effect
 from estimation.filters import LowPass
 from estimation.model import Model, Term
 from estimation.recording import Recording
+from rig.reports.changes import lines
 
 RATE_HZ = 200.0
 TIME_S = np.arange(0, 12, 1 / RATE_HZ)
 SPEEDS = (0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
 DECLARED = {"mass": 2.0, "damping": 5.0, "friction": 1.5, "offset": 0.2}
-MACHINE = {**DECLARED, "asymmetry": 0.0, "stiction": 0.0, "knock": 0.0}
+MACHINE = {**DECLARED, "asymmetry": 0.0, "stiction": 0.0, "knock": 0.0, "ripple": 0.0}
 
 
 def equation(target: str, first: Term, friction: int, speed: str) -> Model:
@@ -55,6 +57,7 @@ def record(seed: int, only: int | None = None, **changed: float) -> list[Recordi
         force += machine["friction"] * np.tanh(speed / 0.01) + machine["offset"]
         force += machine["asymmetry"] * np.abs(speed)
         force += machine["stiction"] * np.exp(-np.abs(speed) / 0.05) * np.tanh(speed / 0.01)
+        force += machine["ripple"] * np.sin(2 * np.pi * position / 0.02)
         force += machine["knock"] * (TIME_S > 7.0)
         force += random.normal(0, 0.1, TIME_S.size) + random.normal(0, 0.02)
         columns = {"axis_position_m": position, "drive_force_n": force}
@@ -108,6 +111,15 @@ def test_a_drive_that_gives_another_torque_an_ampere_is_named_where_it_is_the_ta
 def test_an_effect_that_came_and_one_that_went(before, after, verdict, family):
     (found,) = compare(record(1, **before), record(2, **after), [axis()]).changes
     assert (found.verdict, found.family) == (verdict, family)
+
+
+def test_a_ripple_that_came_is_stated_with_its_period():
+    found = compare(record(1), record(2, ripple=0.5), [axis()])
+    sentence = next(lines(found))
+    assert sentence.startswith("Came: ripple.motor at motor, ")
+    period = re.search(r", period (\S+) m \(confidence", sentence)
+    assert period is not None
+    assert float(period[1]) == pytest.approx(0.02, rel=0.02)
 
 
 @pytest.mark.long
