@@ -30,6 +30,13 @@ class NotFittedError(ModelError):
     """A model has parameters without values."""
 
 
+AT_BOUND = (
+    "A parameter at its bound is not identified: noise of its channel, an effect that the equation"
+    " lacks, or too little motion."
+)
+"""What a parameter at its bound means."""
+
+
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """A parameter's value and how sure it is.
@@ -87,6 +94,10 @@ class Term:
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters of the effect: the amplitudes, then the shape."""
         return (*self.effect.amplitudes, *self.effect.shape)
+
+    def is_at_bound(self, parameter: Parameter) -> bool:
+        """Whether a parameter is the least or the largest value that makes sense."""
+        return self.values[parameter.name].value in (parameter.lower, parameter.upper)
 
     def unit(self, parameter: Parameter, target: str) -> str:
         """Return the unit symbol of a parameter when this term estimates `target`."""

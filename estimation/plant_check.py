@@ -128,7 +128,7 @@ def _described(model: Model, values: bool = False) -> CheckedEquation:
             term.unit(parameter, model.target),
             parameter.description,
             term.values[parameter.name].value if values else None,
-            values and term.values[parameter.name].value in (parameter.lower, parameter.upper),
+            values and term.is_at_bound(parameter),
         )
         for term in model.terms
         for parameter in term.parameters

@@ -201,13 +201,18 @@ class Equation:
 
     def is_quieter(self, runs: Sequence[RunSignals]) -> bool:
         """Whether the right-hand side has less of its sensors' noise than the target has."""
+        own, other = self.noises(runs)
+        return other < own
+
+    def noises(self, runs: Sequence[RunSignals]) -> tuple[float, float]:
+        """Return the variance of sensors' noise in the target and in the right-hand side."""
         linear = [t for t in self.terms if isinstance(t.effect, Proportional)]
         own = other = 0.0
         for run in runs:
             parts = [t.columns(run.noise, ()) @ np.array(t.weights) for t in linear]
             own += float(np.var(run.noise[self.target]))
             other += float(np.var(np.sum(parts, axis=0)))
-        return other < own
+        return own / len(runs), other / len(runs)
 
     def estimate(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the right-hand side without offsets, shape (n,)."""

@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,7 +35,7 @@ from estimation.causes.unsteady import unsteady
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.split import Sealed, claim
-from estimation.model import Model
+from estimation.model import AT_BOUND, Model
 from estimation.noise import MOST_NOISE, noisy_sentence
 from estimation.recording import Recording
 
@@ -124,7 +124,13 @@ def answer(
         moved={m.balance: _moved(layout.equations[m.balance].model, m) for m in written},
         sealed=sealed,
         undecided=dict(layout.undecided),
-        notes=(*apart, *_limits(timed, layout, sealed), *notes),
+        notes=(
+            *apart,
+            *([] if findings else _left(layout, refits)),
+            *_at_bounds(written),
+            *_limits(timed, layout, sealed),
+            *notes,
+        ),
         seconds=time.perf_counter() - began,
     )
     kept = tuple(one for one, _ in judged)
@@ -282,6 +288,32 @@ def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
             key = f"{old.effect.id}.{p.name}"
             out[key] = {"before": old.values[p.name].value, "after": new.values[p.name].value}
     return out
+
+
+def _left(layout: Layout, refits: Refits) -> list[str]:
+    """Return how large the errors are next to the noise of the readings, one sentence each."""
+    found = []
+    for name, error in refits.errors().items():
+        noise = math.sqrt(sum(layout.equations[name].noises(layout.runs)))
+        if noise > 0.0:
+            found.append(
+                f"{name}: the error on the test runs is {error.after / noise:.2g} times the noise"
+                " that its readings show. What is above the noise has no explanation here."
+            )
+    return found
+
+
+def _at_bounds(models: Sequence[Model]) -> Iterator[str]:
+    """Yield the parameters of each equation that are at a bound, a sentence each."""
+    for model in models:
+        bound = [
+            f"{term.effect.id} {parameter.name}"
+            for term in model.terms
+            for parameter in term.parameters
+            if term.is_at_bound(parameter)
+        ]
+        if bound:
+            yield f"{model.balance}: at a bound: {', '.join(bound)}. {AT_BOUND}"
 
 
 def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> list[str]:

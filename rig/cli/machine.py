@@ -101,6 +101,8 @@ def check_lines(plant: "Plant", found: "CheckedPlant") -> list[str]:
 
 
 def _parameter_lines(equation: "CheckedEquation") -> list[str]:
+    from estimation.model import AT_BOUND
+
     lines = []
     for one in equation.parameters:
         value = "" if one.value is None else f" = {one.value:.5g}"
@@ -109,10 +111,7 @@ def _parameter_lines(equation: "CheckedEquation") -> list[str]:
         text += ", at its bound" if one.at_bound else ""
         lines.append(f"  {one.effect}, {one.name}{text}: {one.description}")
     if any(one.at_bound for one in equation.parameters):
-        lines.append(
-            "  A parameter at its bound is not identified: noise of its channel, an effect that the"
-            " equation lacks, or too little motion."
-        )
+        lines.append(f"  {AT_BOUND}")
     if equation.relative_error is not None:
         share = 100 * equation.relative_error
         lines.append(f"  Residual: {share:.3f} % of the root mean square of {equation.target}.")

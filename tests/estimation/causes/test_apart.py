@@ -1,4 +1,6 @@
-"""Runs that are not as the others predict: remarked on unless what was found explains them."""
+"""Notes of a diagnosis: runs that are not as the others predict, and what nothing explains."""
+
+import re
 
 import numpy as np
 import pytest
@@ -43,3 +45,17 @@ def test_a_term_that_differs_is_stated_of_the_fewer_runs() -> None:
     (finding,) = diagnose(runs, [axis()], split(runs)).findings
     assert (finding.family, finding.runs_affected) == ("friction.viscous", ("01", "05", "08"))
     assert finding.parameters["change"].value == pytest.approx(-0.02, rel=0.1)
+
+
+def test_what_nothing_explains_is_stated_with_the_terms_at_their_bounds() -> None:
+    random, runs = np.random.default_rng(0), []
+    for run in turning(lambda _, speed, acceleration: -0.05 * speed - 0.04 * acceleration):
+        slow = np.cumsum(random.normal(0, 2e-3, len(run.time_s)))
+        torque = run["crank_torque_n_m"] + slow - slow.mean()
+        runs.append(run.with_columns(crank_torque_n_m=torque))
+    found = diagnose(runs, [axis()], split(runs))
+    assert found.findings == ()
+    ratio = re.search(r"the error on the test runs is (\S+) times the noise", found.notes[0])
+    assert ratio is not None
+    assert float(ratio[1]) > 5.0
+    assert "at a bound: inertia.missing inertia" in found.notes[1]
