@@ -118,6 +118,7 @@ class Diagnosis:
         seconds: How long it took.
         next_experiment: The experiment that separates the alternatives best, plain JSON types, or
             None.
+        quick: Whether no such experiment was searched for.
     """
 
     findings: tuple[Finding, ...]
@@ -131,6 +132,7 @@ class Diagnosis:
     exploratory: bool = False
     seconds: float = 0.0
     next_experiment: Mapping[str, Any] | None = None
+    quick: bool = False
 
     @property
     def verdict(self) -> str:

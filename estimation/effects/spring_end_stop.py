@@ -22,7 +22,9 @@ class EndStop(Pointwise):
     id = "spring.end_stop"
     balances: ClassVar = {"cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"stop": "jaw_angle_rad"}
-    amplitudes = (Parameter("stiffness", "target / stop", "torque per radian beyond", lower=0.0),)
+    amplitudes = (
+        Parameter("stiffness", "target / stop", "torque or force per unit beyond", lower=0.0),
+    )
     shape = (Parameter("onset", "stop", "angle of first contact", -0.7, 2.5, True, 41),)
     told_apart_by = "a slow free sweep to the ends of the travel, in both directions"
 

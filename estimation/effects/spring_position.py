@@ -19,7 +19,9 @@ class PositionSpring(Proportional):
     id = "spring.position"
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"position": "spindle_angle_rad"}
-    amplitudes = (Parameter("stiffness", "target / position", "torque per radian"),)
+    amplitudes = (
+        Parameter("stiffness", "target / position", "torque or force per unit of position"),
+    )
     told_apart_by = "a slow free sweep without load, in both directions"
 
 

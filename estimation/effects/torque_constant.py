@@ -1,4 +1,4 @@
-"""Torque constant: torque proportional to a motor current or to its command."""
+"""Torque constant: torque or force proportional to a drive's current or command."""
 
 from typing import ClassVar
 
@@ -11,12 +11,12 @@ class TorqueConstant(Proportional):
     Equation: torque = K source. The source is the measured current, the commanded current, or
     another signal that is assumed to be proportional to torque; K in N m per unit of the source.
 
-    Check: measure the stall torque at several currents of both signs.
+    Check: measure torque or force at standstill at several currents of both signs.
 
     Source: O'Neill et al. 2018, section II.A (torque analogues A to C).
     """
 
     id = "motor.torque_constant"
     roles: ClassVar = {"source": "motor_current_a"}
-    amplitudes = (Parameter("gain", "target / source", "torque per unit of the source"),)
+    amplitudes = (Parameter("gain", "target / source", "torque or force per unit of the source"),)
     told_apart_by = "stall at several currents of both signs"

@@ -87,6 +87,7 @@ def run_diagnosis(
         notes=tuple(notes),
         noise_floor=noise_floors(found.refits, recordings),
         next_experiment=proposed,
+        quick=quick,
     )
     return replace(found, diagnosis=diagnosis), look_at(whole, sealed)
 

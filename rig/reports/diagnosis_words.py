@@ -9,7 +9,8 @@ from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.effects import catalogue
 from estimation.plant_models import WORDS
 
-NO_NEXT = "None is proposed: no named hypotheses compete, or none was searched for (--quick)."
+NO_NEXT = "None is proposed: no named hypotheses compete."
+QUICK = "None was searched for: --quick does not search for one. Diagnose without it."
 
 
 def sentences(diagnosis: Diagnosis) -> list[str]:
@@ -190,7 +191,8 @@ def next_sentence(diagnosis: Diagnosis) -> str:
     """Return the next experiment and its reason."""
     proposed = diagnosis.next_experiment
     if proposed is None:
-        return NO_NEXT
+        competing = any(finding.alternatives for finding in diagnosis.findings)
+        return QUICK if diagnosis.quick and competing else NO_NEXT
     between = proposed["between"]
     names = " from ".join(between) if len(between) == 2 else f"{', '.join(between)} from each other"
     if proposed["protocol"] is None:

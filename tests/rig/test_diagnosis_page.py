@@ -13,6 +13,7 @@ from estimation.diagnosis.result import VERDICTS
 from rig.diagnosis.traces import Traces
 from rig.output.provenance import Provenance
 from rig.reports.diagnosis import page
+from rig.reports.diagnosis_words import next_sentence
 from tests.rig.browser import Opened, chromium
 from tests.rig.diagnosed import example
 from tests.rig.test_reports import Page
@@ -47,6 +48,15 @@ def test_the_answer_and_the_check_come_before_evidence_and_method(text):
     order = ["unmodelled effect", "What to check", "feel the cogging", "Evidence", "Method and"]
     places = [body.index(words) for words in order]
     assert places == sorted(places)
+
+
+def test_a_quick_diagnosis_of_several_names_states_that_none_was_searched_for(diagnosed):
+    found, _ = diagnosed
+    several = replace(found.findings[0], verdict="one_of", alternatives=("friction.load",))
+    quick = replace(found, findings=(several,), next_experiment=None, quick=True)
+    assert "--quick does not search" in next_sentence(quick)
+    sure = replace(quick, findings=(replace(several, alternatives=()),))
+    assert "no named hypotheses compete" in next_sentence(sure)
 
 
 def test_a_page_is_well_formed_escaped_and_refers_to_nothing_outside(text):
