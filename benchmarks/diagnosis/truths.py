@@ -133,6 +133,10 @@ NOT_HIDDEN = {
     "transmission.ratio": "declared",
     "transmission.damping": "declared",
     **dict.fromkeys(("arm.links", "arm.links.change", "arm.friction"), "an arm's"),
+    **dict.fromkeys(
+        ("motor.dead_zone", "motor.gain_by_position", "motor.gain_by_side"),
+        "the simulated drive has one gain, at any current and place",
+    ),
     "sensor.gain": "needs a sensor that one equation alone reads, and acts in some of the runs",
     "inertia.position": "needs a linkage, and the rig's shafts are round",
     "coupling.torque": "needs another axis with a torque of its own",
