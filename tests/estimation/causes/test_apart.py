@@ -32,7 +32,7 @@ def test_slow_runs_are_not_remarked_on_where_a_finding_explains_them() -> None:
 
 
 def test_a_run_with_a_swapped_sign_is_the_first_note() -> None:
-    runs = turning(lambda angle, speed, acceleration: 0.0 * speed, runs=6)
+    runs = turning(lambda angle, speed, acceleration: 0.0 * speed)[:6]
     runs[4] = runs[4].with_columns(crank_torque_n_m=-runs[4]["crank_torque_n_m"])
     found = diagnose(runs, [axis()], split(runs))
     assert found.notes[0].startswith(f"04: crank_torque_n_m is -1 {REMARK}")
