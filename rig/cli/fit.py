@@ -124,7 +124,7 @@ def fit(
 ) -> None:
     """Fit a declared model on all runs and report its error on runs it was not fitted on.
 
-    `--model grasper` fits the force at each axis of a 3-DOF grasper, in one file.
+    `--machine grasper` fits the force at each axis of a 3-DOF grasper, in one file.
     """
     from estimation import model_file
     from estimation.opposed import FIX, opposed

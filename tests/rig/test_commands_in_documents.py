@@ -6,6 +6,7 @@ Those that need no rig, no data and seconds only are run, on the simulated rig.
 import re
 import shlex
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import click
@@ -13,6 +14,7 @@ import pytest
 import typer
 
 from benchmarks import results
+from estimation.model_file import names
 from rig.cli.main import app
 
 ROOT = Path(__file__).parents[2]
@@ -75,6 +77,9 @@ def test_a_stated_command_exists_with_its_options(typed):
     known |= {"-h", "--help", "--install-completion", "--show-completion"}
     given = {word.split("=")[0] for word in rest if re.match(r"--?[a-z]", word)}
     assert given <= known, f"{typed}: no option {', '.join(given - known)}"
+    for option, value in pairwise(rest):
+        if command.name == "fit" and option in ("-m", "--model") and re.fullmatch("[a-z]+", value):
+            assert value in (*names(), "states", "network"), f"{typed}: no model {value}"
 
 
 RUN = [
