@@ -296,9 +296,11 @@ def _left(layout: Layout, refits: Refits) -> list[str]:
     for name, error in refits.errors().items():
         noise = math.sqrt(sum(layout.equations[name].noises(layout.runs)))
         if noise > 0.0:
+            unexplained = error.after**2 > 2.0 * noise**2  # more than half of its power
+            rest = "Most of it has no explanation here." if unexplained else "Most of it is noise."
             found.append(
                 f"{name}: the error on the test runs is {error.after / noise:.2g} times the noise"
-                " that its readings show. What is above the noise has no explanation here."
+                f" that its readings show. {rest}"
             )
     return found
 
