@@ -126,6 +126,7 @@ def answer(
         undecided=dict(layout.undecided),
         notes=(
             *apart,
+            *filter(None, [claim(sealed)]),
             *([] if findings else _left(layout, refits)),
             *_at_bounds(written),
             *_limits(timed, layout, sealed),
@@ -321,7 +322,7 @@ def _at_bounds(models: Sequence[Model]) -> Iterator[str]:
 def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> list[str]:
     """Return the limits of these runs, one sentence each."""
     training = [r for r in recordings if r.name in sealed.discover]
-    found = [*filter(None, [claim(sealed)]), *audit(training)]
+    found = audit(training)
     if not sealed.may_name:
         found.append(
             f"{len(sealed.discover)} training runs: with fewer than {DEFAULT.least_to_name} no"
