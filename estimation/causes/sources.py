@@ -81,7 +81,13 @@ TURNING = ("motor_angle", "output_angle", "encoder")
 KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
 """Equations of the reference rig that effects name."""
 
-OF_FEW = ("friction.capstan", "inertia.position")
+OF_FEW = (
+    "friction.capstan",
+    "inertia.position",
+    "motor.dead_zone",  # of a command: the rig's motor is read by its measured current
+    "motor.gain_by_side",
+    "motor.gain_by_position",  # a rotating motor has a ripple of its constant instead
+)
 """Families that the reference rig has in the equations that their effects name, and in no other."""
 
 NARROW = 0.02

@@ -20,7 +20,7 @@ class DeadZone(Pointwise):
     """
 
     id = "motor.dead_zone"
-    balances: ClassVar = {"motor": -1, "grasp": -1}
+    balances: ClassVar = {"grasp": -1}
     roles: ClassVar = {"current": "motor_current_a"}
     amplitudes = (
         Parameter("gain", "target / current", "torque constant beyond the edge", lower=0.0),

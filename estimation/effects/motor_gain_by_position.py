@@ -18,7 +18,7 @@ class GainByPosition(Pointwise):
     """
 
     id = "motor.gain_by_position"
-    balances: ClassVar = {"motor": -1, "grasp": -1}
+    balances: ClassVar = {"grasp": -1}
     roles: ClassVar = {"current": "motor_current_a", "position": "spindle_angle_rad"}
     amplitudes = (
         Parameter("slope", "target / current / position", "linear change with position"),

@@ -21,7 +21,7 @@ class GainBySide(Pointwise):
     """
 
     id = "motor.gain_by_side"
-    balances: ClassVar = {"motor": -1, "grasp": -1}
+    balances: ClassVar = {"grasp": -1}
     roles: ClassVar = {"current": "motor_current_a"}
     amplitudes = (
         Parameter("asymmetry", "target / current", "half the gain of closing minus opening"),
