@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,7 @@ from estimation.causes.scoring import DIGITS, probabilities
 from estimation.causes.search import Found, search
 from estimation.causes.unsteady import unsteady
 from estimation.diagnosis.audit import audit
-from estimation.diagnosis.result import Diagnosis, Finding
+from estimation.diagnosis.result import Diagnosis, Error, Finding
 from estimation.diagnosis.split import Sealed, claim
 from estimation.model import AT_BOUND, Model
 from estimation.noise import MOST_NOISE, noisy_sentence
@@ -116,9 +116,10 @@ def answer(
             [(kept.scored.candidate, f.runs_affected) for kept, f in judged]
         )
     ]
+    errors = refits.errors()
     diagnosis = Diagnosis(
         findings=tuple(findings),
-        errors=refits.errors(),
+        errors=errors,
         unit={name: e.model.unit for name, e in layout.equations.items()},
         noise_floor=dict.fromkeys(layout.equations),
         moved={m.balance: _moved(layout.equations[m.balance].model, m) for m in written},
@@ -127,7 +128,7 @@ def answer(
         notes=(
             *apart,
             *filter(None, [claim(sealed)]),
-            *([] if findings else _left(layout, refits)),
+            *([] if findings else _left(layout, errors)),
             *_at_bounds(written),
             *_limits(timed, layout, sealed),
             *notes,
@@ -291,10 +292,10 @@ def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
     return out
 
 
-def _left(layout: Layout, refits: Refits) -> list[str]:
+def _left(layout: Layout, errors: Mapping[str, Error]) -> list[str]:
     """Return how large the errors are next to the noise of the readings, one sentence each."""
     found = []
-    for name, error in refits.errors().items():
+    for name, error in errors.items():
         noise = math.sqrt(sum(layout.equations[name].noises(layout.runs)))
         if noise > 0.0:
             unexplained = error.after**2 > 2.0 * noise**2  # more than half of its power

@@ -22,9 +22,8 @@ from rig.bench.sensor_logger import require_units
 from rig.configuration.config import Config, is_simulated
 from rig.configuration.sections import DeviceSection
 from rig.errors import UsageError
-from rig.log.devices import channel_of
+from rig.log.devices import channel_of, topic_of
 from rig.log.schema import Field, Stream
-from rig.log.streams import DEVICES
 from rig.machines.safety import check_samples
 
 REFIT_S = 0.5
@@ -142,7 +141,7 @@ class Companion:
     def stream(self) -> Stream:
         """Return its stream in a log."""
         return Stream(
-            topic(self.name),
+            topic_of(self.name),
             f"rig_msgs/msg/{''.join(part.title() for part in self.name.split('_'))}",
             (
                 Field("time_s", "float64", "s", "time of the run, by the logger's clock"),
@@ -211,11 +210,6 @@ def refuse_shared_names(companions: Sequence[Companion], channels: Collection[st
                     f"Give [devices.{companion.name}] another name.",
                 )
             taken[name] = f"[devices.{companion.name}]"
-
-
-def topic(name: str) -> str:
-    """Return the topic of a device's stream in a log."""
-    return f"{DEVICES}{name}"
 
 
 def open_companions(config: Config) -> list[Companion]:

@@ -20,7 +20,7 @@ from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.profile import ArmLimits
 from drivers.teensy.protocol import Identity, Result, Trip, TripReport
 from drivers.transport.transport import Transport
-from rig.bench.companions import Beside, Companion, open_companions, refuse_shared_names, topic
+from rig.bench.companions import Beside, Companion, open_companions, refuse_shared_names
 from rig.bench.device_logger import logger_on, raw_stream, with_channels
 from rig.bench.flight import FlightRecorder
 from rig.bench.holding import holding
@@ -32,6 +32,7 @@ from rig.bench.sensor_logger import SensorWay
 from rig.bench.trips import HostWatch, require_same_start, trip_error, tripped
 from rig.configuration.config import Config
 from rig.errors import SafetyTripError, UsageError
+from rig.log.devices import topic_of
 from rig.log.schema import Stream
 from rig.logic.link import LogicLink
 from rig.machines.choose import machine_of
@@ -122,7 +123,7 @@ class Session:
 
     def take_beside(self) -> dict[str, Beside]:
         """Return the samples of each further device since the last call, by its topic in a log."""
-        return {topic(companion.name): companion.take() for companion in self.companions}
+        return {topic_of(companion.name): companion.take() for companion in self.companions}
 
     @property
     def board(self) -> dict[str, str]:

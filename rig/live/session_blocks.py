@@ -10,13 +10,14 @@ import numpy as np
 from drivers.transport import Transport
 from estimation.channels import ESTIMATED, unit_of
 from estimation.recording import Flag, FloatArray
-from rig.bench.companions import Beside, Companion, topic
+from rig.bench.companions import Beside, Companion
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
 from rig.live.estimator import ModelEstimator, within_range
 from rig.live.keys import LEAVE, MARK, RECORD, STOP, TARE, Keys, no_keys
 from rig.live.status import CalibrationStatus
+from rig.log.devices import topic_of
 from rig.machines.reading import Reading
 from rig.protocols.protocol import Plan
 from rig.recording.recorder import LiveRecorder
@@ -138,7 +139,7 @@ class _Held:
         """Return the value of each channel at the samples of a block; none before its first."""
         found = {}
         for companion in self._companions:
-            block = beside[topic(companion.name)]
+            block = beside[topic_of(companion.name)]
             for name, own in companion.recorded.items():
                 values = block.columns[own][(block.flags & Flag.MISSING) == 0]
                 if values.size:

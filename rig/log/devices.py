@@ -22,6 +22,11 @@ def channel_of(device: str, channel: str) -> str:
     return f"{device}_{channel}"
 
 
+def topic_of(device: str) -> str:
+    """Return the topic of a further device's stream."""
+    return f"{DEVICES}{device}"
+
+
 def device_topics(log: LogFile) -> list[str]:
     """Return the topics of further devices that a log has, read or not."""
     return [topic for topic in log.indexed if topic.startswith(DEVICES)]
@@ -83,10 +88,11 @@ def _at(
 
 def _means(time_s: FloatArray, width_s: float, own_s: FloatArray, values: FloatArray) -> FloatArray:
     """Return the means of values over windows around times, shape (n,); the values for width 0."""
+    held = np.interp(time_s, own_s, values)
     if not width_s:
-        return np.interp(time_s, own_s, values)
+        return held
     area = cumulative_trapezoid(values, own_s, initial=0)
     low_s, high_s = np.clip([time_s - width_s / 2, time_s + width_s / 2], own_s[0], own_s[-1])
     covered_s = np.maximum(high_s - low_s, np.finfo(float).tiny)
     means = (np.interp(high_s, own_s, area) - np.interp(low_s, own_s, area)) / covered_s
-    return np.where(high_s > low_s, means, np.interp(time_s, own_s, values))
+    return np.where(high_s > low_s, means, held)

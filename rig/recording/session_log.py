@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from drivers.clock import rising
 from rig import __version__
-from rig.bench.companions import Beside, topic
+from rig.bench.companions import Beside
 from rig.bench.session import Session
 from rig.log.container import Attached
+from rig.log.devices import topic_of
 from rig.log.recalibrate import ATTACHMENT, ZERO_SUFFIX
 from rig.log.run import CONFIG, RunInfo
 from rig.log.streams import COUNTS, FLIGHT, FLIGHT_STREAM, SAMPLE, sample_stream
@@ -70,7 +71,7 @@ class SessionLog(LogWriter):
         self.newest_s = 0.0
         """Time of the newest sample, s, on the run's clock."""
         self._flown = 0
-        self._least_s = {topic(c.name): 0.5 / c.rate_hz for c in session.companions}
+        self._least_s = {topic_of(c.name): 0.5 / c.rate_hz for c in session.companions}
         self._beside_s: dict[str, float] = {}
 
     def write_reading(self, reading: Reading) -> None:

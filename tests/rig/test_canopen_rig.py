@@ -13,13 +13,13 @@ from drivers.errors import CommandRefusedError, DriverError
 from drivers.teensy.driver import TeensyLogger
 from drivers.transport.simulated import SimulatedTransport
 from drivers.transport.simulated_can import SimulatedCanBus
-from rig.bench.companions import topic
 from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.canopen.simulated import open_simulated_bus, open_simulated_canopen
 from rig.configuration.config import Config, load_config
 from rig.errors import SafetyTripError
 from rig.log.check import check_log
+from rig.log.devices import topic_of
 from rig.log.reader import read_log
 from rig.logic.link import LogicLink
 from rig.machines.choose import machine_of
@@ -127,7 +127,7 @@ def test_a_campaign_is_recorded_with_the_further_devices_on_the_loggers_time(tmp
     log = read_log(result.path)
     assert "clock_residual_s_logger" in log.run.details
     for name, rate_hz in (("jaw_force", 200), ("torque_cell", 1300)):
-        rows = log.topics[topic(name)].rows
+        rows = log.topics[topic_of(name)].rows
         assert abs(len(rows) - rate_hz) <= 0.02 * rate_hz + 60
         np.testing.assert_allclose(np.diff(rows["time_s"]), 1 / rate_hz, rtol=1e-3)
         assert 0 <= rows["time_s"][0] < 0.02

@@ -9,12 +9,13 @@ import pytest
 
 from drivers.errors import LinkTimeoutError
 from drivers.ft300.fake import Ft300Fake
-from rig.bench.companions import refuse_shared_names, topic
+from rig.bench.companions import refuse_shared_names
 from rig.bench.session import Session
 from rig.configuration.config import SHIPPED, SIMULATED
 from rig.errors import SafetyTripError, UsageError
 from rig.importers.registry import open_campaign
 from rig.log.check import Verdict, check_log
+from rig.log.devices import topic_of
 from rig.log.reader import read_log
 from rig.log.run import RunInfo
 from rig.recording.campaign import open_campaign_folder, record_campaign
@@ -107,7 +108,7 @@ def test_a_crossed_limit_of_one_trips_the_rig_and_its_samples_are_in_the_log(tmp
             list(campaign)
         assert not is_armed(link.board)
     (log,) = tmp_path.glob("*.mcap*")
-    rows = read_log(log, tolerant=True).topics[topic("ft")].rows
+    rows = read_log(log, tolerant=True).topics[topic_of("ft")].rows
     assert abs(rows["force_z_n"][-1]) > 1.0
 
 
@@ -150,7 +151,7 @@ def test_its_times_increase_while_the_clocks_are_fitted_again(tmp_path, monkeypa
                 monkeypatch.setattr(rig, "clock", SimpleNamespace(line=moved))
                 log.write_reading(reading)
                 log.write_beside(rig.take_beside())
-    rows = read_log(path, tolerant=True).topics[topic("ft")].rows
+    rows = read_log(path, tolerant=True).topics[topic_of("ft")].rows
     time_s, sequence = rows["time_s"], rows["sequence"]
     assert np.diff(time_s).min() > 0.004
     off_s = (time_s - time_s[0]) - (sequence - sequence[0]) / ft.rate_hz
