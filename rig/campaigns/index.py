@@ -13,6 +13,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from rig.configuration.folders import cache_folder
+
 LAYOUT = 3
 """Version of the index; one of another version is built again."""
 
@@ -76,10 +78,8 @@ class IndexedCampaign:
 
 def default_index(root: Path) -> Path:
     """Return the index file of a folder of campaigns, in the person's cache."""
-    base = os.environ.get("XDG_CACHE_HOME")
-    cache = Path(base) if base else Path.home() / ".cache"
     key = hashlib.sha256(str(root.resolve()).encode()).hexdigest()[:16]
-    return cache / "rig" / f"campaigns-{key}.json"
+    return cache_folder() / f"campaigns-{key}.json"
 
 
 def campaigns(

@@ -69,7 +69,7 @@ def campaigns(
     else:
         found = search.search(whole, terms or [])
     recorded = [campaign for campaign in found if campaign.runs]
-    if refit is not None or (diagnose and len(recorded) > 1):
+    if refit is not None or (diagnose and len(recorded) > (0 if json else 1)):
         from rig.cli.campaigns_each import show_diagnoses, show_refit
 
         if refit is not None:

@@ -8,6 +8,7 @@ from typer import Argument, Option
 
 from rig.cli.options import FiguresFolder, SeedOption, TablesFile, WorkersOption, group
 from rig.cli.study_arm import StateFolder, arm_studies, resumable
+from rig.configuration.folders import cache_folder
 from rig.errors import UsageError
 from rig.output.console import JsonFlag, counted, counting, described
 
@@ -68,7 +69,7 @@ def oneill(
     if networks:
         from rig.studies.oneill.networks import Training, network_tables, run_networks
 
-        kept = state or Path.home() / ".cache" / "rig" / "oneill"
+        kept = state or cache_folder() / "oneill"
         limit = float("inf") if minutes is None else minutes
         training = Training(kept, every=every, seed=seed, workers=workers, minutes=limit)
         with counting("closing samples") as on_run:

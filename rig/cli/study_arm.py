@@ -11,6 +11,7 @@ import typer
 from typer import Option
 
 from rig.cli.options import FiguresFolder, TablesFile, WorkersOption
+from rig.configuration.folders import cache_folder
 from rig.output.console import JsonFlag, counted, described, progress
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def resumable(
     """Yield the keeper of a study's finished parts; when interrupted, print how to resume."""
     from rig.studies.seeds import Keeper
 
-    kept = state or Path.home() / ".cache" / "rig" / study
+    kept = state or cache_folder() / study
     try:
         with progress() as bar:
             task = bar.add_task(what, total=total)

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
 
-from rig.diagnosis.ledger import state_folder
+from rig.configuration.folders import state_folder
 from rig.diagnosis.subject import Subject
 from rig.output.console import stages
 

@@ -6,7 +6,6 @@ a copy, another name or another folder does not make them new.
 """
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -17,6 +16,7 @@ from estimation.diagnosis.split import Sealed, samples_hash
 from estimation.file_kinds import LEDGER
 from estimation.files import OutputError, check_output, write_text_atomic
 from estimation.recording import Recording
+from rig.configuration.folders import state_folder
 from rig.errors import DataError
 
 Look = Mapping[str, Any]
@@ -25,13 +25,6 @@ Look = Mapping[str, Any]
 
 class LedgerError(DataError):
     """The ledger cannot be read or written."""
-
-
-def state_folder() -> Path:
-    """Return `$RIG_STATE_DIR`, else `rig` in the user's state folder."""
-    if own := os.environ.get("RIG_STATE_DIR"):
-        return Path(own)
-    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "rig"
 
 
 def default_ledger() -> Path:

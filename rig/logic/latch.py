@@ -6,17 +6,10 @@ next session would arm as if nothing had happened.
 
 import hashlib
 import json
-import os
 from pathlib import Path
 
 from estimation.files import write_text_atomic
-
-
-def state_folder() -> Path:
-    """Return the folder of what this program remembers: RIG_STATE, else the user's own."""
-    named = os.environ.get("RIG_STATE")
-    own = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
-    return Path(named) if named else Path(own) / "rig"
+from rig.configuration.folders import state_folder
 
 
 class TripLatch:

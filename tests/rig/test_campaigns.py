@@ -185,3 +185,11 @@ def test_the_page_of_one_campaign_is_opened(root, said, monkeypatch):
     page.write_text("<!doctype html>")
     said("campaigns tuesday --open --root", root)
     assert opened == [page.resolve().as_uri()]
+
+
+def test_one_campaign_and_several_are_diagnosed_into_the_same_json(rig, root):
+    for name in ("monday", "tuesday"):
+        diagnosed(root / name)
+    several = {one["folder"]: one for one in rig("--diagnose")["campaigns"]}
+    (alone,) = rig("monday", "--diagnose")["campaigns"]
+    assert alone == several[str(root / "monday")]
