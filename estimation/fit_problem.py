@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from estimation.campaign import Campaign
 from estimation.derived import CAMPAIGN_TIME
-from estimation.effects import Parameter, Remembering
+from estimation.effects import Parameter
 from estimation.errors import EstimationError
 from estimation.model import Model, Term, balance_channels, settled
 from estimation.recording import FloatArray, Recording
@@ -38,7 +38,7 @@ class FitRun:
 
     def columns(self, term: Term, shape: Sequence[float]) -> FloatArray:
         """Return an effect's columns at the samples of the fit."""
-        if isinstance(term.effect, Remembering):
+        if term.effect.start():  # it depends on the samples between
             return np.asarray(term.columns(self.whole, shape)[self.places])
         return term.columns(self.thin, shape)
 

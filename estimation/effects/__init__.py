@@ -10,7 +10,6 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 
 from estimation.effects.effect import Effect, Parameter, Pointwise, Proportional, Remembering
-from estimation.effects.unknown_product import FORMS, product
 from estimation.errors import UnknownNameError
 
 __all__ = [
@@ -81,20 +80,17 @@ def families() -> tuple[str, ...]:
 
 
 def effect(name: str) -> Effect:
-    """Return one effect of the catalogue by its id, or a term of a formula: `unknown.sign.bump`.
+    """Return one effect of the catalogue by its id.
 
     Raises:
         UnknownEffectError: No effect has that id. The message names the nearest one.
     """
     known = catalogue()
-    if name not in known and (term := product(name)) is not None:
-        return term
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
         raise UnknownEffectError(
             f"There is no effect {name!r}.",
-            f"The catalogue has: {', '.join(known)}; formulas: unknown.FORM or unknown.FORM.FORM of"
-            f" {', '.join(FORMS)}.",
+            f"The catalogue has: {', '.join(known)}.",
             f"Did you mean {near[0]!r}?" if near else "",
         )
     return known[name]
