@@ -156,9 +156,6 @@ def inner_loop(place: str, variable: str, random: Random, ranges: Ranges) -> Dra
     """Draw wires or teeth that rub on each other while a spring deflects."""
     reach = ranges.span(variable) * over(random, 0.04, 0.25)
     kind, reaches, weights = bank(random, reach)
-    if kind == "relays":
-        middle = 0.5 * (ranges.low[variable] + ranges.high[variable])
-        reaches = reaches + middle
     part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=-weights)
     if kind == "bouc_wen":
         part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=weights)

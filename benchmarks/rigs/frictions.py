@@ -9,7 +9,6 @@ from benchmarks.rigs.drawn import Drawn, Ranges, Recipe
 from benchmarks.rigs.hidden import Hidden, Table
 from benchmarks.rigs.plant import over
 from rig.simulation.forms import (
-    BANK,
     Random,
     bank,
     bend,
@@ -134,10 +133,6 @@ def loop(place: str, random: Random, ranges: Ranges) -> Drawn:
     variable = f"{place}_angle"
     reach = ranges.span(variable) * over(random, 0.02, 0.15)
     kind, reaches, weights = bank(random, reach)
-    if kind == "relays":  # relays about the whole travel, not about zero
-        middle = 0.5 * (ranges.low[variable] + ranges.high[variable])
-        spread = 0.4 * ranges.span(variable) * random.uniform(-1.0, 1.0, BANK)
-        reaches = reaches + np.tile(middle + spread, 2)
     part = Hidden(place, kind, (ranges.table(variable),), reach=reaches, weights=weights)
     family = LOOPS[kind == "bouc_wen"]
     return Drawn(WORDS[place], family, (variable, "history"), part, ranges.level(place), LOOPS)

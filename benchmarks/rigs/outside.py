@@ -7,7 +7,8 @@ import numpy as np
 from benchmarks.rigs.drawn import Drawn, Ranges, Recipe
 from benchmarks.rigs.frictions import LOADS, WORDS, loaded, rubbing
 from benchmarks.rigs.hidden import Hidden, Table
-from rig.simulation.forms import Random, falling, grid, smooth, spots
+from benchmarks.rigs.plant import over
+from rig.simulation.forms import Random, falling, grid, relays, smooth, spots
 
 UNKNOWN = "unknown"
 
@@ -66,6 +67,19 @@ def switching(place: str, random: Random, ranges: Ranges) -> Drawn:
     return Drawn(WORDS[place], UNKNOWN, variables, part, ranges.level(place))
 
 
+def latching(place: str, random: Random, ranges: Ranges) -> Drawn:
+    """Draw catches along the travel, each of which holds on one way and lets go on the other."""
+    variable = f"{place}_angle"
+    span, middle = ranges.span(variable), 0.5 * (ranges.low[variable] + ranges.high[variable])
+    reach, weights = relays(random, span * over(random, 0.02, 0.15))
+    along = middle + 0.4 * span * random.uniform(-1.0, 1.0, len(weights))
+    part = Hidden(
+        place, "relays", (ranges.table(variable),),
+        reach=reach + np.tile(along, 2), weights=weights,
+    )  # fmt: skip
+    return Drawn(WORDS[place], UNKNOWN, (variable, "history"), part, ranges.level(place))
+
+
 def notch(random: Random, ranges: Ranges) -> Drawn:
     """Draw a notch that the jaw falls into."""
     form = np.gradient(spots(random, 1, 0.06, 0.14), grid())
@@ -110,6 +124,7 @@ def _recipes() -> dict[str, Recipe]:
         found[f"unknown {place} jumps"] = rubbing(place, UNKNOWN, ("velocity_sign",), jumping)
         found[f"unknown {place} drag beyond"] = partial(beyond, place)
         found[f"unknown {place} switching"] = partial(switching, place)
+        found[f"unknown {place} latching"] = partial(latching, place)
     return found
 
 

@@ -107,20 +107,28 @@ def power(random: Random, low: float, high: float) -> Form:
 
 
 def bank(random: Random, reach: float) -> tuple[str, FloatArray, FloatArray]:
-    """Draw an operator with memory of some reach: its kind, reaches and weights.
+    """Draw an operator that builds up over a way after each reversal: kind, reaches and weights.
 
-    Stops side by side (Prandtl-Ishlinskii, Maxwell slip), relays side by side (Preisach) or a loop
-    after Bouc and Wen.
+    Stops side by side (Prandtl-Ishlinskii, Maxwell slip) or a loop after Bouc and Wen.
     """
-    kind = str(random.choice(["stops", "relays", "bouc_wen"]))
-    if kind == "bouc_wen":
+    if random.random() < 0.5:
         shape = np.array([reach, random.uniform(1.0, 3.0), random.uniform(0.5, 1.0)])
-        return kind, shape, np.ones(1)
-    count = int(random.integers(3, 12)) if kind == "stops" else BANK
-    weights = random.gamma(random.uniform(0.6, 2.0), size=count)
-    weights /= weights.sum()
-    reaches = reach * np.exp(random.uniform(-1.2, 0.4, count))
-    if kind == "stops":
-        return kind, reaches, weights
+        return "bouc_wen", shape, np.ones(1)
+    reaches, weights = _in_parallel(random, reach, int(random.integers(3, 12)))
+    return "stops", reaches, weights
+
+
+def relays(random: Random, reach: float) -> tuple[FloatArray, FloatArray]:
+    """Draw relays about zero (Preisach): where each switches on, then off, and their weights.
+
+    What they give depends on the place and, within the reach of it, on the way there.
+    """
+    reaches, weights = _in_parallel(random, reach, BANK)
     middle = reach * random.normal(0.0, 0.6, BANK)
-    return kind, np.concatenate([middle + reaches, middle - reaches]), weights
+    return np.concatenate([middle + reaches, middle - reaches]), weights
+
+
+def _in_parallel(random: Random, reach: float, count: int) -> tuple[FloatArray, FloatArray]:
+    """Draw reaches and weights of elements that act in parallel."""
+    weights = random.gamma(random.uniform(0.6, 2.0), size=count)
+    return reach * np.exp(random.uniform(-1.2, 0.4, count)), weights / weights.sum()
