@@ -2,7 +2,8 @@
 
 The test runs are chosen by a seed, stratified over the conditions: runs are sorted by what was held
 constant and one run of every stratum of neighbours becomes a test run, but not the last one of the
-least or greatest load, speed or other condition.
+least or greatest load, speed or other condition. Runs whose conditions nobody stated are sorted by
+how much their channels vary.
 
 Of few recordings, pieces stand for runs. Of two paths that repeat themselves, the periods of one
 train and those of the other test. Other recordings of too small a number are cut into equal parts.
@@ -10,7 +11,7 @@ train and those of the other test. Other recordings of too small a number are cu
 
 import hashlib
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from estimation.causes.numbers import DEFAULT
 from estimation.errors import EstimationError
-from estimation.recording import FloatArray, Recording
+from estimation.recording import FloatArray, Recording, shared_columns
 
 PERIOD, PART = ", period ", ", part "
 
@@ -96,12 +97,15 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
             f"Record {share} runs at least; to name an effect, eight.",
         )
     new = [recording for recording in recordings if recording.name not in seen]
-    ordered = sorted(new if len(new) >= share else recordings, key=_place)
+    levels = _levels(recordings)
+    ordered = sorted(
+        new if len(new) >= share else recordings, key=lambda r: _place(r.name, levels[r.name])
+    )
     random = np.random.default_rng(seed)
     confirm: set[str] = set()
     for start in range(0, len(ordered) - share + 1, share):
         stratum = [ordered[start + int(k)].name for k in random.permutation(share)]
-        inside = (n for n in stratum if _spans_all(recordings, {*confirm, n}))
+        inside = (n for n in stratum if _spans_all(levels, {*confirm, n}))
         confirm.add(next(inside, stratum[0]))
     return _sealed(recordings, [recording.name for recording in recordings], confirm, seed)
 
@@ -230,24 +234,54 @@ def _pieces(path: Recording, places: Iterable[NDArray[np.intp]], mark: str) -> l
     ]
 
 
-def _place(recording: Recording) -> tuple[tuple[str, int, float, str], ...]:
+Levels = Mapping[str, str | float]
+"""What was held constant in a run: condition to value."""
+
+
+def _levels(recordings: Sequence[Recording]) -> dict[str, Levels]:
+    """Return each run's conditions; where these are alike, how much its channels vary."""
+    stated = {r.name: r.conditions for r in recordings}
+    first = recordings[0].conditions
+    if any(conditions != first for conditions in stated.values()):
+        return stated
+    # three speeds in turn, say: neighbours by name would have one speed in every test run
+    return {
+        name: {"variation": float(level)}
+        for name, level in zip(stated, _variations(recordings), strict=True)
+    }
+
+
+def _variations(recordings: Sequence[Recording]) -> FloatArray:
+    """Return the first principal component of the logarithms of the channels' variations."""
+    shared = shared_columns(recordings)
+    spreads = np.array([[np.nanstd(r[name]) for name in shared] for r in recordings])
+    logs = np.log(spreads[:, (spreads > 0.0).all(axis=0)])
+    if not logs.size:
+        return np.zeros(len(recordings))
+    logs -= logs.mean(axis=0)
+    axis = np.linalg.svd(logs, full_matrices=False)[2][0]
+    return np.asarray(logs @ axis * np.sign(axis.sum() or 1.0))
+
+
+def _place(name: str, levels: Levels) -> tuple[tuple[str, int, float, str], ...]:
     """Return where a run sorts among the others: by its conditions, then by its name."""
     keys: list[tuple[str, int, float, str]] = []
-    for name, value in sorted(recording.conditions.items()):
+    for key, value in sorted(levels.items()):
         numeric = isinstance(value, int | float)
-        keys.append((name, int(not numeric), float(value) if numeric else 0.0, str(value)))
-    return (*keys, ("~name", 0, 0.0, recording.name))
+        keys.append((key, int(not numeric), float(value) if numeric else 0.0, str(value)))
+    return (*keys, ("~name", 0, 0.0, name))
 
 
-def _spans_all(recordings: Sequence[Recording], held: Collection[str]) -> bool:
+def _spans_all(levels: Mapping[str, Levels], held: Collection[str]) -> bool:
     """Whether the runs that are not held have the range of every condition that all have."""
-    return _ranges([r for r in recordings if r.name not in held]) == _ranges(recordings)
+    kept = [own for name, own in levels.items() if name not in held]
+    return _ranges(kept) == _ranges(levels.values())
 
 
-def _ranges(recordings: Sequence[Recording]) -> dict[str, tuple[float, float]]:
+def _ranges(levels: Iterable[Levels]) -> dict[str, tuple[float, float]]:
     found: dict[str, list[float]] = {}
-    for recording in recordings:
-        for name, value in recording.conditions.items():
+    for own in levels:
+        for name, value in own.items():
             if isinstance(value, int | float):
                 found.setdefault(name, []).append(float(value))
     return {name: (min(values), max(values)) for name, values in found.items()}

@@ -81,6 +81,25 @@ def test_the_ends_of_every_condition_discover(seed):
         assert [min(values[0]), max(values[0])] == [min(values[1]), max(values[1])]
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_speeds_that_take_turns_are_all_trained_and_both_ends_are_tested(seed):
+    """Without stated conditions each run has the speed that its channels have."""
+    time_s = np.arange(2000) * 1e-2
+    speeds = [(1.0, 2.0, 4.0)[k % 3] for k in range(12)]
+    taken = [
+        Recording(f"run{k:02d}", time_s, {"motor_angle_rad": np.sin(w * time_s + k)})
+        for k, w in enumerate(speeds)
+    ]
+    sealed = split(
+        [replace(r, columns={**r.columns, "motor_velocity_rad_s": w * np.cos(w * time_s)})
+         for r, w in zip(taken, speeds, strict=True)],
+        seed,
+    )  # fmt: skip
+    of_run = dict(zip([r.name for r in taken], speeds, strict=True))
+    assert {of_run[name] for name in sealed.discover} == {1.0, 2.0, 4.0}
+    assert {of_run[name] for name in sealed.confirm} >= {1.0, 4.0}
+
+
 def test_the_data_hash_follows_the_samples():
     one = runs(count=3, seconds=1.0)
     changed = [one[0].with_columns(motor_current_a=one[0]["motor_current_a"] + 1e-12), *one[1:]]
