@@ -8,7 +8,14 @@ import numpy as np
 from estimation.causes.acting import TURNS, moved_terms, on_some_runs, one_run_changed
 from estimation.causes.angles import groups_apart
 from estimation.causes.blocks import Products
-from estimation.causes.candidates import Candidate, Claim, Group, candidates, groups_of
+from estimation.causes.candidates import (
+    Candidate,
+    Claim,
+    Group,
+    candidates,
+    groups_of,
+    laid_out,
+)
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
@@ -16,7 +23,7 @@ from estimation.causes.joint import Joint
 from estimation.causes.nuisances import skews, with_skews
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.scoring import Scored, assessed, best_of_each
-from estimation.causes.sources import RELATIVE, Bend, Source, least_order
+from estimation.causes.sources import LATE, RELATIVE, Bend, Source, least_order
 from estimation.causes.weights import reweighted
 from estimation.effects import Parameter
 
@@ -96,8 +103,12 @@ class Ranking:
 
     def _with(self, causes: Sequence[Scored]) -> Joint:
         joint = self.joint
-        for cause in causes:
-            joint = joint.with_cause(cause.candidate.laid, cause.candidate.precision)
+        for one in causes:
+            candidate, cause = one.candidate, one.candidate.cause
+            if isinstance(cause, Source) and cause.odd:  # it is there, its even part too
+                whole = replace(cause, odd=False)
+                candidate = laid_out(self.joint, Claim(whole, candidate.acts)) or candidate
+            joint = joint.with_cause(candidate.laid, candidate.precision)
         return joint
 
 
@@ -159,7 +170,9 @@ def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]
         some = best_of_each([*some, *climbing])
     spoilt = assessed(joint, groups_of(joint, reweighted(joint, pool, folds)), folds)
     best = best_of_each([*everything, *some, *spoilt])
-    near = [c for s in best[:REFINED] for c in _neighbours(joint.layout, s.candidate)]
+    near = [
+        c for s in best[:REFINED] for c in (*_neighbours(joint.layout, s.candidate), *_as_late(s))
+    ]
     best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
     bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
     more = assessed(joint, groups_of(joint, bent), folds)
@@ -214,6 +227,21 @@ def _bent(joint: Joint, one: Scored) -> Claim | None:
     knots = tuple(float(x) for x in np.linspace(low, high, KNOTS_OF_BEND))
     bend = Bend(knots, joint.numbers.bend_share * amplitude)
     return Claim(replace(cause, bend=bend), candidate.acts, candidate.choices)
+
+
+def _as_late(one: Scored) -> list[Claim]:
+    """Return a late reading at the time at which its size is one: the odd part shows the product.
+
+    A reading is late as a whole.
+    """
+    cause, candidate = one.candidate.cause, one.candidate
+    if isinstance(cause, Function) or cause.effect.id not in LATE:
+        return []
+    share = float(one.amplitudes[0] / candidate.size[0])
+    if share <= 0.0:
+        return []
+    shape = (*cause.shape[:-1], cause.shape[-1] * share)
+    return [Claim(replace(cause, shape=shape), candidate.acts, candidate.choices)]
 
 
 def _neighbours(layout: Layout, candidate: Candidate) -> list[Claim]:

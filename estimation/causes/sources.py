@@ -97,8 +97,9 @@ ANGLE_STEP_RAD = 1e-4
 """Step of a derivative by an angle."""
 
 LATE = ("sensor.delay", "sensor.lag", "motor.electrical")
-LEAST_LATE = 0.3
-"""Share of a reading that a delay or a lag makes late, at least: a small slow share is creep."""
+LEAST_LATE, MOST_LATE = 0.3, 1.5
+"""Share of a reading that a delay or a lag makes late, at least and at most. It is the whole
+reading, but for noise; a small slow share is creep."""
 
 LEAST_PERIODS, MOST_PERIODS = 2.0, 60.0
 """Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
@@ -168,6 +169,11 @@ class Source:
     def least(self) -> float:
         """Size that its amplitude has at least: a reading is late as a whole."""
         return LEAST_LATE if self.effect.id in LATE else 0.0
+
+    @property
+    def most(self) -> float:
+        """Size that its amplitude has at most."""
+        return MOST_LATE if self.effect.id in LATE else math.inf
 
     @property
     def is_bounded(self) -> bool:
