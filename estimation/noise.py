@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from estimation.recording import FloatArray, Recording
 from estimation.signals import Reading, Signals
@@ -18,16 +19,21 @@ MOST_NOISE = 0.3
 def white_noise(recording: Recording, measured: Sequence[str], signals: Signals) -> Recording:
     """Return a recording of white noise, as wide in each measured channel as that channel's own.
 
-    A sensor that is slower than the recording holds each value, and so its noise.
+    A sensor that is slower than the recording holds each value, and so its noise. A position that
+    is the integral of a measured speed has the integral of that speed's noise.
     """
     random = np.random.default_rng(0)
     made = {}
     for name in measured:
-        known = signals.readings.get(name, Reading())
+        speed = signals.integrals.get(name, "")
+        source = speed if speed in recording else name
+        known = signals.readings.get(source, Reading())
         held = 1 if known.rate_hz is None else round(recording.sample_rate_hz / known.rate_hz)
         white = random.standard_normal(len(recording))
         at = np.arange(len(recording)) // max(held, 1)
-        made[name] = noise_width(recording[name], known) * white[at]
+        noise = noise_width(recording[source], known) * white[at]
+        integral = source != name
+        made[name] = cumulative_trapezoid(noise, recording.time_s, initial=0) if integral else noise
     return recording.with_columns(**made)
 
 

@@ -272,20 +272,36 @@ def test_a_machine_without_any_equation_reports_what_is_needed(tmp_path, said):
     assert f"rig machine check {file}" in printed
 
 
-def test_a_machine_with_a_sensor_of_speed_alone_is_fitted_and_diagnosed(tmp_path, said, answered):
-    """Its position is the integral of the speed; friction that differs by direction is found."""
-    rows = np.loadtxt(slide_table(tmp_path), delimiter=",", skiprows=1)
+def speed_read_slide(folder, asymmetry=0.0, noise_mm_s=0.0):
+    """Return the file and the table of a slide whose speed alone is read."""
+    rows = np.loadtxt(slide_table(folder), delimiter=",", skiprows=1)
     speed = np.gradient(rows[:, 1], rows[:, 0])
-    force = 35.0 * rows[:, 2] + 0.06 * np.abs(speed)
+    force = 35.0 * rows[:, 2] + asymmetry * np.abs(speed)
+    speed += np.random.default_rng(4).normal(0.0, noise_mm_s, len(rows))
     rows = np.column_stack([rows[:, 0], speed, force / 35.0])
-    table = tmp_path / "slide.csv"
+    table = folder / "slide.csv"
     np.savetxt(table, rows, delimiter=",", header="t,v,volts", comments="", fmt="%.9g")
-    file = tmp_path / "slide.toml"
+    file = folder / "slide.toml"
     words = {"position_m": "velocity_m_s", "x:mm": "v:mm/s", '"position"': '"speed"'}
     text = SLIDE
     for old, new in words.items():
         text = text.replace(old, new)
     file.write_text(text)
+    return file, table
+
+
+def test_the_noise_of_a_sensor_of_speed_counts_as_noise(tmp_path, answered):
+    """The acceleration is the derivative of the noisy speed; nothing is missing here."""
+    file, table = speed_read_slide(tmp_path, noise_mm_s=2.0)
+    answer = answered("diagnose --quick", table, "--machine", file)
+    (note,) = [n for n in answer["notes"] if "times the noise" in n]
+    assert answer["findings"] == []
+    assert note.endswith("Most of it is noise.")
+
+
+def test_a_machine_with_a_sensor_of_speed_alone_is_fitted_and_diagnosed(tmp_path, said, answered):
+    """Its position is the integral of the speed; friction that differs by direction is found."""
+    file, table = speed_read_slide(tmp_path, asymmetry=0.06)
     printed = said("machine check", file, table).out
     assert "carriage_position_m is the integral of carriage_velocity_m_s" in printed
     assert "Read by no equation" not in printed
