@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,7 @@ from estimation.causes.scoring import DIGITS, probabilities
 from estimation.causes.search import Found, search
 from estimation.causes.unsteady import unsteady
 from estimation.diagnosis.audit import audit
-from estimation.diagnosis.result import Diagnosis, Error, Finding
+from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.split import Sealed, claim
 from estimation.model import AT_BOUND, Model
 from estimation.noise import MOST_NOISE, noisy_sentence
@@ -99,12 +99,14 @@ def answer(
     refits = Refits(layout, timed, sealed, numbers)
     held_out = HeldOut(layout, sealed, numbers, found.late)
     judged, notes = _judged(found, held_out, refits)
-    written = refits.models()
+    written, errors = refits.models(), refits.errors()
+    left = {name: error.after for name, error in errors.items()}
     findings = [
         replace(f, parameters=parameters_of(kept, f, written, refits)) for kept, f in judged
     ]
     if not findings and sealed.may_name and (changing := unsteady(held_out)):
         findings = [unpredicted(changing, refits)]
+        left[changing.equation] = findings[0].rmse_after
         notes.append(
             f"{changing.equation}: the level of {changing.effect} changes within runs, at times"
             " that no recorded signal predicts."
@@ -116,7 +118,6 @@ def answer(
             [(kept.scored.candidate, f.runs_affected) for kept, f in judged]
         )
     ]
-    errors = refits.errors()
     diagnosis = Diagnosis(
         findings=tuple(findings),
         errors=errors,
@@ -128,7 +129,7 @@ def answer(
         notes=(
             *apart,
             *filter(None, [claim(sealed)]),
-            *([] if findings else _left(layout, errors)),
+            *_left(layout, left, {name for f in findings for name in (f.balance, *f.also_in)}),
             *_at_bounds(written),
             *_limits(timed, layout, sealed),
             *notes,
@@ -292,19 +293,24 @@ def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
     return out
 
 
-def _left(layout: Layout, errors: Mapping[str, Error]) -> list[str]:
-    """Return how large the errors are next to the noise of the readings, one sentence each."""
-    found = []
+def _left(layout: Layout, errors: Mapping[str, float], explained: Set[str]) -> Iterator[str]:
+    """Yield how large the errors left are next to the noise of the readings, a sentence each.
+
+    Of an equation that a finding explains, only where most of its error is not noise.
+    """
     for name, error in errors.items():
         noise = math.sqrt(sum(layout.equations[name].noises(layout.runs)))
-        if noise > 0.0:
-            unexplained = error.after**2 > 2.0 * noise**2  # more than half of its power
-            rest = "Most of it has no explanation here." if unexplained else "Most of it is noise."
-            found.append(
-                f"{name}: the error on the test runs is {error.after / noise:.2g} times the noise"
-                f" that its readings show. {rest}"
-            )
-    return found
+        if noise == 0.0:
+            continue
+        unexplained = error**2 > 2.0 * noise**2  # more than half of its power
+        if name in explained and not unexplained:
+            continue
+        which = "left on" if name in explained else "on"
+        rest = "Most of it has no explanation here." if unexplained else "Most of it is noise."
+        yield (
+            f"{name}: the error {which} the test runs is {error / noise:.2g} times the noise that"
+            f" its readings show. {rest}"
+        )
 
 
 def _at_bounds(models: Sequence[Model]) -> Iterator[str]:

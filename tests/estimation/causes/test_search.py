@@ -536,6 +536,23 @@ def test_friction_that_jumps_at_random_times_is_found_without_a_name() -> None:
     assert any("changes within runs" in note for note in answer.notes)
 
 
+@pytest.mark.parametrize("size", [0.0, 0.004])
+def test_an_error_that_a_finding_leaves_above_the_noise_is_stated(size: float) -> None:
+    """A disturbance of random course has no explanation; without one, nothing is stated."""
+    random, runs = np.random.default_rng(0), []
+    for run in recordings(_rippled):
+        steps = random.normal(0.0, 1.0, len(run) + 49)
+        slow = size * np.convolve(steps, np.ones(50) / 50**0.5, "valid")
+        runs.append(run.with_columns(motor_current_a=run["motor_current_a"] + slow))
+    found = diagnose(runs, [motor()], split(runs))
+    assert [f.family for f in found.findings] == ["ripple.motor"]
+    left = [note for note in found.notes if "times the noise" in note]
+    assert bool(left) == bool(size)
+    for note in left:
+        assert "the error left on the test runs is" in note
+        assert "Most of it has no explanation here." in note
+
+
 @pytest.mark.parametrize("width", [30, 100, 200])
 def test_a_disturbance_of_random_course_is_no_friction_that_changes(width: int) -> None:
     random = np.random.default_rng(8)
