@@ -10,6 +10,7 @@ from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Part
 from estimation.causes.refits import Refits
 from estimation.causes.scoring import Scored, posterior
+from estimation.causes.sources import LATE
 from estimation.causes.unsteady import Unsteady
 from estimation.diagnosis.result import Finding, Value
 from estimation.model import Model, Term
@@ -99,8 +100,10 @@ def named(one: Kept, may_name: bool) -> Finding:
         alternatives=tuple(others),
         probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]},
     )
-    if lead.best.candidate.is_function:
+    cause = lead.best.candidate.cause
+    if isinstance(cause, Function):
         return replace(claimed, verdict="depends_on")
+    claimed = replace(claimed, form=cause.effect.id)
     verdict = "identified" if lead.share >= SURE else "one_of"
     return replace(claimed, verdict=verdict, confidence=round(lead.share, 4))
 
@@ -127,8 +130,23 @@ def parameters_of(
 ) -> Mapping[str, Value]:
     """Return amplitudes and shape of a named cause from the written model of its home equation.
 
-    Of a declared term, its change; of another cause that no file holds, the shape alone.
+    Of a declared term, its change; of another cause that no file holds, the amplitudes of the
+    refit, without intervals. Of what is late, also by how much: a delay or a lag of part of a
+    reading shows in slow motion by the product of that part and its time alone.
     """
+    found = _amplitudes_and_shape(kept, finding, written, refits)
+    cause = kept.scored.candidate.cause
+    if isinstance(cause, Moved | Function) or cause.effect.id not in LATE:
+        return found
+    (gain, late) = (found[p.name] for p in (*cause.effect.amplitudes, *cause.effect.shape))
+    entry = next(e for e in cause.place.enters if e.equation == finding.balance)
+    whole = abs(entry.gain) if kept.part is not None and kept.part.term is not None else 1.0
+    return {"lateness": Value(abs(gain.value) / whole * late.value, late.unit, None), **found}
+
+
+def _amplitudes_and_shape(
+    kept: Kept, finding: Finding, written: Sequence[Model], refits: Refits
+) -> Mapping[str, Value]:
     cause, home = kept.scored.candidate.cause, finding.balance
     if isinstance(cause, Function):
         return {}
@@ -140,18 +158,52 @@ def parameters_of(
         amplitude = float(refits.of[home].amplitudes(kept.part, refits.parts[home])[k])
         acting = [run for run in refits.layout.runs if run.name in finding.runs_affected]
         return {"change": Value(cause.change(amplitude, acting), unit, None)}
-    own = kept.part.term if kept.part is not None else None
-    for term in model.terms:
-        if own is not None and _same(term, own):
-            return {
-                p.name: Value(known.value, term.unit(p, model.target), known.ci95)
-                for p in term.parameters
-                for known in [term.values[p.name]]
-            }
+    if (term := written_term(kept, model)) is not None:
+        return {
+            p.name: Value(known.value, term.unit(p, model.target), known.ci95)
+            for p in term.parameters
+            for known in [term.values[p.name]]
+        }
     units = Term(cause.effect, channels=dict(cause.channels))
-    return {
+    shape = {
         p.name: Value(float(x), units.unit(p, model.target), None)
         for p, x in zip(cause.effect.shape, cause.shape, strict=True)
+    }
+    return {**_refitted(kept, home, refits), **shape}
+
+
+def written_term(kept: Kept, model: Model) -> Term | None:
+    """Return the term of a written model that a cause is; None where the model has none."""
+    own = kept.part.term if kept.part is not None else None
+    return next((t for t in model.terms if own is not None and _same(t, own)), None)
+
+
+def _refitted(kept: Kept, home: str, refits: Refits) -> Mapping[str, Value]:
+    """Return the amplitudes of a cause in the refit of its home equation.
+
+    An error of a sensor that enters by its rates alone is in the unit of the sensor. An amplitude
+    that a declared term of the same family has too is left out: their sum alone is known.
+    """
+    cause, part, model = kept.scored.candidate.cause, kept.part, refits.of[home].model
+    if part is None or isinstance(cause, Function):
+        return {}
+    term = part.term or Term(cause.effect, channels=dict(cause.channels))
+    own: Sequence[int] = range(len(term.effect.amplitudes)) if part.term else cause.parts
+    target = model.target
+    if part.term is None and cause.place.kind in ("angle sensor", "torque sensor"):
+        target = cause.place.name.removeprefix("sensor ")
+    declared = {
+        p
+        for other in model.terms
+        if (other.effect.family, other.channels) == (term.effect.family, term.channels)
+        for p in other.effect.amplitudes
+    }
+    names = [term.effect.amplitudes[k] for k in own]
+    values = refits.of[home].amplitudes(part, refits.parts[home])
+    return {
+        p.name: Value(float(x), term.unit(p, target), None)
+        for p, x in zip(names, values, strict=True)
+        if p not in declared
     }
 
 

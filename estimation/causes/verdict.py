@@ -20,6 +20,7 @@ from estimation.causes.findings import (
     named,
     parameters_of,
     unpredicted,
+    written_term,
 )
 from estimation.causes.folds import unvaried
 from estimation.causes.functions import Function
@@ -103,6 +104,13 @@ def answer(
     left = {name: error.after for name, error in errors.items()}
     findings = [
         replace(f, parameters=parameters_of(kept, f, written, refits)) for kept, f in judged
+    ]
+    notes += [
+        f"{f.balance}: {f.form} is reported and not added to the model file; next to the declared"
+        " terms not all of its amplitudes can be identified."
+        for kept, f in judged
+        if kept.part is not None and kept.part.is_written
+        if not any(written_term(kept, m) for m in written if m.balance == f.balance)
     ]
     if not findings and sealed.may_name and (changing := unsteady(held_out)):
         findings = [unpredicted(changing, refits)]

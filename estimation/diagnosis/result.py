@@ -47,7 +47,8 @@ class Finding:
         balance: Equation it is reported under.
         also_in: Other equations that the same cause enters.
         place: Where in the machine it acts: an equation, `torque at CHANNEL` or `sensor CHANNEL`.
-        family: Id of the effect, or `unknown`.
+        family: Name of the effect, or `unknown`.
+        form: Id of the form of it that was found, such as `spring.position.curved`; empty without.
         verdict: What is claimed of it.
         alternatives: Families that these runs cannot distinguish from it.
         probabilities: Family to its probability, for the family and its alternatives.
@@ -65,6 +66,7 @@ class Finding:
     also_in: tuple[str, ...] = ()
     place: str = ""
     family: str
+    form: str = ""
     verdict: str
     alternatives: tuple[str, ...] = ()
     probabilities: Mapping[str, float] = field(default_factory=dict)

@@ -62,6 +62,7 @@ class CampaignFrictionStep(Pointwise):
     """
 
     id = "change.step.campaign"
+    meaning = "Coulomb friction that changes at one instant of a campaign"
     family = "change.step"
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "campaign_clock": "campaign_time_s"}
@@ -95,6 +96,7 @@ class OffsetStep(Remembering):
     """
 
     id = "change.step.offset"
+    meaning = "an offset that jumps at one instant of a run"
     family = "change.step"
     balances: ClassVar = {**READING, "pitch": 1, "yaw": 1}
     roles: ClassVar = {"clock": "time_s"}

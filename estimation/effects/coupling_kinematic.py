@@ -41,6 +41,7 @@ class BowedCoupling(Pointwise):
     """
 
     id = "coupling.kinematic.bowed"
+    meaning = "motion of this joint by the angle of another joint, not in proportion"
     family = "coupling.kinematic"
     balances: ClassVar = {"stretch": 1}
     roles: ClassVar = {"other_angle": "wrist_pitch_rad"}

@@ -41,6 +41,10 @@ class EccentricHarmonics(EccentricLoad):
     """
 
     id = "eccentric.load.harmonics"
+    meaning = (
+        "a lever arm that varies over a turn, not as a pure sine, so that the load"
+        " causes a periodic torque"
+    )
     amplitudes = harmonics_in("target / load")
 
 
@@ -58,6 +62,7 @@ class EccentricPulley(OutputHarmonics):
     """
 
     id = "eccentric.load.pulley"
+    meaning = "a pulley or gear that is not round: it moves its output and changes its lever arm"
     family = "eccentric.load"
     balances: ClassVar = {"gearbox": 1, "stretch": 1}
     amplitudes = harmonics_in("target")

@@ -85,6 +85,8 @@ class Effect(ABC):
         family: Name that a diagnosis reports; the id by default. Several functional forms of one
             physical effect are in one file and share a family. The id of a form is its family with
             one more word (`hysteresis.presliding.lugre`); a subclass of an effect is a form of it.
+        meaning: What it is in the words of a finding; the first line of its file by default. A form
+            that this line does not describe has its own.
         balances: Equations that a search may add it to, and its side there: 1 adds to the target,
             -1 subtracts from it, so that a bound on an amplitude has the same meaning in all of
             them. `joint` stands for every `joint.N`. Empty for an effect that is only declared,
@@ -98,6 +100,7 @@ class Effect(ABC):
 
     id: ClassVar[str]
     family: ClassVar[str]
+    meaning: ClassVar[str] = ""
     balances: ClassVar[Mapping[str, int]] = {}
     roles: ClassVar[Mapping[str, str]]
     amplitudes: ClassVar[Parameters]

@@ -50,6 +50,7 @@ class WristCapstan(Capstan):
     """
 
     id = "friction.capstan.wrist"
+    meaning = "friction of a cable that is wrapped over a joint by the angle of that joint"
     roles: ClassVar = {
         "speed": "motor_velocity_rad_s",
         "load": "distal_torque_n_m",

@@ -84,6 +84,7 @@ class LoadedBearing(Remembering):
     """
 
     id = "friction.load.bearing"
+    meaning = "friction of a bearing in proportion to its load, part of which relaxes at standstill"
     family = "friction.load"
     balances: ClassVar = {"grasp": -1, "pitch": -1, "yaw": -1}
     roles: ClassVar = {
@@ -128,6 +129,7 @@ class PowerLoadFriction(LoadFriction):
     """
 
     id = "friction.load.power"
+    meaning = "friction that grows with a power of the load"
     balances: ClassVar = {"motor": -1, "cable": 1}
     amplitudes = (
         Parameter("friction", "target / load", "loss per unit of load at 0.1 N m", lower=0.0),
@@ -165,6 +167,7 @@ class StickingLoadFriction(Remembering):
     """
 
     id = "friction.load.sticking"
+    meaning = "friction proportional to the load, also at standstill"
     family = "friction.load"
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"travel": "motor_angle_rad", "drive": "motor_current_a"}

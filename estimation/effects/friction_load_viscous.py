@@ -42,6 +42,7 @@ class SaturatingLoadViscousFriction(LoadViscousFriction):
     """
 
     id = "friction.load_viscous.saturating"
+    meaning = "viscous damping that grows with the load and falls with speed"
     balances: ClassVar = {"motor": -1, "cable": 1}
     shape = (Parameter("knee", "speed", "speed at which half remains", 0.1, 500.0, points=9),)
 

@@ -66,6 +66,7 @@ class StickingPositionFriction(Remembering):
     """
 
     id = "friction.position.sticking"
+    meaning = "friction that varies along the travel, also at standstill"
     family = "friction.position"
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {

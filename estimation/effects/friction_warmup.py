@@ -65,6 +65,7 @@ class CampaignWarmup(Pointwise):
     """
 
     id = "friction.warmup.campaign"
+    meaning = "friction that changes over the hours of a campaign"
     family = "friction.warmup"
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "campaign_clock": "campaign_time_s"}
@@ -94,6 +95,7 @@ class MeasuredWarmup(Pointwise):
     """
 
     id = "friction.warmup.measured"
+    meaning = "friction that changes with a measured temperature"
     family = "friction.warmup"
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "temperature": "motor_temperature_k"}
@@ -121,6 +123,7 @@ class ViscousWarmup(MeasuredWarmup):
     """
 
     id = "friction.warmup.viscous"
+    meaning = "viscous friction that changes with a measured temperature"
     amplitudes = (
         Parameter("damping", "target / speed / temperature", "fall of the damping per kelvin"),
     )

@@ -106,6 +106,7 @@ class Twist(BoucWen):
     """
 
     id = "hysteresis.bouc_wen.twist"
+    meaning = "a deflection with a smooth hysteresis loop over the load"
     balances: ClassVar = {"gearbox": -1, "stretch": 1}
     roles: ClassVar = {"load": "distal_torque_n_m"}
     amplitudes = (Parameter("lost", "target", "half the width of the loop", lower=0.0),)

@@ -72,6 +72,7 @@ class LuGre(Presliding):
     """
 
     id = "hysteresis.presliding.lugre"
+    meaning = "friction that builds up over a short travel, to a level that falls with speed"
     balances: ClassVar = {"motor": -1, "cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"travel": "spindle_angle_rad", "speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("friction", "target", "loss in fast sliding", lower=0.0),)
@@ -112,6 +113,7 @@ class MaxwellSlip(Presliding):
     """
 
     id = "hysteresis.presliding.maxwell"
+    meaning = "friction that builds up over travels of several lengths"
     amplitudes = (
         Parameter("short", "target", "loss of the contact that slides first", lower=0.0),
         Parameter("middle", "target", "loss of the second contact", lower=0.0),

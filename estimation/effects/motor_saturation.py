@@ -42,6 +42,7 @@ class CubicSaturation(Saturation):
     """
 
     id = "motor.saturation.cubic"
+    meaning = "a torque constant that falls with the square of the current"
     amplitudes = (
         Parameter(
             "loss", "target / current / current / current", "loss for one cubic unit", lower=0.0

@@ -70,6 +70,7 @@ class CampaignWarming(Pointwise):
     """
 
     id = "motor.thermal.campaign"
+    meaning = "a torque constant that settles over the minutes or hours of a campaign"
     family = "motor.thermal"
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"campaign_clock": "campaign_time_s", "current": "motor_current_a"}
@@ -96,6 +97,7 @@ class MeasuredThermalLoss(Pointwise):
     """
 
     id = "motor.thermal.measured"
+    meaning = "a torque constant that falls with a measured temperature"
     family = "motor.thermal"
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"current": "motor_current_a", "temperature": "motor_temperature_k"}
@@ -133,6 +135,7 @@ class WarmingLoss(ThermalLoss):
     """
 
     id = "motor.thermal.warming"
+    meaning = "a torque constant that settles over a run"
     amplitudes = (
         Parameter("loss", "target / current", "fall of the torque constant, warm", lower=0.0),
     )

@@ -1,4 +1,4 @@
-"""Motor torque ripple: torque that is periodic in the motor angle (cogging)."""
+"""Ripple: torque or force that repeats along the turn or travel of a drive, such as cogging."""
 
 from typing import ClassVar
 

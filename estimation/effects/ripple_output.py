@@ -1,4 +1,4 @@
-"""Output ripple: torque or angle that is periodic in the output angle, after the gearhead."""
+"""Output ripple: torque or angle that repeats along the turn of a shaft, a gear or a pulley."""
 
 from typing import ClassVar
 
@@ -40,6 +40,10 @@ class OutputHarmonics(OutputRipple):
     """
 
     id = "ripple.output.harmonics"
+    meaning = (
+        "torque or angle that repeats along the turn of a shaft, a gear or a pulley, not"
+        " as a pure sine"
+    )
     amplitudes = harmonics_in("target")
     # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
     shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=31),)

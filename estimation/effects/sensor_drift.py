@@ -45,6 +45,7 @@ class CampaignDrift(Pointwise):
     """
 
     id = "sensor.drift.campaign"
+    meaning = "a zero that settles exponentially over a campaign"
     family = "sensor.drift"
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": 1}
     roles: ClassVar = {"campaign_clock": "campaign_time_s"}
@@ -78,6 +79,7 @@ class SettlingDrift(Remembering):
     """
 
     id = "sensor.drift.exponential"
+    meaning = "a zero that settles exponentially over a run"
     family = "sensor.drift"
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": 1}
     roles: ClassVar = {"clock": "time_s"}
@@ -109,6 +111,7 @@ class LogarithmicDrift(SettlingDrift):
     """
 
     id = "sensor.drift.logarithmic"
+    meaning = "a zero that changes with the logarithm of time"
     amplitudes = (Parameter("drift", "target", "change per factor 2.7 of time"),)
     shape = (Parameter("onset", "clock", "time when the change slows", 0.05, 50.0, points=4),)
     walk = _walk_logarithmic

@@ -47,5 +47,6 @@ class EncoderHarmonics(EncoderNonlinearity):
     """
 
     id = "sensor.encoder_inl.harmonics"
+    meaning = "an angle reading with an error periodic in the angle, not as a pure sine"
     amplitudes = harmonics_in("target")
     shape = (Parameter("order", "1", "periods per turn", 1.0, 16.0, linear=True, points=16),)

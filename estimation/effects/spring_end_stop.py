@@ -20,6 +20,7 @@ class EndStop(Pointwise):
     """
 
     id = "spring.end_stop"
+    meaning = "a contact spring above an upper limit of the travel"
     balances: ClassVar = {"cable": 1, "stretch": -1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"stop": "jaw_angle_rad"}
     amplitudes = (
@@ -46,6 +47,7 @@ class OpenEndStop(EndStop):
     """
 
     id = "spring.end_stop.opening"
+    meaning = "a contact spring below a lower limit of the travel"
     shape = (Parameter("onset", "stop", "angle of first contact", -2.6, 0.6, True, 41),)
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:

@@ -1,4 +1,4 @@
-"""Spring: torque proportional to position."""
+"""Spring: torque or force proportional to position."""
 
 from typing import ClassVar
 
@@ -38,6 +38,7 @@ class CurvedSpring(Pointwise):
     """
 
     id = "spring.position.curved"
+    meaning = "a spring whose stiffness changes along its travel"
     family = "spring.position"
     balances: ClassVar = PositionSpring.balances
     roles: ClassVar = PositionSpring.roles

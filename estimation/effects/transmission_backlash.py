@@ -59,6 +59,7 @@ class Play(Remembering):
     """
 
     id = "transmission.backlash.play"
+    meaning = "free travel of the driving end while friction holds the driven end"
     family = "transmission.backlash"
     balances: ClassVar = {"stretch": -1}
     roles: ClassVar = {"travel": "spindle_angle_rad"}

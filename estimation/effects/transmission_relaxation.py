@@ -84,6 +84,7 @@ class Prony(Relaxation):
     """
 
     id = "transmission.relaxation.prony"
+    meaning = "a deflection that continues with two time constants after the load is constant"
     amplitudes = (
         Parameter("fast", "target / load", "compliance of the fast part", lower=0.0),
         Parameter("slow", "target / load", "compliance of the slow part", lower=0.0),

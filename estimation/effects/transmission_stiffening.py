@@ -45,6 +45,7 @@ class AsymmetricStiffness(Stiffening):
     """
 
     id = "transmission.stiffening.asymmetric"
+    meaning = "a transmission that deflects more in one direction of load than in the other"
     balances: ClassVar = {"gearbox": 1, "stretch": -1}
     amplitudes = (
         Parameter("asymmetry", "target / load", "half the compliance of closing minus opening"),
@@ -67,6 +68,7 @@ class CubicStiffening(Stiffening):
     """
 
     id = "transmission.stiffening.cubic"
+    meaning = "a transmission whose stiffness changes with the square of the load"
     amplitudes = (
         Parameter("bend", "target / load / load / load", "deflection lost at one unit of load"),
     )

@@ -38,6 +38,8 @@ class Finding(_Strict):
     place: str
     """Where in the machine it acts."""
     family: Family
+    form: str
+    """Id of the effect's form that was found, empty of an unknown one."""
     verdict: Name
     alternatives: list[Family]
     probabilities: dict[Family, Annotated[float, Field(ge=0, le=1)]]

@@ -132,7 +132,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
     if finding.alternatives:
         alternatives = "; ".join(f"{words.meaning(a) or a} [{a}]" for a in finding.alternatives)
         facts.append(("Could also be", alternatives))
-    title = words.meaning(finding.family) if named else f"something that depends on {variables}"
+    title = words.meaning_of(finding) if named else f"something that depends on {variables}"
     if not named and not variables:
         title = VERDICTS[finding.verdict]
     title = title or finding.family
@@ -141,7 +141,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": VERDICTS[finding.verdict],
         "facts": facts,
         "check": words.check_of(finding),
-        "command": f"rig effects {finding.family}" if named else "",
+        "command": f"rig effects {finding.form or finding.family}" if named else "",
     }
 
 

@@ -69,7 +69,7 @@ def _named(finding: Finding) -> str:
     sizes = [f"{name} {text}".strip() for name, text in sizes_of(finding).items()]
     if finding.confidence is not None:
         sizes.append(f"confidence {finding.confidence:.0%}")
-    plain = meaning(finding.family)
+    plain = meaning_of(finding)
     size = f", {', '.join(sizes)}" if sizes else ""
     if finding.family in WORDS:
         term = _first_line(finding.family).partition(": ")[0].lower()
@@ -78,14 +78,20 @@ def _named(finding: Finding) -> str:
     return f"unmodelled effect{claim}: {plain or finding.family} [{finding.family}]{size}"
 
 
-def meaning(family: str) -> str:
-    """Return the meaning of a family in plain words; empty for no such family."""
-    return _first_line(family).partition(": ")[2].removesuffix(".")
+def meaning_of(finding: Finding) -> str:
+    """Return the meaning of the form that was found, in plain words; empty without a name."""
+    known = catalogue().get(finding.form)
+    return (known.meaning if known else "") or meaning(finding.family)
 
 
-def _first_line(family: str) -> str:
-    """Return the title and the meaning of a family; empty for no such family."""
-    known = catalogue().get(family)
+def meaning(name: str) -> str:
+    """Return the meaning of a family with all its forms, in plain words; empty for no such one."""
+    return _first_line(name).partition(": ")[2].removesuffix(".")
+
+
+def _first_line(name: str) -> str:
+    """Return the title and the meaning of an effect's file; empty for no such effect."""
+    known = catalogue().get(name)
     lines = known and sys.modules[type(known).__module__].__doc__
     return (lines or "").partition("\n")[0]
 
@@ -93,7 +99,8 @@ def _first_line(family: str) -> str:
 def check_of(finding: Finding) -> str:
     """Return the checks at the rig for a finding, one sentence at least."""
     if finding.verdict in ("identified", "one_of"):
-        checks = [advice(family) for family in (finding.family, *finding.alternatives)]
+        names = (finding.form or finding.family, *finding.alternatives)
+        checks = [advice(name) for name in names]
         if any(checks):
             return " Then: ".join(dict.fromkeys(c[0].upper() + c[1:] for c in checks if c))
     words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
@@ -108,9 +115,9 @@ def check_of(finding: Finding) -> str:
     )
 
 
-def advice(family: str) -> str:
+def advice(name: str) -> str:
     """Return the check at the rig in the description of an effect; empty without."""
-    known = catalogue().get(family)
+    known = catalogue().get(name)
     text = inspect.getdoc(type(known)) or "" if known else ""
     check = next((p for p in text.split("\n\n") if p.startswith("Check: ")), "")
     return " ".join(check.removeprefix("Check: ").split())
@@ -120,9 +127,13 @@ def sizes_of(finding: Finding) -> dict[str, str]:
     """Return parameters with their units, sine and cosine of one wave as its amplitude."""
     left = dict(finding.parameters)
     sizes = {}
-    if "sine" in left and "cosine" in left:
-        sine, cosine = left.pop("sine"), left.pop("cosine")
-        sizes["amplitude"] = _measured(math.hypot(sine.value, cosine.value), sine.unit)
+    if "lateness" in left:  # a part and its time are known by their product alone
+        left = {"lateness": left["lateness"]}
+    for harmonic in ("", "_1", "_2", "_3"):
+        if f"sine{harmonic}" in left and f"cosine{harmonic}" in left:
+            sine, cosine = left.pop(f"sine{harmonic}"), left.pop(f"cosine{harmonic}")
+            size = _measured(math.hypot(sine.value, cosine.value), sine.unit)
+            sizes[f"amplitude{harmonic}"] = size
     for name, known in left.items():
         sizes[name] = _measured(known.value, known.unit)
     if "order" in left:
@@ -183,7 +194,8 @@ def _others(finding: Finding) -> str:
         said = "Another effect of the catalogue does not fit as well."
     else:
         said = "A smooth function of its variables fits better than any effect of the catalogue."
-    checks = {family: advice(family) for family in (finding.family, *finding.alternatives)}
+    checks = {finding.family: advice(finding.form or finding.family)}
+    checks |= {family: advice(family) for family in finding.alternatives}
     return " ".join([said, *(f"To check {name}: {text}" for name, text in checks.items() if text)])
 
 

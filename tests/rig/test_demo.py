@@ -53,7 +53,8 @@ def test_the_demo_finds_what_it_hid_on_runs_not_touched(told):
 def test_the_page_has_all_that_was_found_and_what_is_not_decided(told):
     page, found = Path(told["report"]).read_text(), told["diagnosis"]
     parts = ('"name":"residual-1-1"', "held-out test runs", "What to check", "Next experiment")
-    identified = "identified: torque that is periodic in the motor angle (cogging) [ripple.motor]"
+    words = "torque or force that repeats along the turn or travel of a drive, such as cogging"
+    identified = f"identified: {words} [ripple.motor]"
     wanted = (*parts, identified, "Declared", *found["runs"]["confirm"], *found["notes"])
     assert [part for part in wanted if part not in page] == []
 

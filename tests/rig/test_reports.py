@@ -16,7 +16,7 @@ from rig.log.convert import write_recording
 from rig.output import figures
 from rig.output.provenance import Provenance, commit
 from rig.output.table import TextTable, to_markdown, to_rich
-from rig.reports.diagnosis_words import meaning, sizes_of
+from rig.reports.diagnosis_words import meaning, meaning_of, sizes_of
 from tests.rig.browser import Opened, chromium
 
 pytestmark = pytest.mark.integration
@@ -72,6 +72,21 @@ def test_every_family_has_a_meaning_in_plain_words():
         words = meaning(family)
         assert words, family
         assert not words.endswith("."), family
+
+
+def test_the_form_that_was_found_is_described_and_not_the_head_of_its_family():
+    forms = {
+        "spring.position.curved": "stiffness changes along its travel",
+        "change.step.offset": "an offset that jumps",
+        "spring.end_stop": "above an upper limit",
+        "spring.end_stop.opening": "below a lower limit",
+        "friction.drag": "square of speed",
+    }
+    for form, words in forms.items():
+        family = catalogue()[form].family
+        found = Finding(balance="pan", family=family, form=form, verdict="identified")
+        assert words in meaning_of(found)
+    assert meaning("spring.end_stop") == "a contact spring beyond a limit angle"  # of both forms
 
 
 @pytest.mark.parametrize(

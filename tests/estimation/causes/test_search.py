@@ -77,6 +77,10 @@ def _drag(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> Flo
     return 0.02 * speed**2
 
 
+def _bent(angle: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+    return 0.2 * angle**2
+
+
 @pytest.mark.parametrize(
     ("runs", "family", "parameter", "value"),
     [
@@ -91,6 +95,41 @@ def test_a_cause_of_one_axis_is_named_with_its_size(
     finding = _only(runs, axis())
     assert (finding.family, finding.verdict) == (family, "identified")
     assert finding.parameters[parameter].value == pytest.approx(value, rel=0.05)
+
+
+@pytest.mark.parametrize("late_s", [0.01, 0.02])
+def test_what_is_late_in_part_is_stated_by_how_much_it_is_late(late_s: float) -> None:
+    """In slow motion only the product of the part and its time is known."""
+    runs = [
+        run.with_columns(
+            crank_torque_n_m=np.interp(run.time_s - late_s, run.time_s, run["crank_torque_n_m"])
+        )
+        for run in turning()
+    ]
+    finding = _only(runs, axis())
+    assert finding.family in ("sensor.delay", "sensor.lag")
+    assert finding.parameters["lateness"].value == pytest.approx(late_s, rel=0.2)
+
+
+def test_a_cause_of_some_runs_has_its_size() -> None:
+    """No model file holds it, so its amplitude is that of the refit."""
+    runs = [*turning()[:3], *turning(_bent)[3:8], *turning()[8:]]
+    finding = _only(runs, axis())
+    assert finding.form == "spring.position.curved"
+    assert finding.parameters["bend"].value == pytest.approx(0.2, rel=0.1)
+
+
+def test_an_error_of_an_encoder_has_its_size_where_its_rates_alone_enter() -> None:
+    runs = [
+        run.with_columns(crank_angle_rad=run["crank_angle_rad"] + 2e-3 * np.sin(4 * angle))
+        for run in turning(size=6.0)
+        for angle in [run["crank_angle_rad"]]
+    ]
+    finding = _only(runs, axis())
+    sizes = finding.parameters
+    assert finding.family == "sensor.encoder_inl"
+    assert sizes["sine"].unit == "rad"
+    assert np.hypot(sizes["sine"].value, sizes["cosine"].value) == pytest.approx(2e-3, rel=0.2)
 
 
 def test_an_inertia_over_a_small_angle_is_constant() -> None:
