@@ -1,5 +1,6 @@
 """What can be identified of a machine from its sensors, and from recordings of it."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -12,7 +13,7 @@ from estimation.channels import unit_of
 from estimation.derived import CLOCKS, measured_channels, zero_phase_channels
 from estimation.errors import EstimationError, nearest
 from estimation.fitting import fit
-from estimation.model import Model, balance_channels, settled
+from estimation.model import Evidence, Model, balance_channels, settled
 from estimation.noise import MOST_NOISE, noise_width, noisy_sentence, white_noise
 from estimation.opposed import FIX, opposed, size_of_target
 from estimation.plant import Plant
@@ -27,6 +28,11 @@ ALIKE = 3.0
 
 CUTOFFS = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """The stated cutoff over those that are tried where a channel is mostly noise."""
+
+OFFSETS_IGNORED = (
+    "The fit ignores it (run_offsets = true). State false where a load differs from run to run:"
+    " without its differences gain and friction may be confused."
+)
 
 
 @dataclass(frozen=True)
@@ -159,8 +165,28 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
         found = replace(found, trouble=f"{contradicted} {FIX}")
     if not fitted.run_offsets:
         return replace(found, relative_error=evidence.rmse_with_means / size)
-    means = np.sqrt(max(evidence.rmse_with_means**2 - evidence.rmse**2, 0.0))
-    return replace(found, relative_error=evidence.rmse / size, between_runs=float(means) / size)
+    means = between_runs(evidence)
+    return replace(found, relative_error=evidence.rmse / size, between_runs=means / size)
+
+
+def between_runs(evidence: Evidence) -> float:
+    """Return the error of a fit between runs: the part of it that is in their means."""
+    return math.sqrt(max(evidence.rmse_with_means**2 - evidence.rmse**2, 0.0))
+
+
+def offsets_note(model: Model) -> str:
+    """Return that a fit ignores an error of runs' means that is larger than that within runs.
+
+    Empty where it is smaller, and of a model that has no offset for each run.
+    """
+    evidence = model.evidence
+    if evidence is None or not model.run_offsets or between_runs(evidence) <= evidence.rmse:
+        return ""
+    times = between_runs(evidence) / evidence.rmse
+    return (
+        f"{model.balance}: the error between runs, in their means, is {times:.2g} times that within"
+        f" runs. {OFFSETS_IGNORED}"
+    )
 
 
 def _one_way(model: Model, campaign: Campaign) -> Iterator[str]:

@@ -153,8 +153,8 @@ def _amplitudes_and_shape(
     model = next(m for m in written if m.balance == home)
     if isinstance(cause, Moved) and kept.part is not None:  # in the runs in which it acts
         (k,) = cause.parts
-        term = Term(cause.effect, channels=dict(cause.channels))
-        unit = "1" if cause.of_all else term.unit(cause.effect.amplitudes[k], model.target)
+        moved = Term(cause.effect, channels=dict(cause.channels))
+        unit = "1" if cause.of_all else moved.unit(cause.effect.amplitudes[k], model.target)
         amplitude = float(refits.of[home].amplitudes(kept.part, refits.parts[home])[k])
         acting = [run for run in refits.layout.runs if run.name in finding.runs_affected]
         return {"change": Value(cause.change(amplitude, acting), unit, None)}

@@ -18,6 +18,7 @@ from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.audit import steady
 from estimation.diagnosis.split import cut_and_split, path_of
+from estimation.plant_check import offsets_note
 from estimation.recording import FloatArray, Recording
 from rig.diagnosis.ledger import Ledger, Look, look_at
 from rig.diagnosis.propose import propose
@@ -76,7 +77,9 @@ def run_diagnosis(
         on_stage("choosing the experiment that separates the alternatives")
         proposed = propose(found, recordings, executor)
     asked_of = (f"Check: {line}" for line in questions(whole, asked.derived))
-    notes = [*found.diagnosis.notes, *lost, *asked_of]
+    fitted = (e.model for e in found.layout.equations.values())
+    ignored = filter(None, map(offsets_note, fitted)) if asked.of_machine else ()
+    notes = [*found.diagnosis.notes, *lost, *ignored, *asked_of]
     if seen:
         share = f"{len(seen)} of the {counted(len(sealed.confirm), 'test run')}"
         was = "was" if len(seen) == 1 else "were"

@@ -25,6 +25,8 @@ class Subject:
     models: Sequence[Model]
     derived: Collection[str] = ()
     """Channels of the recordings that were not read but follow from others."""
+    of_machine: bool = False
+    """Whether the models are those of a machine file, which its owner can change."""
 
 
 def subject(
@@ -59,7 +61,8 @@ def subject(
         own = equations_of(machine)
         models = _of(own, balance) if model is None else declared_models(model, balance)
         campaign = open_recordings(path, machine, format_name, skip_bad)
-        return Subject(with_motion(campaign, models), models, read_machine(machine).integrals)
+        derived = read_machine(machine).integrals
+        return Subject(with_motion(campaign, models), models, derived, of_machine=model is None)
     if model is not None:
         models = declared_models(model, balance)
         return Subject(open_campaign(path, format_name, skip_bad), models)

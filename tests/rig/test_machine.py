@@ -132,7 +132,9 @@ reads = "effort"
 
 
 @pytest.mark.parametrize("constant_n", [0.0, 60.0])
-def test_a_load_that_differs_between_runs_and_is_left_out_is_reported(tmp_path, said, constant_n):
+def test_a_load_that_differs_between_runs_and_is_left_out_is_reported(
+    tmp_path, said, answered, constant_n
+):
     table = slide_table(tmp_path)
     rows = np.loadtxt(table, delimiter=",", skiprows=1)
     load = constant_n * (np.floor(rows[:, 0] / 3.0) % 3)
@@ -144,6 +146,9 @@ def test_a_load_that_differs_between_runs_and_is_left_out_is_reported(tmp_path, 
         file.write_text(LOADED.replace("run_offsets = false", f"run_offsets = {stated}"))
         printed = said("machine check", file, table).out
         assert ("The fit ignores it (run_offsets = true)" in printed) == reported
+        if stated == "true":
+            notes = answered("diagnose --quick", table, "--machine", file)["notes"]
+            assert any("State false where a load differs" in note for note in notes) == reported
 
 
 def test_without_a_drive_and_without_a_reading_of_effort_both_are_named(tmp_path, said):
