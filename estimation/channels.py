@@ -23,6 +23,8 @@ UNIT_BY_SUFFIX: dict[str, str] = {
     "m_s2": "m/s^2",
     "rad_s": "rad/s",
     "m_s": "m/s",
+    "m3_s": "m^3/s",
+    "kg_s": "kg/s",
     "n_m_a": "N m/A",
     "n_m": "N m",
     "hz": "Hz",

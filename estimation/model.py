@@ -96,8 +96,14 @@ class Term:
         return (*self.effect.amplitudes, *self.effect.shape)
 
     def is_at_bound(self, parameter: Parameter) -> bool:
-        """Whether a parameter is the least or the largest value that makes sense."""
-        return self.values[parameter.name].value in (parameter.lower, parameter.upper)
+        """Whether a parameter is the least or the largest value that makes sense.
+
+        A whole number, such as a harmonic, is not: it is chosen and not fitted.
+        """
+        return not parameter.is_count and self.values[parameter.name].value in (
+            parameter.lower,
+            parameter.upper,
+        )
 
     def unit(self, parameter: Parameter, target: str) -> str:
         """Return the unit symbol of a parameter when this term estimates `target`."""

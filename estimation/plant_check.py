@@ -1,7 +1,7 @@
 """What can be identified of a machine from its sensors, and from recordings of it."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -103,10 +103,19 @@ class CheckedPlant:
         return bool(self.equations) and not troubled and not self.contradictions
 
 
-def check(plant: Plant, campaign: Campaign | None = None, file: Path | None = None) -> CheckedPlant:
+def check(
+    plant: Plant,
+    campaign: Campaign | None = None,
+    file: Path | None = None,
+    recorded: Sequence[str] = (),
+) -> CheckedPlant:
     """Check which parameters of a machine can be identified, and fitted on recordings of it.
 
-    Its file is named in sentences that state what to change.
+    Args:
+        plant: The machine.
+        campaign: Recordings of it, or None.
+        file: Its file, which sentences on what to change name.
+        recorded: Without recordings, the channels that these will have; none where unknown.
 
     Raises:
         PlantError: An equation of its owner's has an unknown effect, role or channel.
@@ -114,6 +123,13 @@ def check(plant: Plant, campaign: Campaign | None = None, file: Path | None = No
     models = declared(plant)
     if campaign is None:
         found = [_described(model) for model in models]
+        if recorded:
+            found = [
+                replace(
+                    one, trouble=_absent(model, recorded, "is not among the channels of [data]")
+                )
+                for one, model in zip(found, models, strict=True)
+            ]
         return CheckedPlant(tuple(found), tuple(missing(plant)), tuple(unused(plant)))
     recordings = list(campaign.evidence)
     columns = shared_columns(recordings) if recordings else []
@@ -144,14 +160,8 @@ def _described(model: Model, values: bool = False) -> CheckedEquation:
 
 def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> CheckedEquation:
     plain = _described(model)
-    needed = measured_channels([*model.channels, model.target], model.signals)
-    absent = [name for name in needed if name not in (*columns, "time_s")]
-    if absent:
-        what = f"{', '.join(absent)} was not recorded"
-        if move := move_condition(absent, campaign.evidence):
-            return replace(plain, trouble=f"{what} as a channel: {move}")
-        near = nearest(absent[0], list(columns)) if columns else "There are no runs."
-        return replace(plain, trouble=f"{what}. {near}")
+    if absent := _absent(model, columns, "was not recorded", campaign.evidence):
+        return replace(plain, trouble=absent)
     try:
         plain = replace(plain, limits=(*_one_way(model, campaign), *_noisy(model, campaign)))
         fitted = fit(model, campaign, bootstrap=0)
@@ -187,6 +197,18 @@ def offsets_note(model: Model) -> str:
         f"{model.balance}: the error between runs, in their means, is {times:.2g} times that within"
         f" runs. {OFFSETS_IGNORED}"
     )
+
+
+def _absent(model: Model, columns: Sequence[str], what: str, runs: Iterable[Recording] = ()) -> str:
+    """Return which channels of an equation are not there, with the nearest one; empty if none."""
+    needed = measured_channels([*model.channels, model.target], model.signals)
+    absent = [name for name in needed if name not in (*columns, "time_s")]
+    if not absent:
+        return ""
+    if move := move_condition(absent, runs):
+        return f"{', '.join(absent)} {what} as a channel: {move}"
+    near = nearest(absent[0], list(columns)) if columns else "There are no runs."
+    return f"{', '.join(absent)} {what}. {near}"
 
 
 def _one_way(model: Model, campaign: Campaign) -> Iterator[str]:

@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -152,7 +152,8 @@ def _judged(
     found: Found, held_out: HeldOut, refits: Refits
 ) -> tuple[list[tuple[Kept, Finding]], list[str]]:
     """Return the causes that the test runs confirm with their findings, and notes on the others."""
-    confirmed, notes = _confirmed(found, held_out)
+    confirmed, rejected = _confirmed(found, held_out)
+    notes = list[str]()
     opened: dict[int, tuple[Kept, Finding]] = {}
     spread = [len(one.scored.candidate.cause.place.equations) for one in confirmed]
     # each equation is refitted on its own, where a cause of several ones could stand in for another
@@ -160,17 +161,23 @@ def _judged(
         one, candidate = confirmed[k], confirmed[k].scored.candidate
         finding, more = _opened(one, [kept for kept, _ in opened.values()], held_out, refits)
         if finding is None:
-            notes.append(
-                f"{candidate.cause.family} ({candidate.cause.place.name}) was found in the training"
-                " runs and does not lower the error on the test runs."
-            )
+            rejected.append((candidate, "does not lower the error on the test runs"))
             continue
         part = refits.parts[finding.balance][-1]
         opened[k] = replace(one, part=part), finding
         notes += more
         if not part.is_written:
             notes.append(_unwritten(candidate))
-    return [opened[k] for k in sorted(opened)], notes
+    judged = [opened[k] for k in sorted(opened)]
+    names = [kept.scored.candidate.name for kept, _ in judged]
+    return judged, [*notes, *(_rejected(one, why, names) for one, why in rejected)]
+
+
+def _rejected(candidate: Candidate, why: str, found: Collection[object]) -> str:
+    """Return that a cause is not a finding; of another form of a finding, that it is a second."""
+    second = "A second form of " if candidate.name in found else ""
+    family, place = candidate.cause.family, candidate.cause.place.name
+    return f"{second}{family} ({place}) was found in the training runs and {why}."
 
 
 def _opened(
@@ -214,12 +221,12 @@ def _opened(
     return finding, notes
 
 
-def _confirmed(found: Found, held_out: HeldOut) -> tuple[list[Kept], list[str]]:
-    """Return the causes with evidence on the test runs next to the others, and notes on the rest.
+def _confirmed(found: Found, held_out: HeldOut) -> tuple[list[Kept], list[tuple[Candidate, str]]]:
+    """Return the causes with evidence on the test runs next to the others, and the rest with why.
 
     The one with the least evidence goes first: two effects may need one another.
     """
-    left, notes, numbers = list[Kept](), list[str](), held_out.numbers
+    left, rejected, numbers = list[Kept](), list[tuple[Candidate, str]](), held_out.numbers
     for ranked in found.conditional:
         likely = family_probabilities(ranked, numbers)
         left.append(Kept(likely[0].best, likely, ranked))
@@ -230,13 +237,9 @@ def _confirmed(found: Found, held_out: HeldOut) -> tuple[list[Kept], list[str]]:
         ]
         least = min(range(len(left)), key=lambda k: tested[k][1])
         if tested[least][1] >= math.log(numbers.kept_evidence):
-            return [one for one, _ in tested], notes
-        cause = left.pop(least).scored.candidate.cause
-        notes.append(
-            f"{cause.family} ({cause.place.name}) was found in the training runs and not"
-            " confirmed on the test runs."
-        )
-    return [], notes
+            return [one for one, _ in tested], rejected
+        rejected.append((left.pop(least).scored.candidate, "not confirmed on the test runs"))
+    return [], rejected
 
 
 def _tested(one: Kept, others: Sequence[Candidate], held_out: HeldOut) -> tuple[Kept, float]:

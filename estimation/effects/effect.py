@@ -50,6 +50,11 @@ class Parameter:
     linear: bool = False
     points: int = 13
 
+    @property
+    def is_count(self) -> bool:
+        """Whether it is a whole number, such as of periods: its bounds are values like others."""
+        return self.linear and self.points == 1 + self.upper - self.lower
+
     def grid(self) -> FloatArray:
         """Return the initial values of a search, shape (points,), from `lower` to `upper`."""
         if self.linear:

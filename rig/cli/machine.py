@@ -69,12 +69,12 @@ def check(
     """
     from estimation.plant_check import check as check_plant
     from rig.importers.questions import questions
-    from rig.machines.recordings import open_recordings
+    from rig.machines.recordings import open_recordings, recorded_channels
     from rig.machines.shipped import read_machine
 
     plant = read_machine(file)
     campaign = None if data is None else open_recordings(data, file, format_)
-    found = check_plant(plant, campaign, file)
+    found = check_plant(plant, campaign, file, recorded_channels(file))
     asked = [] if campaign is None else questions(list(campaign.evidence), plant.integrals)
     result = {"machine": plant.name, "check": found, "sound": found.is_sound, "questions": asked}
     present(json_, result, *check_lines(plant, found), *(f"Check: {line}" for line in asked))

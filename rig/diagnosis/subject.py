@@ -8,6 +8,7 @@ from estimation import model_file, plant_file
 from estimation.arm.balances import balances_of
 from estimation.campaign import Campaign
 from estimation.derived import measured_channels
+from estimation.errors import nearest
 from estimation.model import Model
 from estimation.plant_models import declared as declared_of
 from rig.calibrate.declared import Declared, declared_by_folder, is_raw
@@ -108,10 +109,10 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
 def _of(models: Sequence[Model], balance: str | None) -> list[Model]:
     chosen = [model for model in models if balance in (None, model.balance)]
     if not chosen:
-        known = ", ".join(dict.fromkeys(model.balance for model in models))
+        known = list(dict.fromkeys(model.balance for model in models))
         raise UsageError(
             f"There is no declared model of the equation {balance!r}.",
-            f"Declared: {known}.",
-            "Name a model file with --model.",
+            f"Declared: {', '.join(known)}.",
+            f"{nearest(balance or '', known)} Or name a model file with --model.",
         )
     return chosen

@@ -135,7 +135,8 @@ def _implausible(unit: str, least: float, greatest: float) -> Iterator[str]:
         limit, instead = PLAUSIBLE[unit]
         size = max(abs(least), abs(greatest))
         if size > limit:
-            yield f"{with_unit(size, unit)} is unusually large; is the column in {instead}?"
+            turns = f", {size / (2 * np.pi):.0f} turns," if unit == "rad" else ""
+            yield f"{with_unit(size, unit)}{turns} is unusually large; is the column in {instead}?"
 
 
 def _clipped(

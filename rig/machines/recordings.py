@@ -70,6 +70,21 @@ def _positioned(load: Callable[[], Recording], integrals: Mapping[str, str]) -> 
     return recording.with_columns(**columns)
 
 
+def recorded_channels(machine: Path) -> list[str]:
+    """Return the channels that recordings have by the `[data]` of a machine file; none without.
+
+    Raises:
+        UsageError: The file cannot be read.
+        NoPlantError: No such machine.
+    """
+    file = place_of(machine)
+    if not has_data(file):
+        return []
+    data = read_mapping(file, ()).data
+    stated = [*data.columns, *data.formulas]
+    return [*stated, *(p for p, s in read_machine(file).integrals.items() if s in stated)]
+
+
 def has_data(file: Path) -> bool:
     """Whether a machine file states how a foreign table is read."""
     return "data" in tomllib.loads(file.read_text("utf-8"))

@@ -27,8 +27,9 @@ VERDICTS = {
 
 
 CONFIDENCE = (
-    "Confidence is the posterior probability of the name among all candidates. It is not calibrated"
-    " yet; answers that were sure and wrong are counted in docs/results/diagnosis-versions.md."
+    "Confidence is the posterior probability of the name among all candidates. How often it was"
+    " right on drawn campaigns is in docs/results/diagnosis-numbers.md; answers that were sure and"
+    " wrong are counted in docs/results/diagnosis-versions.md."
 )
 
 

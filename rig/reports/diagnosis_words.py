@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.effects import catalogue
 from estimation.plant_models import WORDS
+from rig.output.table import counted
 
 NO_NEXT = "None is proposed: no named hypotheses compete."
 QUICK = "None was searched for: --quick does not search for one. Diagnose without it."
@@ -23,21 +24,21 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
             " runs."
         ]
     else:
-        which = "test runs (exploratory)" if diagnosis.exploratory else "held-out test runs"
         runs = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)
         lines = [
-            _sentence(f, diagnosis.unit[f.balance], which) + _where(f, runs)
+            _sentence(f, diagnosis.unit[f.balance], diagnosis.exploratory) + _where(f, runs)
             for f in diagnosis.findings
         ]
     return lines + [f"{name}: not decided. {why}" for name, why in diagnosis.undecided.items()]
 
 
-def _sentence(finding: Finding, unit: str, which: str) -> str:
+def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:
     scale, shown = display(unit, finding.rmse_before)
+    tested = counted(finding.runs_total, "test run" if exploratory else "held-out test run")
     fall = (
-        f"error on {finding.runs_total} {which}"
+        f"error on {tested}{' (exploratory)' * exploratory}"
         f" {scale * finding.rmse_before:.3g} -> {scale * finding.rmse_after:.3g} {shown}"
-        f" (lower in {finding.runs_improved} of {finding.runs_total} runs)"
+        f" (lower in {finding.runs_improved} of {counted(finding.runs_total, 'run')})"
     )
     also = f" It also enters {', '.join(finding.also_in)}." if finding.also_in else ""
     return f"{finding.balance}: {_claim(finding)}; {fall}.{also}"
@@ -56,7 +57,9 @@ def _claim(finding: Finding) -> str:
     if finding.verdict == "identified":
         return _named(finding)
     if finding.verdict == "one_of":
-        others = ", ".join(finding.alternatives) or "another effect"
+        if not finding.alternatives:
+            return f"{_named(finding)}; these runs are not enough to be sure of it"
+        others = ", ".join(finding.alternatives)
         return f"{_named(finding)}; also possible: {others}; these runs cannot distinguish them"
     if finding.verdict == "depends_on":
         others = ", ".join(finding.alternatives)

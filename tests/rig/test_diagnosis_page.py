@@ -13,7 +13,7 @@ from estimation.diagnosis.result import VERDICTS
 from rig.diagnosis.traces import Traces
 from rig.output.provenance import Provenance
 from rig.reports.diagnosis import page
-from rig.reports.diagnosis_words import next_sentence
+from rig.reports.diagnosis_words import next_sentence, sentences
 from tests.rig.browser import Opened, chromium
 from tests.rig.diagnosed import example
 from tests.rig.test_reports import Page
@@ -57,6 +57,15 @@ def test_a_quick_diagnosis_of_several_names_states_that_none_was_searched_for(di
     assert "--quick does not search" in next_sentence(quick)
     sure = replace(quick, findings=(replace(several, alternatives=()),))
     assert "no named hypotheses compete" in next_sentence(sure)
+
+
+def test_a_name_without_alternatives_is_not_said_to_have_one(diagnosed):
+    (finding,) = diagnosed[0].findings
+    alone = replace(finding, alternatives=(), runs_improved=1, runs_total=1)
+    (text,) = sentences(replace(diagnosed[0], findings=(alone,)))
+    assert "also possible" not in text
+    assert "these runs are not enough to be sure of it" in text
+    assert "error on 1 held-out test run " in text
 
 
 def test_a_page_is_well_formed_escaped_and_refers_to_nothing_outside(text):

@@ -266,6 +266,39 @@ def test_a_column_that_was_not_recorded_is_named(slide, said):
     assert "drive_force_n was not recorded. Did you mean 'motor_force_n'?" in printed
 
 
+def test_a_channel_that_the_file_does_not_state_is_refused_without_recordings(slide, said):
+    file, _ = slide
+    own = """
+[[equation]]
+name = "belt"
+target = "drive_force_n"
+[[equation.effects]]
+id = "inertia.missing"
+channels.acceleration = "carriage_acceleration_m_s2"
+[[equation.effects]]
+id = "transmission.ratio"
+channels.load = "belt_frc_n"
+[data]"""
+    cell = 'belt_force_n = "cell"'
+    text = SLIDE.replace("[data.columns]", f"[data.columns]\n{cell}")
+    file.write_text(text.replace("[data]", own, 1))
+    printed = said("machine check", file, code=1).out
+    assert "belt_frc_n is not among the channels of [data]. Did you mean 'belt_force_n'?" in printed
+    file.write_text(file.read_text().replace("belt_frc_n", "belt_force_n"))
+    said("machine check", file)
+
+
+def test_the_nearest_equation_is_proposed(slide, said):
+    file, table = slide
+    printed = said("diagnose", table, "--machine", file, "--equation", "cariage", code=2).err
+    assert "Did you mean 'carriage'?" in printed
+
+
+def test_a_table_without_a_machine_file_is_answered_with_the_option_that_reads_it(slide, said):
+    _, table = slide
+    assert "--machine FILE" in said("diagnose", table, code=5).err
+
+
 def test_a_machine_without_any_equation_reports_what_is_needed(tmp_path, said):
     file = tmp_path / "bare.toml"
     file.write_text(SLIDE.split("[[sensor]]")[0])

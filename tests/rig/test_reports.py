@@ -11,6 +11,7 @@ import pytest
 
 from estimation.diagnosis.result import Finding, Value
 from estimation.effects import catalogue
+from estimation.model import Estimate, Term
 from estimation.recording import Flag, Mark, Recording
 from rig.log.convert import write_recording
 from rig.output import figures
@@ -87,6 +88,12 @@ def test_the_form_that_was_found_is_described_and_not_the_head_of_its_family():
         found = Finding(balance="pan", family=family, form=form, verdict="identified")
         assert words in meaning_of(found)
     assert meaning("spring.end_stop") == "a contact spring beyond a limit angle"  # of both forms
+
+
+def test_a_whole_number_is_at_no_bound():
+    harmonic = catalogue()["inertia.position"].shape[0]
+    term = Term(catalogue()["inertia.position"], values={"harmonic": Estimate(harmonic.upper)})
+    assert not term.is_at_bound(harmonic)
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,8 @@ BASE: dict[str, tuple[float, dict[str, int]]] = {
     "m": (1.0, {"m": 1}),
     "in": (0.0254, {"m": 1}),
     "ft": (0.3048, {"m": 1}),
+    "l": (1e-3, {"m": 3}),
+    "L": (1e-3, {"m": 3}),
     "N": (1.0, {"N": 1}),
     "gf": (1e-3 * G_M_S2, {"N": 1}),
     "lbf": (4.4482216152605, {"N": 1}),
@@ -55,7 +57,7 @@ BASE: dict[str, tuple[float, dict[str, int]]] = {
 
 MICRO = dict.fromkeys("uµμ", 1e-6)
 PREFIXES = {"": 1.0, "n": 1e-9, **MICRO, "m": 1e-3, "c": 1e-2, "h": 1e2, "k": 1e3, "M": 1e6}
-PREFIXED = ("s", "m", "N", "Nm", "g", "gf", "A", "V", "Hz", "Pa", "bar", "rad", "deg")
+PREFIXED = ("s", "m", "l", "L", "N", "Nm", "g", "gf", "A", "V", "Hz", "Pa", "bar", "rad", "deg")
 
 SHIFTED = {"degC": (1.0, 273.15), "°C": (1.0, 273.15), "degF": (5 / 9, 459.67 * 5 / 9)}
 """Temperatures whose zero is not that of kelvin: K = factor * value + shift."""

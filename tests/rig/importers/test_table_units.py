@@ -24,6 +24,9 @@ from rig.importers.table.units import NotAUnitError, conversion, read_unit, stat
         ("MPa", "cap_pressure_pa", 1e6),
         ("N/mm^2", "cap_pressure_pa", 1e6),
         ("psi", "cap_pressure_pa", 6894.757),
+        ("l/min", "pump_flow_m3_s", 1e-3 / 60),
+        ("ml/s", "pump_flow_m3_s", 1e-6),
+        ("g/s", "feed_kg_s", 1e-3),
         ("bar 9.42 cm^2", "rod_force_n", 94.2),
     ],
 )
