@@ -139,8 +139,10 @@ def parameters_of(
     if isinstance(cause, Moved | Function) or cause.effect.id not in LATE:
         return found
     (gain, late) = (found[p.name] for p in (*cause.effect.amplitudes, *cause.effect.shape))
-    entry = next(e for e in cause.place.enters if e.equation == finding.balance)
-    whole = abs(entry.gain) if kept.part is not None and kept.part.term is not None else 1.0
+    whole = 1.0
+    if kept.part is not None and kept.part.term is not None:  # in the unit of the equation
+        own = (e for e in cause.place.enters if e.equation == finding.balance and not e.order)
+        whole = abs(next(e.gain for e in own if e.gain))
     return {"lateness": Value(abs(gain.value) / whole * late.value, late.unit, None), **found}
 
 

@@ -181,13 +181,19 @@ class Refit:
         """Return the model with the causes that a file can hold.
 
         Values are those of `solve` with these causes. Spreads and intervals are of a bootstrap over
-        the training runs, to first order in shapes too (`estimation.fitting.fit`). A term that
-        cannot be identified next to the declared ones is left out.
+        the training runs, to first order in shapes too (`estimation.fitting.fit`). A cause that
+        contains a declared term, as a curved spring contains a linear one, takes its place. A term
+        that cannot be identified next to the declared ones is left out.
         """
         terms = [p.term for p in parts if p.is_written and p.term is not None]
         campaign = Campaign.of([self.recordings[n] for n in self.train_names])
         own = dict(zip(map(id, self._declared), self.solve(parts).declared, strict=True))
         declared = [own.get(id(term), term) for term in self.model.terms]
+        for term in [*terms]:
+            inside = [k for k, one in enumerate(declared) if _contains(term, one)]
+            if inside:
+                declared[inside[0]] = term
+                terms.remove(term)
         while True:
             model = replace(self.model, terms=(*declared, *terms), evidence=None)
             try:
@@ -303,6 +309,14 @@ class Refit:
                     ),
                 )
         return held[name]
+
+
+def _contains(term: Term, declared: Term) -> bool:
+    """Whether the columns of a declared term are among those of another form of its family."""
+    own, other = declared.effect, term.effect
+    same_place = (declared.sign, declared.channels) == (term.sign, term.channels)
+    inside = {*own.amplitudes} < {*other.amplitudes} and not own.shape
+    return own.family == other.family and same_place and inside
 
 
 def _rms(squares: Mapping[str, float], samples: Mapping[str, int]) -> float:

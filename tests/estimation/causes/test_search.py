@@ -29,7 +29,8 @@ from estimation.causes.verdict import answer, diagnose
 from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.result import Finding
 from estimation.diagnosis.split import split
-from estimation.model import Model
+from estimation.effects import effect
+from estimation.model import Model, Term
 from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
 from tests.estimation.causes.synthetic import (
@@ -117,6 +118,22 @@ def test_a_cause_of_some_runs_has_its_size() -> None:
     finding = _only(runs, axis())
     assert finding.form == "spring.position.curved"
     assert finding.parameters["bend"].value == pytest.approx(0.2, rel=0.1)
+
+
+def test_a_curved_spring_takes_the_place_of_the_linear_one_that_is_declared() -> None:
+    """A model file with both could not be fitted: they share a column."""
+    spring = Term(effect("spring.position"), channels={"position": "crank_angle_rad"})
+    model = replace(axis(), terms=(*axis().terms, spring))
+    runs = turning(lambda angle, *_: 0.1 * angle + 0.2 * angle**2)
+    found = answer(runs, [model], split(runs))
+    (finding,) = found.diagnosis.findings
+    assert finding.form == "spring.position.curved"
+    assert finding.parameters["stiffness"].value == pytest.approx(0.1, rel=0.1)
+    assert finding.parameters["bend"].value == pytest.approx(0.2, rel=0.1)
+    (written,) = found.models
+    assert [t.effect.id for t in written.terms if t.effect.family == "spring.position"] == [
+        "spring.position.curved"
+    ]
 
 
 def test_an_error_of_an_encoder_has_its_size_where_its_rates_alone_enter() -> None:
