@@ -13,10 +13,11 @@ class EncoderNonlinearity(Waves):
     of lines).
 
     Equation: error = a sin(order angle) + b cos(order angle), a and b in rad, angle in rad, order
-    in periods per turn. It is a candidate in the equations of angles only: the motor's or the
-    spindle's encoder in the gearbox's, the spindle's or the jaw's in the stretch's. The jaw's
-    encoder is the target there, and enough harmonics of an angle can represent the angle itself, so
-    its error is computed over the prediction of that angle from spindle and load.
+    in periods per turn. In an equation of motion it enters by its rates of change. On the reference
+    rig it is a candidate in the equations of angles only: the motor's or the spindle's encoder in
+    the gearbox's, the spindle's or the jaw's in the stretch's. The jaw's encoder is the target
+    there, and enough harmonics of an angle can represent the angle itself, so its error is computed
+    over the prediction of that angle from spindle and load.
 
     Check: turn slowly without load, and again with the other sensor turned by half a turn; check
     the encoder's mount.

@@ -65,6 +65,9 @@ def _shown(one: "Effect") -> Iterator[str]:
         yield f"parameter {p.name}: {p.description} ({p.unit}; {bounds})"
     channels = ", ".join(f"{role} = {channel}" for role, channel in one.roles.items())
     yield f"reads: {channels or 'nothing'}"
-    yield f"searched in: {', '.join(one.balances) or 'no equation; it is declared only'}"
+    if one.balances:
+        yield f"searched in: {', '.join(one.balances)}; of other machines, where the inputs are read"
+    else:
+        yield "searched in: no equation; it is declared only"
     if one.told_apart_by:
         yield f"distinguished by: {one.told_apart_by}"

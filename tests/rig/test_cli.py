@@ -208,5 +208,6 @@ def test_an_effect_is_described_with_equation_and_parameters(said):
     for name, one in catalogue().items():
         out = said("effects", name).out
         assert "Equation" in out
+        assert ("of other machines" in out) == bool(one.balances)
         for parameter in (*one.amplitudes, *one.shape):
             assert f"parameter {parameter.name}: {parameter.description}" in out
