@@ -136,6 +136,18 @@ def test_a_curved_spring_takes_the_place_of_the_linear_one_that_is_declared() ->
     ]
 
 
+def test_a_rejected_form_of_what_is_found_is_called_a_second_one() -> None:
+    runs = [
+        run.with_columns(crank_torque_n_m=run["crank_torque_n_m"] + 0.05 * run.time_s)
+        for run in turning()
+    ]
+    found = diagnose(runs, [axis()], split(runs))
+    (finding,) = found.findings
+    rejected = [note for note in found.notes if "was found in the training runs" in note]
+    assert finding.family == "sensor.drift"
+    assert all(note.startswith("A second form of ") for note in rejected if finding.family in note)
+
+
 def test_an_error_of_an_encoder_has_its_size_where_its_rates_alone_enter() -> None:
     runs = [
         run.with_columns(crank_angle_rad=run["crank_angle_rad"] + 2e-3 * np.sin(4 * angle))
