@@ -66,7 +66,8 @@ def _shown(one: "Effect") -> Iterator[str]:
     channels = ", ".join(f"{role} = {channel}" for role, channel in one.roles.items())
     yield f"reads: {channels or 'nothing'}"
     if one.balances:
-        yield f"searched in: {', '.join(one.balances)}; of other machines, where the inputs are read"
+        known = ", ".join(one.balances)
+        yield f"searched in: {known}; of other machines, where the inputs are read"
     else:
         yield "searched in: no equation; it is declared only"
     if one.told_apart_by:
