@@ -64,7 +64,7 @@ def measured_channels(names: Iterable[str], signals: Signals | None = None) -> t
     known = signals or reference()
     for name in names:
         if (combination := known.combination(_source(name, known)[0])) is not None:
-            needed |= {share.channel for share in combination.shares}
+            needed |= {*measured_channels((s.channel for s in combination.shares), known)}
             if combination.direction is not None:
                 needed.add(origin_of(combination.direction.speed)[0])
         elif name != "time_s":
@@ -153,11 +153,8 @@ def derive(
         source, times = _source(name, signals)
         if times and tracked and source in tracked:
             return tracked[source][:, times]
-        combination = signals.combination(source)
-        if combination is None:
-            values = filtered[source]
-        else:
-            values = _combined(combination, filtered, differentiated)
+        made = signals.combination(source)
+        values = filtered[source] if made is None else _combined(made, differentiated)
         for _ in range(times):
             values = derivative(values)
         return values
@@ -184,10 +181,9 @@ def derive(
 
 def _combined(
     combination: Combination,
-    filtered: Mapping[str, FloatArray],
     differentiated: Callable[[str], FloatArray],
 ) -> FloatArray:
-    parts = [share.times * filtered[share.channel] / share.over for share in combination.shares]
+    parts = [s.times * differentiated(s.channel) / s.over for s in combination.shares]
     if (turn := combination.direction) is not None:
         parts.append(turn.size * np.tanh(differentiated(turn.speed) / turn.width))
     return np.asarray(sum(parts[1:], start=parts[0]))

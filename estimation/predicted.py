@@ -1,14 +1,16 @@
 """A target predicted by its own fitted equation: what an effect reads instead of the target.
 
-A term that reads its own target would explain the target's noise. The proportional terms of the
-fitted equation and its Coulomb friction are a channel of the machine, so that it is read live too.
+A term that reads its own target would explain the target's noise. A fitted equation of terms that
+are proportional to a channel, and of Coulomb friction, is a channel of the machine, so that it is
+read live too.
 """
 
 from dataclasses import replace
 
 from estimation.channels import ending_of
-from estimation.derived import CLOCKS, origin_of
+from estimation.derived import looks_back, origin_of
 from estimation.effects import Proportional
+from estimation.fit_problem import OFFSET
 from estimation.model import Model
 from estimation.signals import Combination, Direction, Share
 
@@ -24,21 +26,28 @@ def predicted_of(channel: str, target: str) -> str:
 
 
 def with_prediction(model: Model) -> Model:
-    """Return a fitted model whose signals have the prediction of its target, where it has one."""
+    """Return a fitted model whose signals have the prediction of its target.
+
+    There is none where a term is neither proportional to a channel nor Coulomb friction: the other
+    terms alone differ from the target by more than its noise.
+    """
     name = predicted_of(model.target, model.target)
     others = tuple(c for c in model.signals.combinations if c.name != name)
     known = replace(model.signals, combinations=others)
-    shares, turn = [], None
+    shares, turns = [], []
     for term in model.terms:
+        if term.effect.id == OFFSET:
+            continue
         (channel, *_) = term.channels.values() or ("",)
-        plain = origin_of(channel) == (channel, 0) and known.combination(channel) is None
-        if isinstance(term.effect, Proportional) and plain and channel not in CLOCKS:
+        if isinstance(term.effect, Proportional) and not looks_back([channel]):
             shares.append(Share(channel, times=term.weights[0]))
-        if term.effect.id == "friction.coulomb":
-            turn = Direction(channel, term.weights[0], term.values["width"].value)
-    if not shares:
+        elif term.effect.id == "friction.coulomb":
+            turns.append(Direction(channel, term.weights[0], term.values["width"].value))
+        else:
+            return model
+    if not shares or len(turns) > 1:
         return model
-    made = Combination(name, tuple(shares), turn)
+    made = Combination(name, tuple(shares), next(iter(turns), None))
     return replace(model, signals=replace(known, combinations=(*known.combinations, made)))
 
 

@@ -13,7 +13,10 @@ Samples = Literal["all", "motion", "closing"]
 
 @dataclass(frozen=True)
 class Share:
-    """What a measured channel adds to a combination: value x times / over, such as a gear ratio."""
+    """What a channel adds to a combination: value x times / over, such as a gear ratio.
+
+    The channel is a measured one, a derivative of one, or another combination.
+    """
 
     channel: str
     times: float = 1.0
@@ -39,7 +42,7 @@ class Direction:
 
 @dataclass(frozen=True)
 class Combination:
-    """A derived channel that is a weighted sum of measured ones.
+    """A derived channel that is a weighted sum of others.
 
     Attributes:
         name: Channel name, ends in its unit.

@@ -21,7 +21,7 @@ from estimation.derived import settled_places
 from estimation.fit_problem import OFFSET, FitError, FitRun, prepared
 from estimation.fitting import fit
 from estimation.model import Estimate, Model, Term
-from estimation.predicted import without_unused
+from estimation.predicted import with_prediction, without_unused
 from estimation.recording import FloatArray, Recording
 from estimation.within_bounds import solve_within
 
@@ -218,6 +218,25 @@ class Refit:
         except FitError:
             return term
         return replace(term, values={p.name: last.values[p.name] for p in term.effect.shape})
+
+    def predict_next_to(self, parts: Sequence[Part]) -> None:
+        """Predict the target by the declared terms as they are fitted next to some causes.
+
+        Without the causes these terms stand in for them, and what reads their prediction would be
+        of another size.
+        """
+        for _ in range(MOVES):
+            known, runs, solved = self.model, self._runs, self.solve(parts)
+            weights, declared = iter(solved.weights), {}
+            for term, own in zip(self._declared, solved.declared, strict=True):
+                sizes = {p.name: Estimate(float(next(weights))) for p in term.effect.amplitudes}
+                declared[id(term)] = replace(own, values={**own.values, **sizes})
+            terms = tuple(declared.get(id(term), term) for term in known.terms)
+            signals = with_prediction(replace(known, terms=terms)).signals
+            self.model, self._runs, self._solved = replace(known, signals=signals), {}, {}
+            if self.solve(parts).squared >= solved.squared:
+                self.model, self._runs, self._solved = known, runs, {}
+                return
 
     def _fitted(self, parts: tuple[Part, ...]) -> Solved:
         solved, share = self._amplitudes(parts, tuple(self._declared)), 1.0

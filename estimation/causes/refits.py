@@ -86,13 +86,28 @@ class Refits:
     def _part(self, candidate: Candidate, name: str, runs: Collection[str]) -> Part | None:
         cause, equation = candidate.cause, self.layout.equations[name]
         acts = None if candidate.acts is None else frozenset(runs)
-        if isinstance(cause, Source):
-            if (term := _term(cause, equation)) is not None:
-                if set(term.channels.values()) - {channel for _, channel in cause.channels}:
-                    term = self.of[name].refined(self.parts[name], term)
-                return Part(term, acts, is_change=isinstance(cause, Moved))
-            if name != cause.place.home:
-                return None
+        if not isinstance(cause, Source):
+            return self._columns(candidate, name, acts)
+        if (term := _term(cause, equation)) is None:
+            return self._columns(candidate, name, acts) if name == cause.place.home else None
+        part = Part(term, acts, is_change=isinstance(cause, Moved))
+        refit, before = self.of[name], self.parts[name]
+        if set(term.channels.values()) - {channel for _, channel in cause.channels}:
+            part = replace(part, term=refit.refined(before, term))
+            refit.predict_next_to([*before, part])
+            part = replace(part, term=refit.refined(before, term))
+        if sum(e.equation == name for e in cause.place.enters) > 1:
+            # the term is one of several ways in which the cause enters, such as a position's delay
+            # by the speed and the acceleration
+            whole = self._columns(candidate, name, acts)
+            term_left, left = (refit.solve([*before, p]).squared for p in (part, whole))
+            if left < (1.0 - self.numbers.form_floor) * term_left:
+                return whole
+        return part
+
+    def _columns(self, candidate: Candidate, name: str, acts: frozenset[str] | None) -> Part:
+        """Return the columns of a cause in an equation, as a part that no model file holds."""
+        cause = candidate.cause
         gain = sum(abs(e.gain) for e in cause.place.enters if e.equation == name)
         precision = 0.0 if isinstance(cause, Source) else (gain / self.numbers.knot_sd) ** 2
         whole = {run.name: _everywhere(run, candidate, name) for run in self.layout.runs}

@@ -284,12 +284,12 @@ def _unwritten(candidate: Candidate) -> str:
         why = "it acts in some of the runs only"
     elif isinstance(cause, Function):
         why = "its form is unknown"
-    elif any(e.equation == cause.place.home and not e.order for e in cause.place.enters):
+    elif not any(e.order for e in cause.place.enters if e.equation == cause.place.home):
         why = "it depends on the quantity that the model estimates, which the model cannot read"
     else:
         why = (
-            "only the rate of change of what it adds enters the equation, and a term of a model is"
-            " not a rate of change"
+            "the rate of change of what it adds enters the equation, and a term of a model is not a"
+            " rate of change"
         )
     return f"{cause.place.home}: {cause.family} is reported and not added to the model file; {why}."
 

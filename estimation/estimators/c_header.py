@@ -169,16 +169,7 @@ class _Program:
 
     def fill(self, k: int, channel: str) -> str:
         """Return the statement that computes the channel at place k of a row."""
-        combination = self._signals.combination(channel)
-        if combination is not None:
-            parts = [
-                f"{share.times!r} * {self._measured(share.channel)} / {share.over!r}"
-                for share in combination.shares
-            ]
-            if (turn := combination.direction) is not None:
-                parts.append(f"{turn.size!r} * tanh({self._value(turn.speed)} / {turn.width!r})")
-            value = " + ".join(parts)
-        elif channel in self.windows:
+        if channel in self.windows:
             rises = channel.endswith(derived.TRAVEL)
             ending = (derived.TRAVEL, "_angle_rad") if rises else (derived.FALL, "_")
             source = ("" if rises else "-") + self._measured(channel.replace(*ending))
@@ -205,7 +196,15 @@ class _Program:
         return f"name_age(&s->window[{self.windows.index(TURNING_TRAVEL)}], s->tick)"
 
     def _value(self, channel: str) -> str:
-        """Return the expression of a measured channel, a speed or an acceleration."""
+        """Return the expression of a channel: measured, a speed, an acceleration, a combination."""
+        if (combination := self._signals.combination(channel)) is not None:
+            parts = [
+                f"{share.times!r} * {self._value(share.channel)} / {share.over!r}"
+                for share in combination.shares
+            ]
+            if (turn := combination.direction) is not None:
+                parts.append(f"{turn.size!r} * tanh({self._value(turn.speed)} / {turn.width!r})")
+            return f"({' + '.join(parts)})"
         source, times = derived.origin_of(channel)
         if times and source in self.measured:
             return f"{('speed', 'acceleration')[times - 1]}[{self.measured.index(source)}]"
