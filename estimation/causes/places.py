@@ -11,7 +11,7 @@ from typing import Literal
 
 from estimation.causes.angles import angles_of, related, signals_of, unrelated
 from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensitivity
-from estimation.derived import CAMPAIGN_TIME
+from estimation.derived import CAMPAIGN_TIME, origin_of
 
 CLOCKS: Mapping[str, tuple[str, ...]] = {
     "clock": ("time_s",),
@@ -52,7 +52,8 @@ class Place:
         roles: Role of an effect to the channels that can play it there.
         like: Equation of the reference rig with the same signs: `stretch` where an output's travel
             is the target, `gearbox` where the bend itself is.
-        others: Position, speed and acceleration of each axis that no equation relates to it.
+        others: Position, speed and acceleration of each axis that no equation relates to it, and
+            the readings of its equation that are no motion.
     """
 
     name: str
@@ -175,7 +176,25 @@ def _own(
     enters = (Entry(equation.name, float(sign)),)
     apart = [_motion(a) for a in everywhere if a not in angles]
     others = tuple((*m["travel"], *m["speed"], *m["acceleration"]) for m in apart)
+    known = {c for played in (*roles.values(), *others) for c in played}
+    if inputs := _inputs(layout, equation, known | set(everywhere)):
+        others = (*others, inputs)
     return Place(equation.name, "loss", equation.name, enters, roles, others=others)
+
+
+def _inputs(layout: Layout, equation: Equation, known: set[str]) -> tuple[str, ...]:
+    """Return the readings that an equation has as terms and that are neither motion nor a drive.
+
+    Such as the flow in a pipe, or a formula of several channels: no effect has a role for them.
+    """
+    found = [
+        c
+        for term in equation.terms
+        if term.effect.id != "motor.torque_constant"
+        for c in term.channels.values()
+        if c in layout.measured and c not in known and origin_of(c)[0] not in known
+    ]
+    return tuple(dict.fromkeys(found))
 
 
 def _actuator(equation: Equation, angles: Sequence[str]) -> Place | None:
