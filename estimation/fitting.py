@@ -16,9 +16,12 @@ from estimation.fit_problem import FitRun, Problem, prepared, problem_of, solve
 from estimation.model import Estimate, Evidence, Model, estimate, with_values
 from estimation.recording import FloatArray
 from estimation.shape_search import scaled, search_shape, unscaled
-from estimation.within_bounds import solve_within
+from estimation.within_bounds import determined, solve_within
 
 SLOPE_STEP = 1e-3  # On the scale that a shape is searched on
+
+IN_INTERVAL = 0.95
+"""Share of the replicates that an interval covers."""
 
 Shapes = Literal["search", "near", "keep"]
 
@@ -44,7 +47,8 @@ def fit(
 
     Returns:
         The model with values, spreads and evidence. Spreads are to first order in all parameters,
-        shapes too. A parameter at its bound, or fitted on a single run, has no spread.
+        shapes too. A parameter at its bound, or fitted on so few runs that resamplings often lack
+        them, has no spread.
 
     Raises:
         FitError: No valid sample, or columns that are collinear on these runs.
@@ -77,13 +81,14 @@ def _bootstrap(
     """Return values over a bootstrap of runs: (replicate, free columns + shapes + offset).
 
     Each replicate takes one Gauss-Newton step from the fit, with the derivative of the estimate by
-    each shape, on the scale it is searched on, as a further column.
-    Parameters at a bound stay there: NaN. The others stay within theirs.
+    each shape, on the scale it is searched on, as a further column. The step of all runs together,
+    which is not zero where shapes are kept, is taken off.
+    Parameters at a bound stay there: NaN. The others stay within theirs. A parameter is NaN too in
+    a replicate that does not determine it, such as the stiffness of a stop that no run in it meets.
     """
     runs = problem.runs
     if count == 0 or len(runs) < 2:
         return None
-    names = len(free)
     products, means = [], []
     for run in runs:
         columns = problem.free_columns(run, shape)
@@ -95,6 +100,8 @@ def _bootstrap(
         products.append(table.T @ table)
     inside = np.concatenate([(free > problem.lower) & (free < problem.upper), np.ones(len(shape))])
     moving = np.flatnonzero(inside)
+    power = np.diag(np.sum(products, axis=0))[moving]
+    size = np.sqrt(np.where(power > 0.0, power, 1.0))
     weights = np.random.default_rng(seed).multinomial(
         len(runs), np.full(len(runs), 1 / len(runs)), size=count
     )
@@ -105,17 +112,23 @@ def _bootstrap(
     low = np.concatenate([problem.lower, [scaled(p, p.lower) for p in shapes]]) - start
     high = np.concatenate([problem.upper, [scaled(p, p.upper) for p in shapes]]) - start
     low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+
+    def step_of(total: FloatArray) -> FloatArray:
+        step, inner = np.zeros(len(start)), total[np.ix_(moving, moving)]
+        step[moving] = solve_within(inner, total[moving, -1], low[moving], high[moving])
+        return step
+
+    shared = step_of(np.sum(products, axis=0))
     for replicate, weight in enumerate(weights):
         total = np.tensordot(weight, products, axes=1)
-        step = np.zeros(len(start))
-        step[moving] = solve_within(
-            total[np.ix_(moving, moving)], total[moving, -1], low[moving], high[moving]
-        )
-        values[replicate, :-1] = np.where(inside > 0, start + step, np.nan)
+        step = np.clip(step_of(total) - shared, low, high)
+        normal = total[np.ix_(moving, moving)] / np.outer(size, size)
+        known = moving[determined(normal)]
+        values[replicate, known] = (start + step)[known]
         if problem.offset is not None:
             mean = np.average(means, axis=0, weights=weight)
             values[replicate, -1] = (mean[-1] - mean[:-1] @ step) * problem.signs[problem.offset]
-    for k, parameter in enumerate(shapes, start=names):
+    for k, parameter in enumerate(shapes, start=len(free)):
         if not parameter.linear:
             values[:, k] = np.exp(values[:, k])
     return values
@@ -152,9 +165,11 @@ def _with_numbers(
 
 
 def _estimate(value: float, spreads: FloatArray | None, column: int) -> Estimate:
-    if spreads is None or not np.isfinite(spreads[:, column]).all():
+    if spreads is None:
         return Estimate(float(value))
-    replicates = spreads[:, column]
+    replicates = spreads[np.isfinite(spreads[:, column]), column]
+    if len(replicates) < IN_INTERVAL * len(spreads):  # the others may have any value
+        return Estimate(float(value))
     return Estimate(float(value), float(replicates.std(ddof=1)), interval95(value, replicates))
 
 

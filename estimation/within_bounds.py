@@ -1,6 +1,7 @@
 """Least squares within bounds from normal equations, for fits and for each of their replicates."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 from estimation.recording import FloatArray
@@ -17,7 +18,8 @@ def solve_within(
     `normal`, shape (n, n), holds the products of the columns with one another, `right` those with
     the target. Where bounds are active the others are optimal conditional on them.
     """
-    scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
+    power = np.diag(normal)
+    scale = np.sqrt(np.where(power > 0.0, power, 1.0))
     scaled, aim = normal / np.outer(scale, scale), right / scale
     free: FloatArray = linalg.lstsq(scaled, aim, check_finite=False)[0] / scale
     if np.all(free >= low) and np.all(free <= high):
@@ -28,3 +30,14 @@ def solve_within(
     columns, target = roots[:, None] * axes[:, kept].T, (axes[:, kept].T @ aim) / roots
     found = optimize.lsq_linear(columns, target, (low * scale, high * scale), method="bvls")
     return np.clip(found.x / scale, low, high)
+
+
+def determined(normal: FloatArray) -> NDArray[np.bool_]:
+    """Return which x of `solve_within` the data determine, shape (n,).
+
+    The columns have the scale of all data, of which these may be a part. An x is not determined
+    where its column, or the same of several columns together, is zero to rounding.
+    """
+    sizes, axes = linalg.eigh(normal)
+    free = axes[:, sizes <= LEAST_SHARE * sizes[-1]]
+    return np.asarray(np.sum(free**2, axis=1) < np.sqrt(LEAST_SHARE))

@@ -2,8 +2,8 @@
 
 The search reads signals predicted from other sensors. Here every channel is read as measured, as a
 model in use reads it, and the amplitudes are least squares within their bounds on the training
-runs. Shapes of causes stay as they were found; those of declared terms were fitted without the
-causes, and move next to them. Fits and errors count the samples that the model counts: at
+runs. Shapes of causes were found on a grid and those of declared terms without the causes: they
+move next to one another. Fits and errors count the samples that the model counts: at
 standstill friction takes any value.
 """
 
@@ -26,7 +26,7 @@ from estimation.recording import FloatArray, Recording
 from estimation.within_bounds import solve_within
 
 MOVES = 4
-"""Turns of moving the declared shapes."""
+"""Turns of moving the shapes."""
 
 DRAWS = 200
 """Campaigns drawn for the spreads of a written model."""
@@ -64,8 +64,8 @@ class Solved:
     """An equation with causes on the training runs.
 
     Attributes:
-        parts: The causes.
-        declared: The declared terms, at the shapes of the least error next to the causes.
+        parts: The causes, with the shapes of the least error next to one another.
+        declared: The declared terms, at these shapes too.
         weights: Amplitudes, declared ones first.
         level: Mean residual over the runs.
         squared: Sum of squared residuals.
@@ -185,9 +185,10 @@ class Refit:
         contains a declared term, as a curved spring contains a linear one, takes its place. A term
         that cannot be identified next to the declared ones is left out.
         """
-        terms = [p.term for p in parts if p.is_written and p.term is not None]
+        solved = self.solve(parts)
+        terms = [p.term for p in solved.parts if p.is_written and p.term is not None]
         campaign = Campaign.of([self.recordings[n] for n in self.train_names])
-        own = dict(zip(map(id, self._declared), self.solve(parts).declared, strict=True))
+        own = dict(zip(map(id, self._declared), solved.declared, strict=True))
         declared = [own.get(id(term), term) for term in self.model.terms]
         for term in [*terms]:
             inside = [k for k, one in enumerate(declared) if _contains(term, one)]
@@ -203,21 +204,11 @@ class Refit:
                     raise
                 terms.pop()
 
-    def refined(self, parts: Sequence[Part], term: Term) -> Term:
-        """Return a term with its shape moved to the least error, next to what was added before.
-
-        For a term that reads another channel than the search did.
-        """
-        declared = [p.term for p in parts if p.is_written and p.term is not None]
-        zero = {p.name: Estimate(0.0) for p in term.effect.amplitudes}
-        begun = replace(term, values={**term.values, **zero})
-        model = replace(self.model, terms=(*self.model.terms, *declared, begun), evidence=None)
-        campaign = Campaign.of([self.recordings[n] for n in self.train_names])
-        try:
-            last = fit(model, campaign, bootstrap=0, shapes="near").terms[-1]
-        except FitError:
-            return term
-        return replace(term, values={p.name: last.values[p.name] for p in term.effect.shape})
+    def settled(self, parts: Sequence[Part]) -> list[Part]:
+        """Return causes with the shapes that they were fitted with next to one another."""
+        solved = self.solve(parts)
+        self._solved[tuple(map(id, solved.parts))] = solved
+        return list(solved.parts)
 
     def predict_next_to(self, parts: Sequence[Part]) -> None:
         """Predict the target by the declared terms as they are fitted next to some causes.
@@ -240,8 +231,8 @@ class Refit:
 
     def _fitted(self, parts: tuple[Part, ...]) -> Solved:
         solved, share = self._amplitudes(parts, tuple(self._declared)), 1.0
-        for _ in range(MOVES if parts and shapes.any_of(self._declared) else 0):
-            further = self._amplitudes(parts, self._moved(solved, share))
+        for _ in range(MOVES if parts and any(moving for _, moving in _terms(solved)) else 0):
+            further = self._amplitudes(*self._moved(solved, share))
             if further.squared < solved.squared:
                 solved = further
             else:
@@ -266,15 +257,29 @@ class Refit:
         left = np.append(-weights, 1.0)
         return Solved(parts, declared, weights, level, float(left @ gram @ left))
 
-    def _moved(self, solved: Solved, share: float) -> tuple[Term, ...]:
-        """Return the declared terms with their shapes a share of a Gauss-Newton step further."""
+    def _moved(self, solved: Solved, share: float) -> tuple[tuple[Part, ...], tuple[Term, ...]]:
+        """Return causes and declared terms, their shapes a share of a Gauss-Newton step further."""
+        terms = _terms(solved)
+        widths = [len(term.effect.amplitudes) for term, _ in terms]
+        weights = np.split(solved.weights, np.cumsum(widths))
+        acts = [None] * len(solved.declared) + [p.acts for p in solved.parts if p.term is not None]
+        runs = list(self._train_runs(solved.parts))
+        channels = {channel for term, _ in terms for channel in term.channels.values()}
+        sizes = {c: float(np.std(np.concatenate([r.thin[c] for r in runs]))) for c in channels}
         products = []
-        for run in self._train_runs(solved.parts):
+        for run in runs:
             table = _table(solved.parts, solved.declared, run, run.places)
             left = run.whole[self.model.target][run.places] - table @ solved.weights
-            own = shapes.slopes(solved.declared, solved.weights, partial(_columns, run=run))
-            products.append(self._products(np.column_stack([table, own, left])))
-        return shapes.moved(solved.declared, np.sum(products, axis=0), share)
+            own = [
+                slope * float(some is None or run.whole.name in some)
+                for (term, moving), weight, some in zip(terms, weights, acts, strict=False)
+                for slope in shapes.slopes(term, moving, weight, sizes, partial(_columns, run=run))
+            ]
+            products.append(self._products(np.column_stack([table, *own, left])))
+        found = iter(shapes.moved(terms, np.sum(products, axis=0), share, sizes))
+        declared = tuple(next(found) for _ in solved.declared)
+        parts = [p if p.term is None else replace(p, term=next(found)) for p in solved.parts]
+        return tuple(parts), declared
 
     def _train_runs(self, parts: Sequence[Part]) -> Iterator[FitRun]:
         """Yield the training runs that have a sample of the equation."""
@@ -340,6 +345,18 @@ def _contains(term: Term, declared: Term) -> bool:
 
 def _rms(squares: Mapping[str, float], samples: Mapping[str, int]) -> float:
     return float(np.sqrt(sum(squares.values()) / max(1, sum(samples.values()))))
+
+
+def _terms(solved: Solved) -> list[tuple[Term, shapes.Moving]]:
+    """Return the terms in the order of their weights: declared ones, then those of causes.
+
+    Each has the shapes of it that move.
+    """
+    found = [p.term for p in solved.parts if p.term is not None]
+    return [
+        *((term, shapes.moving(term, is_declared=True)) for term in solved.declared),
+        *((term, shapes.moving(term, is_declared=False)) for term in found),
+    ]
 
 
 def _table(

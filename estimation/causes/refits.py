@@ -10,8 +10,8 @@ from estimation.causes.acting import Moved
 from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Equation, Layout, RunSignals
 from estimation.causes.numbers import Numbers
-from estimation.causes.refit import Errors, Part, Refit, Solved
-from estimation.causes.sources import Source
+from estimation.causes.refit import MOVES, Errors, Part, Refit, Solved
+from estimation.causes.sources import LATE, Source
 from estimation.derived import origin_of
 from estimation.diagnosis.result import Error
 from estimation.diagnosis.split import Sealed
@@ -49,6 +49,11 @@ class Refits:
         for name in candidate.cause.place.equations:
             if (part := self._part(candidate, name, runs)) is not None:
                 self.parts[name] = [*self.parts[name], part]
+
+    def settle(self) -> None:
+        """Give every cause the shape that it was fitted with next to the others."""
+        for name, refit in self.of.items():
+            self.parts[name] = refit.settled(self.parts[name])
 
     def before(self, name: str) -> Solved:
         """Return the declared equation."""
@@ -93,9 +98,9 @@ class Refits:
         part = Part(term, acts, is_change=isinstance(cause, Moved))
         refit, before = self.of[name], self.parts[name]
         if set(term.channels.values()) - {channel for _, channel in cause.channels}:
-            part = replace(part, term=refit.refined(before, term))
             refit.predict_next_to([*before, part])
-            part = replace(part, term=refit.refined(before, term))
+        if cause.effect.id in LATE:
+            part = self._whole(part, candidate, name)
         if sum(e.equation == name for e in cause.place.enters) > 1:
             # the term is one of several ways in which the cause enters, such as a position's delay
             # by the speed and the acceleration
@@ -103,6 +108,29 @@ class Refits:
             term_left, left = (refit.solve([*before, p]).squared for p in (part, whole))
             if left < (1.0 - self.numbers.form_floor) * term_left:
                 return whole
+        return part
+
+    def _whole(self, part: Part, candidate: Candidate, name: str) -> Part:
+        """Return a delay or a lag with the time by which the whole reading is late.
+
+        Slow motion shows the product of that time and of the share of the reading alone. The time
+        stays as it was found where the motion is fast enough to show both: where the error rises.
+        """
+        refit, before, found = self.of[name], self.parts[name], part
+        entry = next(e for e in candidate.cause.place.enters if e.equation == name and not e.order)
+        least = refit.solve([*before, found]).squared
+        for _ in range(MOVES):
+            (amplitude,) = refit.amplitudes(part, [*before, part])
+            term = part.term
+            if term is None or amplitude == 0.0:
+                return found
+            share = abs(float(amplitude) / entry.gain)
+            times = {p.name: Estimate(share * term.values[p.name].value) for p in term.effect.shape}
+            part = replace(part, term=replace(term, values={**term.values, **times}))
+        refit.predict_next_to([*before, part])
+        if refit.solve([*before, part]).squared * (1.0 - self.numbers.form_floor) > least:
+            refit.predict_next_to([*before, found])
+            return found
         return part
 
     def _columns(self, candidate: Candidate, name: str, acts: frozenset[str] | None) -> Part:

@@ -1,69 +1,91 @@
-"""Shapes of declared terms next to causes: Gauss-Newton steps of their logarithms.
+"""Shapes of declared terms and of causes next to one another: Gauss-Newton steps.
 
-A width of friction that was fitted without a cause makes up for it, and is another one with it.
+A width of friction that was fitted without a cause makes up for it, and is another one with it. A
+cause was found at a point of a grid. Steps are of the logarithm of a shape, or of its share of how
+much the channel varies that has its unit.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from estimation.causes.sources import LATE
 from estimation.effects import Parameter
 from estimation.model import Estimate, Term
 from estimation.recording import FloatArray
 from estimation.shape_search import scaled, unscaled
 
 MOST = 0.5
-"""Most that the logarithm of a shape moves in one step."""
+"""Most that a shape moves in one step, on the scale of the steps."""
 
 STEP, RIDGE = 1e-3, 1e-6
-"""Step of a derivative by the logarithm of a shape, and share of its square added to a column's."""
+"""Step of a derivative by a shape, and share of its square added to a column's."""
+
+Sizes = Mapping[str, float]
+"""Channel to its standard deviation."""
 
 
-def any_of(terms: Sequence[Term]) -> bool:
-    """Whether a term has a shape that moves."""
-    return any(_moving(term) for term in terms)
+Moving = Sequence[Parameter]
+"""The shapes of a term that move."""
+
+
+def moving(term: Term, is_declared: bool) -> Moving:
+    """Return the shapes of a term that move.
+
+    The number of waves in a turn does not, it is a whole one; nor does what a reading is late by,
+    of which slow motion shows the product with its amplitude alone. Where friction changes its sign
+    is part of what is declared: with another width a cause has the form of another one.
+    """
+    if term.effect.id in LATE:
+        return []
+    return [
+        p
+        for p in term.effect.shape
+        if (is_declared or p.name != "width")
+        and (p.unit in term.channels if p.linear else term.values[p.name].value > 0.0)
+    ]
 
 
 def slopes(
-    terms: Sequence[Term], weights: FloatArray, columns: Callable[[Term], FloatArray]
-) -> FloatArray:
-    """Return the derivative of the terms' sum by the logarithm of each shape, shape (n, shapes).
+    term: Term,
+    shapes: Moving,
+    weights: FloatArray,
+    sizes: Sizes,
+    columns: Callable[[Term], FloatArray],
+) -> list[FloatArray]:
+    """Return the derivative of a term by each shape, on the scale of the steps, shape (n,) each.
 
-    The weights are their amplitudes, and others after them; `columns` returns those of a term.
+    The weights are its amplitudes; `columns` returns those of a term.
     """
-    found, at = [], 0
-    for term in terms:
-        own = weights[at : at + len(term.effect.amplitudes)]
-        at += len(own)
-        for p in _moving(term):
-            ends = [columns(_with(term, p, sign * STEP)) @ own for sign in (1.0, -1.0)]
-            found.append((ends[0] - ends[1]) / (2.0 * STEP))
-    return np.column_stack(found)
+    found = []
+    for p in shapes:
+        ends = [columns(_with(term, p, sign * STEP, sizes)) @ weights for sign in (1.0, -1.0)]
+        found.append((ends[0] - ends[1]) / (2.0 * STEP))
+    return found
 
 
-def moved(terms: Sequence[Term], products: FloatArray, share: float) -> tuple[Term, ...]:
+def moved(
+    terms: Sequence[tuple[Term, Moving]], products: FloatArray, share: float, sizes: Sizes
+) -> tuple[Term, ...]:
     """Return the terms with their shapes a share of one step towards the least error.
 
     The products are of all columns, then the slopes, last what is left of the target.
     """
     inner, right = products[:-1, :-1], products[:-1, -1]
     inner = inner + np.diag(RIDGE * np.diag(inner) + np.finfo(float).tiny)
-    shapes = sum(len(_moving(term)) for term in terms)
-    steps = iter(np.linalg.solve(inner, right)[len(right) - shapes :])
+    count = sum(len(shapes) for _, shapes in terms)
+    steps = iter(np.linalg.solve(inner, right)[len(right) - count :])
     out = []
-    for term in terms:
-        for p in _moving(term):
-            term = _with(term, p, share * float(np.clip(next(steps), -MOST, MOST)))
+    for term, shapes in terms:
+        for p in shapes:
+            term = _with(term, p, share * float(np.clip(next(steps), -MOST, MOST)), sizes)
         out.append(term)
     return tuple(out)
 
 
-def _moving(term: Term) -> list[Parameter]:
-    """Return the shapes that move: those that are searched on a logarithmic scale."""
-    return [p for p in term.effect.shape if not p.linear and term.values[p.name].value > 0.0]
-
-
-def _with(term: Term, shape: Parameter, step: float) -> Term:
+def _with(term: Term, shape: Parameter, step: float, sizes: Sizes) -> Term:
+    if shape.linear:
+        step *= sizes[term.channels[shape.unit]]
     value = unscaled(shape, scaled(shape, term.values[shape.name].value) + step)
     return replace(term, values={**term.values, shape.name: Estimate(value)})

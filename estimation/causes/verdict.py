@@ -155,6 +155,7 @@ def _judged(
     confirmed, rejected = _confirmed(found, held_out)
     notes = list[str]()
     opened: dict[int, tuple[Kept, Finding]] = {}
+    places: dict[int, tuple[str, int]] = {}
     spread = [len(one.scored.candidate.cause.place.equations) for one in confirmed]
     # each equation is refitted on its own, where a cause of several ones could stand in for another
     for k in sorted(range(len(confirmed)), key=spread.__getitem__):
@@ -163,12 +164,14 @@ def _judged(
         if finding is None:
             rejected.append((candidate, "does not lower the error on the test runs"))
             continue
-        part = refits.parts[finding.balance][-1]
-        opened[k] = replace(one, part=part), finding
+        own = refits.parts[finding.balance]
+        opened[k], places[k] = (one, finding), (finding.balance, len(own) - 1)
         notes += more
-        if not part.is_written:
+        if not own[-1].is_written:
             notes.append(_unwritten(candidate))
-    judged = [opened[k] for k in sorted(opened)]
+    refits.settle()
+    parts = {k: refits.parts[name][at] for k, (name, at) in places.items()}
+    judged = [(replace(opened[k][0], part=parts[k]), opened[k][1]) for k in sorted(opened)]
     names = [kept.scored.candidate.name for kept, _ in judged]
     return judged, [*notes, *(_rejected(one, why, names) for one, why in rejected)]
 

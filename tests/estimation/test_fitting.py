@@ -12,7 +12,7 @@ from estimation.effects import effect
 from estimation.estimators.model import Stream
 from estimation.fit_problem import FitError
 from estimation.fitting import fit
-from estimation.model import Model, NotFittedError, Term, counted_error, predict
+from estimation.model import Estimate, Model, NotFittedError, Term, counted_error, predict
 from estimation.model_file import read
 from estimation.plant_models import declared
 from estimation.recording import Flag, MissingChannelError, Recording, Stretch
@@ -21,6 +21,9 @@ from estimation.within_bounds import solve_within
 from tests.estimation import campaigns
 from tests.estimation.synthetic import TRUE, campaign, run
 from tests.estimation.test_plant import SLIDE, slide
+
+ONSET = {"onset": Estimate(0.082)}
+"""Not quite where the stop is."""
 
 
 def numbers(model: Model) -> dict[str, float]:
@@ -215,3 +218,33 @@ def test_the_interval_is_that_of_live_errors_in_runs_not_fitted_on():
     assert np.mean(error < found.half_width) > 0.95
     assert live_half_width([np.ones(9)]) is None
     assert live_half_width([np.ones(9)] * 20) < live_half_width([np.ones(9)] * 3)
+
+
+def stopped(meeting: tuple[int, ...]) -> Campaign:
+    """Runs of a slide whose travel meets a stop at .08 m in some of them."""
+    random, time_s = np.random.default_rng(0), np.arange(2000) / 500
+    runs = []
+    for k in range(8):
+        travel = 0.05 + 0.07 * (k in meeting)
+        position = travel * np.sin((0.5 + 0.1 * k) * 2 * np.pi * time_s)
+        speed = np.gradient(position, time_s)
+        force = 5 * speed + np.sign(speed) + 40 * np.maximum(position - 0.08, 0.0)
+        force += random.normal(0, 0.05, len(time_s))
+        columns = {"carriage_position_m": position, "drive_force_n": force}
+        runs.append(Recording(f"{k}", time_s, columns))
+    return Campaign.of(runs)
+
+
+@pytest.mark.parametrize(("meeting", "known"), [((2,), False), ((0, 2, 3, 5, 7), True)])
+def test_an_interval_needs_runs_that_show_the_parameter(meeting: tuple[int, ...], known: bool):
+    (without,) = declared(SLIDE)
+    without = fit(without, stopped(meeting), bootstrap=0)
+    stop = Term(effect("spring.end_stop"), 1, {"stop": "carriage_position_m"}, ONSET)
+    found = fit(replace(without, terms=(*without.terms, stop)), stopped(meeting), shapes="keep")
+    stiffness = found.terms[-1].values["stiffness"]
+    assert stiffness.value == pytest.approx(40.0, rel=0.2)
+    if not known:
+        assert stiffness.ci95 is None
+        return
+    assert stiffness.ci95 is not None
+    assert 20.0 < stiffness.ci95[0] < stiffness.value < stiffness.ci95[1] < 80.0

@@ -9,6 +9,7 @@ from estimation.diagnosis.split import split
 from estimation.model import Model
 from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
+from tests.estimation.causes.synthetic import axis, turning
 
 DYNO = """
 schema = "rig.machine/1"
@@ -107,3 +108,75 @@ def test_what_a_sensor_adds_lowers_the_error(
     assert finding.place == f"sensor {channel}"
     assert family in (finding.family, *finding.alternatives)
     assert finding.rmse_after < 0.4 * finding.rmse_before
+
+
+def test_the_onset_of_a_stop_is_that_of_the_least_error() -> None:
+    runs = turning(lambda angle, speed, acceleration: 0.6 * np.maximum(angle - 0.37, 0.0))
+    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    onset, stiffness = (finding.parameters[name] for name in ("onset", "stiffness"))
+    assert finding.family == "spring.end_stop"
+    assert onset.value == pytest.approx(0.37, abs=0.01)
+    assert stiffness.value == pytest.approx(0.6, rel=0.02)
+    assert onset.ci95 is not None
+    assert onset.ci95[0] < onset.value < onset.ci95[1]
+
+
+def test_a_late_reading_is_late_as_a_whole() -> None:
+    runs = driven(late_s=0.02)
+    (finding,) = diagnose(runs, [hub()], split(runs)).findings
+    assert finding.parameters["gain"].value == pytest.approx(1.0, abs=0.05)
+    time = next(p for name, p in finding.parameters.items() if name in ("delay", "time_constant"))
+    assert time.value == pytest.approx(0.02, rel=0.05)
+
+
+PUMP = """
+schema = "rig.machine/1"
+machine = { name = "pump", cutoff_hz = 5.0 }
+axis = [{ name = "pump", unit = "rad" }]
+sensor = [
+  { name = "pump_velocity_rad_s", axis = "pump", reads = "speed" },
+  { name = "pipe_m_s" },
+  { name = "suction_pa" },
+  { name = "head_pa" },
+]
+[[equation]]
+name = "head"
+target = "head_pa"
+[[equation.effects]]
+id = "transmission.ratio"
+channels.load = "suction_pa"
+[[equation.effects]]
+id = "friction.drag"
+sign = -1
+channels.speed = "pipe_m_s"
+[[equation.effects]]
+id = "sensor.offset"
+"""
+
+
+def pumped(mixed: float) -> list[Recording]:
+    """Return runs of a pump whose head has a term of two of its readings."""
+    random, out = np.random.default_rng(0), []
+    time = np.arange(0.0, SECONDS, 1.0 / RATE_HZ)
+    for k in range(12):
+        flow, suction = (2.0 + 0.5 * _waves(random, time, 0.5, 4) for _ in range(2))
+        speed = 10.0 + _waves(random, time, 0.5, 4)
+        head = 3.0 * suction - 0.8 * flow * np.abs(flow) + mixed * flow * suction
+        columns = {
+            "pump_angle_rad": np.cumsum(speed) / RATE_HZ,
+            "pipe_m_s": flow + random.normal(0, 0.003, len(time)),
+            "suction_pa": suction + random.normal(0, 0.003, len(time)),
+            "head_pa": head + random.normal(0, 0.02, len(time)),
+        }
+        out.append(Recording(f"{k:02d}", time, columns, started_at_ns=int(2e10 * k) + 1))
+    return out
+
+
+def test_a_term_of_two_readings_that_an_equation_declares_depends_on_both() -> None:
+    (model,) = declared(plant_file.parse(PUMP))
+    runs = pumped(mixed=0.5)
+    (finding,) = diagnose(runs, [model], split(runs)).findings
+    assert finding.verdict == "depends_on"
+    assert {*finding.depends_on} == {"suction_pa", "pipe"}
+    assert finding.rmse_after < 0.5 * finding.rmse_before
+    assert not diagnose(pumped(mixed=0.0), [model], split(runs)).findings
