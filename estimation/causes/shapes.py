@@ -85,7 +85,10 @@ def moved(
 
 
 def _with(term: Term, shape: Parameter, step: float, sizes: Sizes) -> Term:
+    known = term.values[shape.name].value
     if shape.linear:
-        step *= sizes[term.channels[shape.unit]]
-    value = unscaled(shape, scaled(shape, term.values[shape.name].value) + step)
+        value = known + step * sizes[term.channels[shape.unit]]
+    else:  # one that was found beyond the values that are searched comes no further
+        ends = min(shape.lower, known), max(shape.upper, known)
+        value = float(np.clip(unscaled(shape, scaled(shape, known) + step), *ends))
     return replace(term, values={**term.values, shape.name: Estimate(value)})

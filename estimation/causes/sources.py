@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.signal import detrend
 
 from estimation.causes.angles import travel_of
 from estimation.causes.equations import ANGLES, Layout, RunSignals
@@ -285,7 +286,8 @@ def repeats_one_reference(layout: Layout) -> bool:
     if not angle or len(layout.runs) < 2:
         return False
     size = min(len(r.channels[angle]) for r in layout.runs)
-    moves = [r.channels[angle][:size] - r.channels[angle][:size].mean() for r in layout.runs]
+    # less the mean speed: shafts that turn one way have angles that grow alike
+    moves = [detrend(r.channels[angle][:size]) for r in layout.runs]
     first = moves[0]
     return all(
         float(first @ m) > 0.99 * math.sqrt(float(first @ first) * float(m @ m)) for m in moves[1:]

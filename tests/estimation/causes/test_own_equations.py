@@ -1,5 +1,7 @@
 """Equations that the owner of a machine states: what their target's own sensor adds to them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -180,3 +182,18 @@ def test_a_term_of_two_readings_that_an_equation_declares_depends_on_both() -> N
     assert {*finding.depends_on} == {"suction_pa", "pipe"}
     assert finding.rmse_after < 0.5 * finding.rmse_before
     assert not diagnose(pumped(mixed=0.0), [model], split(runs)).findings
+
+
+def test_a_zero_that_drifts_is_named_where_a_shaft_turns_one_way() -> None:
+    runs = []
+    for k, run in enumerate(driven()):
+        speed = 9.0 + 0.5 * (k % 3)
+        ahead = run["roller_angle_rad"] + speed * run.time_s
+        torque = run["hub_torque_n_m"] - 9.0 * run["roller_angle_rad"] + 0.3 * run.time_s
+        columns = {"roller_angle_rad": ahead, "hub_torque_n_m": torque + 0.4 * speed}
+        runs.append(run.with_columns(**columns))
+    model = hub()
+    model = replace(model, terms=tuple(t for t in model.terms if t.effect.id != "spring.position"))
+    (finding,) = diagnose(runs, [model], split(runs)).findings
+    assert finding.family == "sensor.drift"
+    assert finding.rmse_after < 0.1 * finding.rmse_before
