@@ -39,5 +39,5 @@ def determined(normal: FloatArray) -> NDArray[np.bool_]:
     where its column, or the same of several columns together, is zero to rounding.
     """
     sizes, axes = linalg.eigh(normal)
-    free = axes[:, sizes <= LEAST_SHARE * sizes[-1]]
+    free = axes[:, sizes <= LEAST_SHARE * sizes.max(initial=0.0)]
     return np.asarray(np.sum(free**2, axis=1) < np.sqrt(LEAST_SHARE))

@@ -248,3 +248,9 @@ def test_an_interval_needs_runs_that_show_the_parameter(meeting: tuple[int, ...]
         return
     assert stiffness.ci95 is not None
     assert 20.0 < stiffness.ci95[0] < stiffness.value < stiffness.ci95[1] < 80.0
+
+
+def test_a_model_of_an_offset_alone_is_fitted():
+    offset = Term(effect("sensor.offset"), 1, {"clock": "time_s"})
+    found = fit(Model("m", "carriage", "drive_force_n", (offset,)), stopped((2,)))
+    assert found.terms[0].values["offset"].ci95 is not None
