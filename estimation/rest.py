@@ -44,6 +44,13 @@ def in_motion(
     return np.asarray(ndimage.maximum_filter1d(rest, reach) == 0)
 
 
+def longest_rest_s(speed: FloatArray, sample_rate_hz: float, slowest: float) -> float:
+    """Return the longest time in a run within which no sample is in motion, s."""
+    moving = in_motion(speed, np.ones(len(speed), np.bool_), sample_rate_hz, slowest)
+    ends = np.flatnonzero(np.concatenate([[True], moving, [True]]))
+    return float(np.diff(ends).max() - 1) / sample_rate_hz
+
+
 def closing(spindle_speed: FloatArray, sample_rate_hz: float) -> NDArray[np.bool_]:
     """Return which samples of a whole run close the jaw, away from the run's ends, shape (n,)."""
     trim = round(TRIM_S * sample_rate_hz)

@@ -106,8 +106,8 @@ CATALOGUED: dict[str, Truth] = {
     "gear_wear": _of("change.step", "motor", "friction.coulomb", course="comes"),
     "cable_stiff": _of("friction.warmup", "cable", course="fades"),
     "cable_dwell": _of("friction.dwell", "cable", needs="rests"),
-    # at one angle of wrap the two directions differ by what the ratio takes up
-    "cable_capstan": _of("friction.capstan", "cable", "friction.load"),
+    # over one angle of wrap it is proportional to the load, but for what the ratio takes up
+    "cable_capstan": _of("friction.load", "cable", "friction.capstan"),
     "wrist_capstan": _of("friction.capstan", "cable", needs="wrist"),
     "wrist_pull": _of("coupling.kinematic", "stretch", needs="wrist"),
     "jaw_weight": _of("gravity.payload", "cable stretch"),

@@ -28,8 +28,9 @@ LOADS = {"motor": "gear_torque", "spindle": "cable_torque"}
 LOOPS = ("hysteresis.presliding", "hysteresis.bouc_wen")
 
 
-SAME = {"change.step": ("friction.coulomb",)}
-"""Family to others with the same columns: declared friction may have another level in some runs."""
+SAME = {"change.step": ("friction.coulomb",), "friction.capstan": ("friction.load",)}
+"""Family to others with the same columns: declared friction may have another level in some runs,
+and a cable over one wrap rubs in proportion to its load, but for what the ratio takes up."""
 
 
 def rubbing(place: str, family: str, variables: tuple[str, ...], *tables: Drawer) -> Recipe:

@@ -128,7 +128,8 @@ def pool_of(joint: Joint, claims: Iterable[Claim]) -> list[Group]:
     train, pool = joint.layout, groups_of(joint, claims)
     for run in (*train.runs, *train.shaken):
         run.memo.clear()  # columns of the whole run, many times as large as those on the grid
-    count = Counter(_form(c.cause) for group in pool for c in group.candidates)
+    causes = [c.cause for group in pool for c in group.candidates]
+    count = Counter(_form(cause) for cause in causes if not _tried(cause))
     return [
         replace(
             group,
@@ -149,15 +150,20 @@ def _form(cause: Source | Function) -> tuple[str, str]:
     return cause.place.name, "" if len(cause.variables) == 1 else "several"
 
 
+def _tried(cause: Source | Function) -> int:
+    """Return the number of points that stand behind one candidate; 0 where each is one."""
+    return cause.tried if isinstance(cause, Source) else 0
+
+
 def _choices(cause: Source | Function, count: Mapping[tuple[str, str], int]) -> int:
     """Return the number of choices that a cause is one of: of forms, and within its form.
 
-    Within a form these are the points of its grid. Of smooth functions these are the numbers of
-    variables, and the sets of so many.
+    Within a form these are the points of its grid, or those that it was chosen from. Of smooth
+    functions these are the numbers of variables, and the sets of so many.
     """
     forms = sum(effect != "several" for _, effect in count)
     if not isinstance(cause, Function):
-        return forms * count[_form(cause)]
+        return forms * (_tried(cause) or count[_form(cause)])
     sets = max(1, math.comb(count[cause.place.name, ""], len(cause.variables)))
     return forms * MOST_VARIABLES * sets
 

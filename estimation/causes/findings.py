@@ -5,14 +5,16 @@ from dataclasses import dataclass, replace
 
 from estimation.causes.acting import Moved
 from estimation.causes.candidates import Candidate
+from estimation.causes.equations import sensitivity
 from estimation.causes.functions import Function, name_of_channel, names
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import Part
 from estimation.causes.refits import Refits
 from estimation.causes.scoring import Scored, posterior
-from estimation.causes.sources import LATE
+from estimation.causes.sources import LATE, Source
 from estimation.causes.unsteady import Unsteady
 from estimation.diagnosis.result import Finding, Value
+from estimation.effects import Proportional
 from estimation.model import Model, Term
 
 SURE = 0.9
@@ -202,11 +204,34 @@ def _refitted(kept: Kept, home: str, refits: Refits) -> Mapping[str, Value]:
     }
     names = [term.effect.amplitudes[k] for k in own]
     values = refits.of[home].amplitudes(part, refits.parts[home])
+    if part.term is None and cause.place.kind == "angle sensor":
+        values = values * _gain_before(cause, refits, home)
     return {
         p.name: Value(float(x), term.unit(p, target), None)
         for p, x in zip(names, values, strict=True)
         if p not in declared
     }
+
+
+def _gain_before(cause: Source, refits: Refits, equation: str) -> float:
+    """Return the gain of a reading's error that its columns have, of that next to them.
+
+    The error of an angle enters by the inertia that the equation has without it, which is too small
+    or too large for just that reason.
+    """
+    declared, solved = refits.layout.equations[equation], refits.after(equation)
+    orders: dict[str, int] = {}
+    for name in declared.channels:
+        if (found := sensitivity(name, cause.reads[0], declared.model.signals)) is not None:
+            orders[name] = found[1]
+    if not orders:
+        return 1.0
+    highest, after, at = max(orders, key=lambda name: orders[name]), 0.0, 0
+    for term in solved.declared:
+        if isinstance(term.effect, Proportional) and highest in term.channels.values():
+            after += term.sign * float(solved.weights[at])
+        at += len(term.effect.amplitudes)
+    return declared.channels[highest] / after if after else 1.0
 
 
 def others_in_set(name: str, shares: Mapping[str, float]) -> list[str]:

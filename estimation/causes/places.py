@@ -126,7 +126,9 @@ def _shared(layout_angles: Sequence[str], position: str) -> dict[str, tuple[str,
     if layout_angles:
         roles["motor_angle"] = tuple(layout_angles[:1])
     if position:
-        roles |= dict.fromkeys(("position", "stop", "tilt"), (position,))
+        roles |= dict.fromkeys(("position", "stop"), (position,))
+    if position.endswith("_angle_rad"):  # a carriage does not tilt
+        roles["tilt"] = (position,)
     if len(layout_angles) > 1:  # a harmonic of the only shaft there is has one name
         roles["output_angle"] = (position,)
     return roles

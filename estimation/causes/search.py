@@ -259,6 +259,8 @@ def _neighbours(layout: Layout, candidate: Candidate) -> list[Claim]:
 
 def _nearby(layout: Layout, cause: Source, k: int, parameter: Parameter) -> list[float]:
     """Return values of one shape parameter between the points of its grid."""
+    if cause.tried:
+        return []  # the largest between the points of its grid already
     if parameter.name == "order":
         near = [cause.shape[k] + step for step in (-2.0, -1.0, 1.0, 2.0)]  # whole: of its shaft
         least = least_order(layout, dict(cause.channels)[cause.turning])
@@ -267,6 +269,10 @@ def _nearby(layout: Layout, cause: Source, k: int, parameter: Parameter) -> list
     if parameter.name in ("width", "settled") or values is None or len(values) < 2:
         return []
     steps, ratio = (-0.5, -0.25, 0.25, 0.5), values[1] / values[0]
+    near = [cause.shape[k] * ratio**step for step in steps]
     if parameter.linear:
-        return [cause.shape[k] + step * (values[1] - values[0]) for step in steps]
-    return [cause.shape[k] * ratio**step for step in steps]
+        near = [cause.shape[k] + step * (values[1] - values[0]) for step in steps]
+    if parameter.unit != "1":
+        return near
+    # a number without a unit has the same bounds on every machine
+    return [value for value in near if parameter.lower <= value <= parameter.upper]

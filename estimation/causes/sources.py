@@ -7,19 +7,21 @@ effect that is not distinguishable from a simpler one over that range is left ou
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.signal import detrend
 
-from estimation.causes.angles import travel_of
+from estimation.causes.angles import signals_of, travel_of
 from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
+from estimation.causes.orders import largest_orders
 from estimation.causes.places import CLOCKS, Place, direction_width
 from estimation.effects import Effect, Parameter, Pointwise, catalogue
 from estimation.filters import holoborodko_derivative
 from estimation.recording import FloatArray
+from estimation.rest import longest_rest_s
 
 DECLARED_ONLY = (
     "arm.",
@@ -30,6 +32,12 @@ DECLARED_ONLY = (
     "transmission.damping",
 )
 DECLARED_FRICTION = ("friction.coulomb", "friction.viscous")
+SYNONYMS = ("friction.capstan",)
+"""Effects that another one stands for.
+
+Over a constant wrap a cable's pull is multiplied by cosh(wrap) + sinh(wrap) sign: the second part
+is `friction.load`, the first one a factor of the load, which equations have.
+"""
 NOT_A_LOSS = (
     "motor.",
     "ripple.current",
@@ -97,6 +105,12 @@ NARROW = 0.02
 ANGLE_STEP_RAD = 1e-4
 """Step of a derivative by an angle."""
 
+OF_ANY_ORDER = ("ripple.motor", "ripple.output", "ripple.current", "eccentric.load")
+"""Waves that a shaft may make which turns by another ratio; an encoder is on its own shaft."""
+
+SERIES = ("inertia.position.harmonics",)
+"""Effects of several harmonics of one turn: over less than a turn these are nearly the same."""
+
 LATE = ("sensor.delay", "sensor.lag", "motor.electrical")
 LEAST_LATE, MOST_LATE = 0.3, 1.5
 """Share of a reading that a delay or a lag makes late, at least and at most. It is the whole
@@ -132,6 +146,8 @@ class Source:
         odd: Whether half the difference to the same filter backwards in time stands in for it: its
             correlation with the stationary noise of what it reads is zero.
         bend: Its deviation from its equation, after the column itself; none if None.
+        tried: How many points it was chosen from by the error, of which it is the only candidate;
+            0 where all of them are.
     """
 
     place: Place
@@ -141,6 +157,7 @@ class Source:
     parts: tuple[int, ...]
     odd: bool = False
     bend: Bend | None = None
+    tried: int = 0
 
     @property
     def family(self) -> str:
@@ -256,11 +273,28 @@ def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
         for channels in itertools.product(*options):
             if any(c not in layout.runs[0].channels for _, c in channels):
                 continue
+            if effect.id in SERIES and not _turns(layout, dict(channels)["position"]):
+                continue
             odd = _follows_noise(layout, place, effect, channels)
             axes = [_axis(layout, place, effect, p, dict(channels)) for p in effect.shape]
             for shape in itertools.product(*axes):
                 for parts in _parts(effect):
                     yield Source(place, effect, tuple(channels), shape, parts, odd)
+            if effect.family in OF_ANY_ORDER:
+                yield from _between(layout, Source(place, effect, tuple(channels), (), (), odd))
+
+
+def _between(layout: Layout, wave: Source) -> Iterator[Source]:
+    """Yield a wave at the orders that are not whole and that the error shows most."""
+    angle = dict(wave.channels)[wave.turning]
+    if not angle.endswith("_angle_rad"):
+        return  # the periods of a position are on the grid
+    factors = [channel for role, channel in wave.channels if role != wave.turning]
+    least, most = least_order(layout, angle), _last_order(layout, wave.effect, angle)
+    orders, tried = largest_orders(layout, wave.place.home, angle, factors, least, most)
+    (parts,) = _parts(wave.effect)
+    for order in orders:
+        yield replace(wave, shape=(order,), parts=parts, tried=tried)
 
 
 def _follows_noise(
@@ -296,6 +330,8 @@ def repeats_one_reference(layout: Layout) -> bool:
 
 def _acts(effect: Effect, place: Place) -> bool:
     if effect.family in DECLARED_FRICTION or effect.id.startswith(DECLARED_ONLY):
+        return False
+    if effect.id in SYNONYMS:
         return False
     if effect.at_rest or effect.id == "coupling.torque":
         return False
@@ -342,6 +378,8 @@ def _axis(
         role = next(r for r in TURNING if r in channels)
         return _orders(layout, effect, channels[role])
     relative = RELATIVE.get((effect.id, parameter.name)) or RELATIVE.get(parameter.name)
+    if effect.id == "friction.dwell" and relative is not None:
+        return _rests(layout, parameter, channels, relative)
     if parameter.name == "fall" and relative is not None:
         # one that falls faster is another form of the change of sign
         usual = _range(layout, channels["speed"])[1] or 1.0
@@ -372,18 +410,35 @@ RELATIVE: Mapping[object, Sequence[float]] = {
     ("transmission.relaxation", "time"): tuple(np.geomspace(0.01, 0.7, 6)),
     ("transmission.relaxation.prony", "time"): (0.01, 0.05),
     ("friction.dwell", "time"): (0.03, 0.2),
-    ("friction.dwell", "way"): (0.05, 0.5),
+    ("friction.dwell", "way"): (0.0025, 0.025),
     "delay": tuple(np.geomspace(2e-4, 5e-2, 6)),
     "since": tuple(np.linspace(0.08, 0.92, 12)),
     "onset": (0.3, 0.42, 0.54, 0.66, 0.78, 0.9),
     ("spring.end_stop.opening", "onset"): (0.1, 0.22, 0.34, 0.46, 0.58, 0.7),
     "settled": (0.0, 1.0),
     "rise": (0.5, 2.0),
-    "exponent": (0.5, 1.5, 2.0),
+    "exponent": (2.0 / 3.0, 1.5, 2.0),
     "sharpness": (2.0,),
     "wrap": (0.2, 1.0),
 }
 """Shape parameter to the values tried, shares of the range of the channel that its unit names."""
+
+
+def _rests(
+    layout: Layout, parameter: Parameter, channels: Mapping[str, str], relative: Sequence[float]
+) -> list[float]:
+    """Return the times in which a contact ages, and the ways that wear it, that the runs show.
+
+    A time is a share of a run, and at most the longest rest: without one the contact is always as
+    its speed makes it, which is a friction that falls with the speed. A way is a share of that of a
+    whole run at its usual most speed: a contact that is worn within less is a curve over speed too.
+    """
+    whole_s, speed = _range(layout, channels["clock"])[1], channels["speed"]
+    if parameter.name == "way":
+        return [x * whole_s * _range(layout, speed)[1] for x in relative]
+    slowest = signals_of(layout).rest.get(speed, 0.0)
+    rest_s = max(longest_rest_s(r.channels[speed], r.rate_hz, slowest) for r in layout.runs)
+    return [x * whole_s for x in relative if x * whole_s <= rest_s]
 
 
 def _harmonics(layout: Layout, parameter: Parameter, angle: str) -> list[float]:
@@ -394,6 +449,11 @@ def _harmonics(layout: Layout, parameter: Parameter, angle: str) -> list[float]:
     return [float(x) for x in parameter.grid() if x * travel > 0.5 * math.pi]
 
 
+def _turns(layout: Layout, position: str) -> bool:
+    """Whether a shaft makes a whole turn in some run."""
+    return position.endswith("_angle_rad") and travel_of(layout, position) > 2.0 * math.pi
+
+
 def least_order(layout: Layout, angle: str) -> float:
     """Return the least order that repeats: with fewer periods any smooth form looks like a wave."""
     return LEAST_PERIODS * 2 * math.pi / travel_of(layout, angle)
@@ -402,14 +462,20 @@ def least_order(layout: Layout, angle: str) -> float:
 def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:
     """Return whole orders, as finely as the travel resolves them.
 
-    A harmonic repeats with the shaft that makes it, so its order there is a whole number.
+    A harmonic repeats with the shaft that makes it, so its order there is a whole number; of a
+    shaft behind a belt or a gear it is another one, see `_between`.
     """
     resolved = 2 * math.pi / travel_of(layout, angle)
     if not angle.endswith("_angle_rad"):  # nothing turns: any period
         return list(np.arange(LEAST_PERIODS, MOST_PERIODS, 1.0 / 3.0) * resolved)
     first = max(1, math.ceil(least_order(layout, angle)))
-    last = max(40, round(MOST_PERIODS * min(resolved, 1.5))) // (len(effect.amplitudes) // 2)
+    last = _last_order(layout, effect, angle)
     return [float(k) for k in range(first, last + 1, max(1, round(resolved / 3)))]
+
+
+def _last_order(layout: Layout, effect: Effect, angle: str) -> int:
+    resolved = 2 * math.pi / travel_of(layout, angle)
+    return max(40, round(MOST_PERIODS * min(resolved, 1.5))) // (len(effect.amplitudes) // 2)
 
 
 def _range(layout: Layout, channel: str) -> tuple[float, float]:

@@ -43,7 +43,7 @@ class Dwell(Remembering):
     amplitudes = (Parameter("friction", "target", "loss after a long rest", lower=0.0),)
     shape = (
         Parameter("time", "clock", "standstill to reach 63 %", 0.1, 10.0, points=3),
-        Parameter("way", "speed * clock", "slip after which 37 % remains", 0.01, 30.0, points=4),
+        Parameter("way", "speed * clock", "slip after which 37 % remains", 1e-3, 1e3, points=7),
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 0.05, 20.0, points=3),
     )
     walk = _walk

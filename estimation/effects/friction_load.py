@@ -125,7 +125,7 @@ class PowerLoadFriction(LoadFriction):
     Check: repeat the same motion against three stiffnesses, and free.
 
     Source: Bowden and Tabor 1950 (friction as the area of contact: by Hertz's law the power 2/3 of
-    the load for a single round contact, 1 for rough faces).
+    the load for a single round contact, the least there is, and 1 for rough faces).
     """
 
     id = "friction.load.power"
@@ -135,7 +135,7 @@ class PowerLoadFriction(LoadFriction):
         Parameter("friction", "target / load", "loss per unit of load at 0.1 N m", lower=0.0),
     )
     shape = (
-        Parameter("exponent", "1", "power of the load", 0.5, 2.5, points=5),
+        Parameter("exponent", "1", "power of the load", 2.0 / 3.0, 2.5, points=5),
         Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),
     )
     told_apart_by = "the same motion against three stiffnesses, and free"

@@ -45,10 +45,9 @@ def test_a_drive_of_another_ratio_goes_from_table_to_export(run, tmp_path, hidde
     told = json.loads(run("diagnose runs", words))
     named = [f for f in told["findings"] if f["verdict"] in ("identified", "one_of")]
     assert [(f["balance"], f["family"]) for f in named] == found  # the likeliest of a set
-    # over a small wrap, a cable's friction is proportional to the load; the acceleration of a wave
-    # does not show in this torque, so the wave may be the encoder's
+    # the acceleration of a wave does not show in this torque, so the wave may be the encoder's
     others = {other for f in named for other in f["alternatives"]}
-    assert others <= {"friction.capstan", "sensor.encoder_inl"}
+    assert others <= {"sensor.encoder_inl"}
     DiagnosisSchema.model_validate(told)  # the names of anyone's equations and angles
     words = "--machine drive.toml --model model.toml --speed 0 --json"
     assert "cell_torque_n_m" in run("replay runs", words)
