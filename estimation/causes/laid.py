@@ -148,8 +148,7 @@ class Projection:
                 means = np.zeros_like(means)
             if unit != "none":
                 norm = norm + within * np.einsum("rcnk,rcnk->ck", inner, inner)
-                varied = means - means.mean(axis=0)  # what all runs share is the offset's
-                norm = norm + between * np.einsum("rck,rck->ck", varied, varied)
+                norm = norm + between * np.einsum("rck,rck->ck", means, means)
             base, middle = self._inner[name], self._means[name]
             right = between * np.einsum("ri,rck->cik", middle, means)
             right[:, :-1] += within * products(base[:, None], inner).sum(axis=0)
@@ -162,11 +161,10 @@ class Projection:
             size = np.sqrt(norm) + TINY
             if unit == "first":
                 size = np.repeat(size[:, :1], size.shape[1], axis=1)
-            divisor = np.maximum(size, NOTHING)  # a constant column shows nothing
             for name, inner in inners.items():
-                inner /= divisor[:, None]
-                middles[name] /= divisor
-                taken[name] = taken[name] / divisor[:, None]
+                inner /= size[:, None]
+                middles[name] /= size
+                taken[name] = taken[name] / size[:, None]
         for noise in followed.values():
             noise /= np.maximum(size, NOTHING)[:, None]
         across = {n: products(self._noise[n][:, None], x) for n, x in followed.items()}
