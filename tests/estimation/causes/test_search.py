@@ -237,7 +237,7 @@ def test_a_drive_may_give_another_torque_an_ampere_in_some_of_the_runs() -> None
         runs.append(Recording(run.name, run.time_s, run.columns | {"crank_current_a": current}))
     finding = _only(runs, axis("crank_current_a"))
     assert finding.family == "motor.torque_constant"
-    assert finding.parameters["change"].value == pytest.approx(0.75 / 0.8 - 1.0, rel=0.02)
+    assert finding.parameters["change"].value == pytest.approx(0.75 / 0.8 - 1.0, rel=0.05)
     assert {*finding.runs_affected} == {runs[k].name for k in has}
 
 
