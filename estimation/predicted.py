@@ -5,6 +5,7 @@ are proportional to a channel, and of Coulomb friction, is a channel of the mach
 read live too.
 """
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from estimation.channels import ending_of
@@ -25,11 +26,12 @@ def predicted_of(channel: str, target: str) -> str:
     return f"{stem}_predicted{channel.removeprefix(stem)}"
 
 
-def with_prediction(model: Model) -> Model:
+def with_prediction(model: Model, noisy: Collection[str] = ()) -> Model:
     """Return a fitted model whose signals have the prediction of its target.
 
     There is none where a term is neither proportional to a channel nor Coulomb friction: the other
-    terms alone differ from the target by more than its noise.
+    terms alone differ from the target by more than its noise. Nor is there one where a term has a
+    noisy channel: what reads the prediction would follow the noise that the term has in the error.
     """
     name = predicted_of(model.target, model.target)
     others = tuple(c for c in model.signals.combinations if c.name != name)
@@ -39,6 +41,8 @@ def with_prediction(model: Model) -> Model:
         if term.effect.id == OFFSET:
             continue
         (channel, *_) = term.channels.values() or ("",)
+        if channel in noisy:
+            return replace(model, signals=known)
         if isinstance(term.effect, Proportional) and not looks_back([channel]):
             shares.append(Share(channel, times=term.weights[0]))
         elif term.effect.id == "friction.coulomb":

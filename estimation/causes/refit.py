@@ -111,7 +111,8 @@ class Errors:
 class Refit:
     """One equation, fitted on the training runs, on all runs, which have the campaign's time.
 
-    The numbers hold the prior of amplitudes without a term.
+    The numbers hold the prior of amplitudes without a term. Noisy channels take no part in the
+    prediction of the target.
 
     Raises:
         FitError: No training run has a sample of the equation.
@@ -124,8 +125,11 @@ class Refit:
         train: Sequence[str],
         test: Sequence[str],
         numbers: Numbers = DEFAULT,
+        noisy: Collection[str] = (),
     ) -> None:
-        self.model, self.recordings = model, {r.name: r for r in recordings}
+        self.noisy = frozenset(noisy)
+        self.model = with_prediction(model, noisy) if noisy else model
+        self.recordings = {r.name: r for r in recordings}
         self.train_names, self.test_names = tuple(train), tuple(test)
         self.numbers = numbers
         self._runs: dict[frozenset[str], dict[str, tuple[FitRun, NDArray[np.intp]] | None]] = {}
@@ -223,7 +227,7 @@ class Refit:
                 sizes = {p.name: Estimate(float(next(weights))) for p in term.effect.amplitudes}
                 declared[id(term)] = replace(own, values={**own.values, **sizes})
             terms = tuple(declared.get(id(term), term) for term in known.terms)
-            signals = with_prediction(replace(known, terms=terms)).signals
+            signals = with_prediction(replace(known, terms=terms), self.noisy).signals
             self.model, self._runs, self._solved = replace(known, signals=signals), {}, {}
             if self.solve(parts).squared >= solved.squared:
                 self.model, self._runs, self._solved = known, runs, {}

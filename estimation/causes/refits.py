@@ -9,6 +9,7 @@ import numpy as np
 from estimation.causes.acting import Moved
 from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Equation, Layout, RunSignals
+from estimation.causes.instruments import CLEAN, noise_share
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import MOVES, Errors, Part, Refit, Solved
 from estimation.causes.sources import LATE, Source
@@ -37,7 +38,9 @@ class Refits:
     ) -> None:
         self.layout, self.sealed, self.numbers = layout, sealed, numbers
         self.of: dict[str, Refit] = {
-            name: Refit(e.model, recordings, sealed.discover, sealed.confirm, numbers)
+            name: Refit(
+                e.model, recordings, sealed.discover, sealed.confirm, numbers, _noisy(layout, e)
+            )
             for name, e in layout.equations.items()
         }
         self.parts: dict[str, list[Part]] = {name: [] for name in layout.equations}
@@ -93,7 +96,7 @@ class Refits:
         acts = None if candidate.acts is None else frozenset(runs)
         if not isinstance(cause, Source):
             return self._columns(candidate, name, acts)
-        if (term := _term(cause, equation)) is None:
+        if (term := _term(cause, replace(equation, model=self.of[name].model))) is None:
             return self._columns(candidate, name, acts) if name == cause.place.home else None
         part = Part(term, acts, is_change=isinstance(cause, Moved))
         refit, before = self.of[name], self.parts[name]
@@ -146,6 +149,12 @@ class Refits:
             return acting * np.column_stack([np.interp(since_s, time_s, c) for c in values.T])
 
         return Part(unwritten=columns, precision=precision)
+
+
+def _noisy(layout: Layout, equation: Equation) -> set[str]:
+    """Return the channels of an equation's terms of which a part that counts is noise."""
+    channels = {column.channel for column in equation.kinds if column.channel}
+    return {c for c in channels if noise_share(layout.runs, c) > CLEAN}
 
 
 def _everywhere(
