@@ -78,8 +78,11 @@ class Joint:
             an inertia, a friction or a damping below zero is a cause that the equation lacks.
     """
 
-    def __init__(self, layout: Layout, numbers: Numbers = DEFAULT) -> None:
+    def __init__(
+        self, layout: Layout, numbers: Numbers = DEFAULT, *, is_one_machine: bool = True
+    ) -> None:
         self.layout, self.numbers = layout, numbers
+        self._is_one_machine = is_one_machine
         self.runs = layout.runs
         counts = [len(equation.kinds) for equation in layout.equations.values()]
         ends = itertools.pairwise(itertools.accumulate(counts, initial=0))
@@ -186,7 +189,11 @@ class Joint:
         kinds = [c for e in self.layout.equations.values() for c in e.kinds]
         bounded[: len(kinds)] = [c.is_bounded for c in kinds]
         self._hold(np.zeros_like(bounded))
-        while (below := bounded & ~self.held & (self._amplitudes < 0.0)).any():
+        # of two machines together a friction may be negative: what differs is then a change
+        while (
+            self._is_one_machine
+            and (below := bounded & ~self.held & (self._amplitudes < 0.0)).any()
+        ):
             self._hold(self.held | below)
 
     @property
