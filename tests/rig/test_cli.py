@@ -83,6 +83,7 @@ def test_a_folder_that_cannot_be_made_is_no_fault_of_the_program(tmp_path, said)
 def test_ctrl_c_while_modules_are_loaded_shows_no_traceback():
     code = """
 import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job of a shell ignores it
 from rig.__main__ import run
 class Finder:
     def find_spec(self, name, path=None, target=None):
