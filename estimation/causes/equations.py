@@ -118,13 +118,11 @@ class Column(NamedTuple):
         sign: With which its term enters.
         channel: What it is a constant times; empty where it is another function.
         of_shape: Whether it is the derivative by a shape.
-        is_bounded: Whether it is an amplitude that cannot be negative.
     """
 
     sign: int
     channel: str
     of_shape: bool
-    is_bounded: bool
 
 
 @dataclass(frozen=True)
@@ -184,9 +182,8 @@ class Equation:
         for term in self.terms:
             linear = isinstance(term.effect, Proportional)
             channel = next(iter(term.channels.values())) if linear else ""
-            sizes = term.effect.amplitudes
-            found += [Column(term.sign, channel, False, p.lower == 0.0) for p in sizes]
-            found += [Column(term.sign, channel, True, False)] * len(term.effect.shape)
+            found += [Column(term.sign, channel, False)] * len(term.effect.amplitudes)
+            found += [Column(term.sign, channel, True)] * len(term.effect.shape)
         return found
 
     def noise(self, run: RunSignals) -> FloatArray:
