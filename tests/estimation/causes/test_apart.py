@@ -49,7 +49,7 @@ def test_a_term_that_differs_is_stated_of_the_fewer_runs() -> None:
 
 def test_what_nothing_explains_is_stated_with_the_terms_at_their_bounds() -> None:
     random, runs = np.random.default_rng(0), []
-    for run in turning(lambda _, speed, acceleration: -0.05 * speed - 0.0201 * acceleration):
+    for run in turning(lambda _, speed, acceleration: -0.05 * speed - 0.04 * acceleration):
         slow = np.cumsum(random.normal(0, 2e-3, len(run.time_s)))
         torque = run["crank_torque_n_m"] + slow - slow.mean()
         runs.append(run.with_columns(crank_torque_n_m=torque))
