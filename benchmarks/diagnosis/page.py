@@ -55,13 +55,15 @@ NOTES = {
 name of the hidden effect (weak: at 30 % of its strength; pairs: both); outside the catalogue: the
 right variables and no name; some runs: the name and the runs, one run may be off (another
 laboratory's scorer counts the name); confounded: the whole set of effects that the runs cannot
-distinguish and a next experiment; clean: no finding. Solved: confounded cases that are right after
-the proposed runs were recorded, of those for which runs were proposed. Sure and wrong: cases with
-a wrong statement at a confidence of .9 or more. Extra names: wrong names in addition to the
-hidden effects, over all cases. Error ratio: error on the test runs over the residual of the
-declared model on the same campaign without the hidden effects, median of the rightly named cases
-(their number). A judging seed of a generator is used once: `judge` on the first line with
-both; `seen` on later lines. Processor time is of one call on one core of a shared machine.""",
+distinguish and a next experiment (of drawn rigs, the sets of lines up to c1b6d65d also held
+families with amplitudes that no machine has); clean: no finding. Solved: confounded cases that
+are right after the proposed runs were recorded, of those for which runs were proposed. Sure and
+wrong: cases with a wrong statement at a confidence of .9 or more. Extra names: wrong names in
+addition to the hidden effects, over all cases. Error ratio: error on the test runs over the
+residual of the declared model on the same campaign without the hidden effects, median of the
+rightly named cases (their number). A judging seed of a generator is used once: `judge` on the
+first line with both; `seen` on later lines. Processor time is of one call on one core of a
+shared machine.""",
     MACHINES: """Measured data of machines that were built, recorded and published by others; the
 conversions are in `benchmarks/diagnosis`. Error is the root mean square of the test runs'
 residual, run means included, over that of the target, before and after what was found. A dash

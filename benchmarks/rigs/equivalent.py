@@ -2,7 +2,8 @@
 
 Worked out, not declared: the effect's own signal, as each equation sees it, is fitted by the
 declared terms with and without a family's columns, free of noise. A family counts as
-good as the effect where what it cannot reproduce would not be seen in the noise of these runs.
+good as the effect where what it cannot reproduce would not be seen in the noise of these runs, with
+amplitudes that a machine can have.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,6 +37,17 @@ STRIDE = 4
 FREE = 0.5
 """Share of itself by which a declared gain may change next to a family: one that takes the whole
 torque from another column does not explain this machine."""
+
+LEVER = 0.7
+"""Largest variation of a lever, share of it, which the waves of a form have in equal parts: that up
+to which `benchmarks.rigs.build` draws one."""
+
+TORQUES = ("motor", "cable")
+"""Equations between torques, where an eccentricity is a share of a lever."""
+
+SAME: Mapping[str, str] = {"friction.capstan": "friction.load"}
+"""Family to the one that it cannot differ from: over a constant wrap a cable's pull is multiplied
+by a factor on each way, which is a gain and friction proportional to the load."""
 
 LONGEST_LAG = 60
 
@@ -80,7 +92,8 @@ def reproducing(
         enough = seen + FORM * beyond
         fitting = {family for family, left in lefts.items() if left <= enough}
         good = fitting if good is None else good & fitting
-    return tuple(sorted((good or set()) | set(known[:1])))
+    found = (good or set()) | set(known[:1])
+    return tuple(sorted({SAME.get(family, family) for family in found}))
 
 
 def spread(residuals: Sequence[FloatArray]) -> float:
@@ -103,13 +116,19 @@ def _base(run: Prepared, equation: str, fitted: Fitted) -> FloatArray:
     return np.hstack([middle, (wide - middle)[:, [sign]]])
 
 
-def _left(table: FloatArray, whole: FloatArray, gains: FloatArray) -> float:
+def _left(
+    table: FloatArray,
+    whole: FloatArray,
+    gains: FloatArray,
+    own: Sequence[tuple[float, float]] = (),
+) -> float:
     """Return the mean square residual of a least-squares fit, declared gains near their own.
 
     Args:
         table: Declared columns, the derivative by a width if there is one, a family's columns.
         whole: What is fitted.
         gains: Of the declared columns; each may change by `FREE` of itself.
+        own: Lower and upper bound of each of the family's amplitudes.
     """
     scale = np.sqrt(np.mean(table**2, axis=0)) + np.finfo(float).tiny
     scaled = table / scale
@@ -117,7 +136,11 @@ def _left(table: FloatArray, whole: FloatArray, gains: FloatArray) -> float:
     right = scaled.T @ whole / len(whole)
     most = np.full(len(scale), np.inf)
     most[: len(gains)] = FREE * np.abs(gains) * scale[: len(gains)]
-    weights = solve_within(gram, right, -most - 1e-300, most + 1e-300)
+    low, high = -most, most.copy()
+    if own:
+        at = len(scale) - len(own)
+        low[at:], high[at:] = np.transpose(own) * scale[at:]
+    weights = solve_within(gram, right, low - 1e-300, high + 1e-300)
     left = np.mean(whole**2) - 2.0 * weights @ right + weights @ gram @ weights
     return float(max(left, 0.0))
 
@@ -142,15 +165,26 @@ def _lefts(
     whole_runs = [_channels(r, run, names) for r, run in zip(recordings, runs, strict=True)]
     found: dict[str, float] = {}
     for term in terms:
+        bounds = _bounds(term, equation)
         for shape in _shapes(term):
             tables = [
                 residual.centred(_columns(term, shape, channels, at))
                 for channels, at in zip(whole_runs, places, strict=True)
             ]
-            left = _left(np.hstack([base, np.concatenate(tables)]), whole, gains)
+            left = _left(np.hstack([base, np.concatenate(tables)]), whole, gains, bounds)
             family = term.effect.family
             found[family] = min(found.get(family, np.inf), left)
     return found
+
+
+def _bounds(term: Term, equation: str) -> list[tuple[float, float]]:
+    """Return the bounds of a term's amplitudes as they are added to an equation's target."""
+    if term.effect.family == "eccentric.load" and equation in TORQUES:
+        count = len(term.effect.amplitudes)
+        return [(-2.0 * LEVER / count, 2.0 * LEVER / count)] * count  # a sine and a cosine a wave
+    if term.effect.balances.get(equation, 1) > 0:
+        return [(p.lower, p.upper) for p in term.effect.amplitudes]
+    return [(-p.upper, -p.lower) for p in term.effect.amplitudes]
 
 
 def _columns(

@@ -87,6 +87,14 @@ def test_a_confounded_case_states_the_families_that_cannot_be_separated():
 
 
 @pytest.mark.long
+def test_no_family_of_a_confounded_case_has_an_amplitude_that_no_machine_has():
+    # the drag of this motor falls as it warms: so would friction that falls with the load
+    assert "friction.load" not in draw(FIRST + 172001, "confounded", gear_ratio=35.0).truth.together
+    # the load of this one depends on the angle: so would a lever of tens of times its length
+    assert "eccentric.load" not in draw(FIRST + 172003, "confounded", gear_ratio=35).truth.together
+
+
+@pytest.mark.long
 def test_an_effect_outside_the_catalogue_has_no_name_but_variables():
     (effect,) = case_of("outside").truth.effects
     assert effect.family == "unknown"
