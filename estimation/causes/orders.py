@@ -6,16 +6,20 @@ that the data resolve, too many to be candidates: those at which the error is la
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy import fft
 
+from estimation.causes.angles import angles_of
 from estimation.causes.equations import Equation, Layout
 from estimation.recording import FloatArray
 
 WAVES = 6
 """Waves that are taken off the error one after another, the largest first."""
+
+TOGETHER = 0.99
+"""Share of the variance of an angle that another one of the same gear train has."""
 
 PLACES, FINER, MOST_PLACES = 8, 4, 1 << 22
 """Places in the shortest period, steps in the order that the travel resolves, most places."""
@@ -58,6 +62,23 @@ def largest_orders(
         if all(abs(order - known) > resolved for known in (round(order), *found)):
             found.append(order)
     return found, math.ceil((most - least) / resolved)
+
+
+def orders_elsewhere(layout: Layout, angle: str, order: float) -> Iterator[tuple[str, float]]:
+    """Yield the angles of other shafts that turn with this one, and the order that it is there."""
+    for other in angles_of(layout):
+        if other != angle and (ratio := _ratio(layout, angle, other)):
+            yield other, order / ratio
+
+
+def _ratio(layout: Layout, angle: str, other: str) -> float:
+    """Return how far another shaft turns with this one, no sign; zero where they do not."""
+    moved = [
+        np.vstack([run.on_grid(name) - run.on_grid(name).mean() for name in (angle, other)])
+        for run in layout.runs
+    ]
+    (own, both), (_, theirs) = sum(m @ m.T for m in moved)
+    return abs(both) / own if both**2 > TOGETHER * own * theirs else 0.0
 
 
 def _sharpened(turned: FloatArray, values: FloatArray, near: float, spacing: float) -> float:

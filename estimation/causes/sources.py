@@ -16,7 +16,7 @@ from scipy.signal import detrend
 from estimation.causes.angles import signals_of, travel_of
 from estimation.causes.equations import ANGLES, Layout, RunSignals
 from estimation.causes.instruments import signal
-from estimation.causes.orders import largest_orders
+from estimation.causes.orders import largest_orders, orders_elsewhere
 from estimation.causes.places import CLOCKS, Place, direction_width
 from estimation.effects import Effect, Parameter, Pointwise, catalogue
 from estimation.filters import holoborodko_derivative
@@ -294,7 +294,20 @@ def _between(layout: Layout, wave: Source) -> Iterator[Source]:
     orders, tried = largest_orders(layout, wave.place.home, angle, factors, least, most)
     (parts,) = _parts(wave.effect)
     for order in orders:
-        yield replace(wave, shape=(order,), parts=parts, tried=tried)
+        if not _is_whole_elsewhere(layout, wave.effect, angle, order):
+            yield replace(wave, shape=(order,), parts=parts, tried=tried)
+
+
+def _is_whole_elsewhere(layout: Layout, effect: Effect, angle: str, order: float) -> bool:
+    """Whether an order of an angle is, within what the runs resolve, a whole one of another shaft.
+
+    What turns with that shaft makes it then; no belt nor gear that nobody declared is needed.
+    """
+    return any(
+        abs(there - round(there)) <= 2.0 * math.pi / travel_of(layout, other)
+        for other, there in orders_elsewhere(layout, angle, order)
+        if 0.5 < there <= _last_order(layout, effect, other)
+    )
 
 
 def _follows_noise(

@@ -496,6 +496,16 @@ def test_a_gear_and_its_sensors_are_kept_apart(fault: dict[str, float], family: 
     assert finding.rmse_after < (0.6 if "slow" in fault else 1.0) * finding.rmse_before
 
 
+def test_a_wave_of_the_slow_shaft_is_no_broken_order_of_the_fast_one() -> None:
+    runs = []
+    for one in geared():
+        wave = 0.01 * np.sin(23.0 * one["spindle_angle_rad"] + 0.4)
+        runs.append(one.with_columns(motor_current_a=one["motor_current_a"] + wave))
+    finding = _only(runs, motor(), gearbox())
+    assert (finding.family, finding.verdict) == ("ripple.output", "identified")
+    assert finding.parameters["order"].value == pytest.approx(23.0)
+
+
 @pytest.mark.long
 def test_a_cause_of_several_equations_does_not_stand_in_for_one_of_a_single_equation() -> None:
     runs = [
