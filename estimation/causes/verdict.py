@@ -5,12 +5,13 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from estimation.causes import remarks
 from estimation.causes.acting import Moved
 from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Layout, lay_out, on_one_clock
@@ -22,10 +23,9 @@ from estimation.causes.findings import (
     unpredicted,
     written_term,
 )
-from estimation.causes.folds import unvaried
 from estimation.causes.functions import Function
 from estimation.causes.held_out import HeldOut
-from estimation.causes.instruments import add_instruments, noise_share
+from estimation.causes.instruments import add_instruments
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.refit import Errors
@@ -33,11 +33,9 @@ from estimation.causes.refits import Refits
 from estimation.causes.scoring import DIGITS, probabilities
 from estimation.causes.search import Found, search
 from estimation.causes.unsteady import unsteady
-from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.split import Sealed, claim
-from estimation.model import AT_BOUND, Model
-from estimation.noise import MOST_NOISE, noisy_sentence
+from estimation.model import Model
 from estimation.recording import Recording
 
 LEAST_SHARE = 0.001
@@ -119,13 +117,8 @@ def answer(
             f"{changing.equation}: the level of {changing.effect} changes within runs, at times"
             " that no recorded signal predicts."
         )
-    apart = [
-        f"{run}: {layout.equations[name].target} is {factor:.2g} times what the other runs predict"
-        " for it. Check its sign and unit in this run, or exclude the run."
-        for name, run, factor in held_out.apart(
-            [(kept.scored.candidate, f.runs_affected) for kept, f in judged]
-        )
-    ]
+    explained = {name for f in findings for name in (f.balance, *f.also_in)}
+    found_in = [(kept.scored.candidate, f.runs_affected) for kept, f in judged]
     diagnosis = Diagnosis(
         findings=tuple(findings),
         errors=errors,
@@ -135,11 +128,11 @@ def answer(
         sealed=sealed,
         undecided=dict(layout.undecided),
         notes=(
-            *apart,
+            *remarks.apart(layout, held_out.apart(found_in)),
             *filter(None, [claim(sealed)]),
-            *_left(layout, left, {name for f in findings for name in (f.balance, *f.also_in)}),
-            *_at_bounds(written),
-            *_limits(timed, layout, sealed),
+            *remarks.left(layout, left, explained),
+            *remarks.at_bounds(written),
+            *remarks.limits(timed, layout, sealed),
             *notes,
         ),
         seconds=time.perf_counter() - began,
@@ -305,67 +298,3 @@ def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
             key = f"{old.effect.id}.{p.name}"
             out[key] = {"before": old.values[p.name].value, "after": new.values[p.name].value}
     return out
-
-
-def _left(layout: Layout, errors: Mapping[str, float], explained: Set[str]) -> Iterator[str]:
-    """Yield how large the errors left are next to the noise of the readings, a sentence each.
-
-    Of an equation that a finding explains, only where most of its error is not noise.
-    """
-    for name, error in errors.items():
-        noise = math.sqrt(sum(layout.equations[name].noises(layout.runs)))
-        if noise == 0.0:
-            continue
-        unexplained = error**2 > 2.0 * noise**2  # more than half of its power
-        if name in explained and not unexplained:
-            continue
-        which = "left on" if name in explained else "on"
-        rest = "Most of it has no explanation here." if unexplained else "Most of it is noise."
-        yield (
-            f"{name}: the error {which} the test runs is {error / noise:.2g} times the noise that"
-            f" its readings show. {rest}"
-        )
-
-
-def _at_bounds(models: Sequence[Model]) -> Iterator[str]:
-    """Yield the parameters of each equation that are at a bound, a sentence each."""
-    for model in models:
-        bound = [
-            f"{term.effect.id} {parameter.name}"
-            for term in model.terms
-            for parameter in term.parameters
-            if term.is_at_bound(parameter)
-        ]
-        if bound:
-            yield f"{model.balance}: at a bound: {', '.join(bound)}. {AT_BOUND}"
-
-
-def _limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> list[str]:
-    """Return the limits of these runs, one sentence each."""
-    training = [r for r in recordings if r.name in sealed.discover]
-    found = audit(training)
-    if not sealed.may_name:
-        found.append(
-            f"{len(sealed.discover)} training runs: with fewer than {DEFAULT.least_to_name} no"
-            " effect is named."
-        )
-    found += [f"Left out: {reason}" for reason in layout.left_out.values()]
-    found += [
-        f"All training runs are at one level of {condition}: an effect that depends on it cannot"
-        " be distinguished from one that does not."
-        for condition in unvaried(layout.select(sealed.discover))
-    ]
-    return found + _noisy(layout)
-
-
-def _noisy(layout: Layout) -> list[str]:
-    """Return the terms that a reading's noise makes too small, one sentence each."""
-    found = []
-    for equation in layout.equations.values():
-        for channel in equation.channels:
-            share = noise_share(layout.runs, channel)
-            cutoff = equation.model.low_pass.cutoff_hz
-            if share > MOST_NOISE:
-                remedy = f"A cutoff_hz below {cutoff:g} removes more of it."
-                found.append(f"{equation.name}: {noisy_sentence(channel, share, remedy)}")
-    return found

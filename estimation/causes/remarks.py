@@ -1,0 +1,87 @@
+"""What a diagnosis remarks on besides its findings: one sentence each."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+
+from estimation.causes.equations import Layout
+from estimation.causes.folds import unvaried
+from estimation.causes.instruments import noise_share
+from estimation.causes.numbers import DEFAULT
+from estimation.diagnosis.audit import audit
+from estimation.diagnosis.split import Sealed
+from estimation.model import AT_BOUND, Model
+from estimation.noise import MOST_NOISE, noisy_sentence
+from estimation.recording import Recording
+
+
+def apart(layout: Layout, found: Iterable[tuple[str, str, float]]) -> Iterator[str]:
+    """Yield the runs whose target is in another sign or unit than the other runs predict."""
+    for name, run, factor in found:
+        yield (
+            f"{run}: {layout.equations[name].target} is {factor:.2g} times what the other runs"
+            " predict for it. Check its sign and unit in this run, or exclude the run."
+        )
+
+
+def left(layout: Layout, errors: Mapping[str, float], explained: Set[str]) -> Iterator[str]:
+    """Yield how large the errors left are next to the noise of the readings, a sentence each.
+
+    Of an equation that a finding explains, only where most of its error is not noise.
+    """
+    for name, error in errors.items():
+        noise = math.sqrt(sum(layout.equations[name].noises(layout.runs)))
+        if noise == 0.0:
+            continue
+        unexplained = error**2 > 2.0 * noise**2  # more than half of its power
+        if name in explained and not unexplained:
+            continue
+        which = "left on" if name in explained else "on"
+        rest = "Most of it has no explanation here." if unexplained else "Most of it is noise."
+        yield (
+            f"{name}: the error {which} the test runs is {error / noise:.2g} times the noise that"
+            f" its readings show. {rest}"
+        )
+
+
+def at_bounds(models: Sequence[Model]) -> Iterator[str]:
+    """Yield the parameters of each equation that are at a bound, a sentence each."""
+    for model in models:
+        bound = [
+            f"{term.effect.id} {parameter.name}"
+            for term in model.terms
+            for parameter in term.parameters
+            if term.is_at_bound(parameter)
+        ]
+        if bound:
+            yield f"{model.balance}: at a bound: {', '.join(bound)}. {AT_BOUND}"
+
+
+def limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> list[str]:
+    """Return the limits of these runs, one sentence each."""
+    training = [r for r in recordings if r.name in sealed.discover]
+    found = audit(training)
+    if not sealed.may_name:
+        found.append(
+            f"{len(sealed.discover)} training runs: with fewer than {DEFAULT.least_to_name} no"
+            " effect is named."
+        )
+    found += [f"Left out: {reason}" for reason in layout.left_out.values()]
+    found += [
+        f"All training runs are at one level of {condition}: an effect that depends on it cannot"
+        " be distinguished from one that does not."
+        for condition in unvaried(layout.select(sealed.discover))
+    ]
+    return found + _noisy(layout)
+
+
+def _noisy(layout: Layout) -> list[str]:
+    """Return the terms that a reading's noise makes too small, one sentence each."""
+    found = []
+    for equation in layout.equations.values():
+        for channel in equation.channels:
+            share = noise_share(layout.runs, channel)
+            cutoff = equation.model.low_pass.cutoff_hz
+            if share > MOST_NOISE:
+                remedy = f"A cutoff_hz below {cutoff:g} removes more of it."
+                found.append(f"{equation.name}: {noisy_sentence(channel, share, remedy)}")
+    return found
