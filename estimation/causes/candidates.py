@@ -14,8 +14,9 @@ from estimation.causes.functions import MOST_VARIABLES, Function, functions_at
 from estimation.causes.instruments import signal
 from estimation.causes.joint import Joint
 from estimation.causes.laid import NOTHING, Columns, Laid, Scale
+from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
-from estimation.causes.sources import Source, sources_at
+from estimation.causes.sources import Source
 from estimation.recording import FloatArray
 
 QUIET = 0.002

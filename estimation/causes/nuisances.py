@@ -9,8 +9,8 @@ import numpy as np
 from estimation.causes.candidates import Claim, groups_of, without_declared
 from estimation.causes.instruments import above, noisy_bands
 from estimation.causes.joint import Joint
+from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
-from estimation.causes.sources import sources_at
 
 SKEW_S = 1e-3
 MOST_SKEW = 2.0

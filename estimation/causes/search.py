@@ -19,11 +19,12 @@ from estimation.causes.candidates import (
 from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
+from estimation.causes.grids import RELATIVE, least_order
 from estimation.causes.joint import Joint
 from estimation.causes.nuisances import skews, with_skews
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.scoring import Scored, assessed, best_of_each
-from estimation.causes.sources import LATE, RELATIVE, Bend, Source, least_order
+from estimation.causes.sources import LATE, Bend, Source
 from estimation.causes.weights import reweighted
 from estimation.effects import Parameter
 

@@ -21,10 +21,10 @@ from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT
+from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
 from estimation.causes.scoring import assessed, best_of_each
 from estimation.causes.search import Found, search
-from estimation.causes.sources import sources_at
 from estimation.causes.verdict import answer, diagnose
 from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.result import Finding

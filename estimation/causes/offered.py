@@ -1,0 +1,211 @@
+"""Which effects of the catalogue a search offers at a place, and in which forms."""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from scipy.signal import detrend
+
+from estimation.causes.angles import travel_of
+from estimation.causes.equations import ANGLES, Layout
+from estimation.causes.grids import axis, last_order, least_order, turns
+from estimation.causes.orders import largest_orders, orders_elsewhere
+from estimation.causes.places import Place
+from estimation.causes.sources import Source
+from estimation.effects import Effect, catalogue
+
+DECLARED_ONLY = (
+    "arm.",
+    "compliance.",
+    "motor.torque_constant",
+    "sensor.offset",
+    "transmission.ratio",
+    "transmission.damping",
+)
+DECLARED_FRICTION = ("friction.coulomb", "friction.viscous")
+SYNONYMS = ("friction.capstan",)
+"""Effects that another one stands for.
+
+Over a constant wrap a cable's pull is multiplied by cosh(wrap) + sinh(wrap) sign: the second part
+is `friction.load`, the first one a factor of the load, which equations have.
+"""
+NOT_A_LOSS = (
+    "motor.",
+    "ripple.current",
+    "sensor.",
+    "transmission.",
+    "hysteresis.bouc_wen.twist",
+    "change.step.offset",
+    "inertia.missing",
+)
+OF_KIND: Mapping[str, tuple[str, ...]] = {
+    "lever": ("eccentric.load.pulley",),
+    "actuator": ("motor.", "ripple.current", "sensor.delay", "sensor.gain_nonlinear"),
+    "deflection": (
+        "coupling.kinematic",
+        "transmission.",
+        "hysteresis.bouc_wen.twist",
+        "hysteresis.presliding",
+        "ripple.output",
+        "eccentric.load",
+    ),
+    "torque sensor": (
+        "sensor.gain_nonlinear",
+        "sensor.drift",
+        "sensor.creep",
+        "sensor.lag",
+        "sensor.delay",
+        "sensor.crosstalk",
+        "change.step.offset",
+    ),
+    "angle sensor": ("sensor.encoder_inl", "sensor.delay", "sensor.lag"),
+}
+"""Kind of a place to the effects that act there; at a loss all others act but some."""
+
+FILTERS = (
+    "sensor.delay",
+    "sensor.lag",
+    "sensor.creep",
+    "motor.electrical",
+    "transmission.relaxation",
+)
+"""Effects that pass a reading through a linear filter, as smoothing its noise does."""
+
+LOOPS = ("hysteresis.", "transmission.backlash")
+"""Effects with a loop: at a constant load they follow the noise of its reading."""
+
+OVER_TIME = ("friction.warmup", "sensor.drift", "change.step", "motor.thermal")
+"""Effects that a time in the run stands for."""
+
+KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
+"""Equations of the reference rig that effects name."""
+
+OF_FEW = (
+    "friction.capstan",
+    "inertia.position",
+    "motor.dead_zone",  # of a command: the rig's motor is read by its measured current
+    "motor.gain_by_side",
+    "motor.gain_by_position",  # a rotating motor has a ripple of its constant instead
+)
+"""Families that the reference rig has in the equations that their effects name, and in no other."""
+
+OF_ANY_ORDER = ("ripple.motor", "ripple.output", "ripple.current", "eccentric.load")
+"""Waves that a shaft may make which turns by another ratio; an encoder is on its own shaft."""
+
+SERIES = ("inertia.position.harmonics",)
+"""Effects of several harmonics of one turn: over less than a turn these are nearly the same."""
+
+
+def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
+    """Yield every candidate at a place."""
+    repeats = repeats_one_reference(layout)
+    for effect in catalogue().values():
+        of_run_time = "clock" in effect.roles and effect.id.startswith(OVER_TIME)
+        if not _acts(effect, place) or (repeats and of_run_time):
+            continue
+        options = [[(role, c) for c in place.roles.get(role, ())] for role in effect.roles]
+        for channels in itertools.product(*options):
+            if any(c not in layout.runs[0].channels for _, c in channels):
+                continue
+            if effect.id in SERIES and not turns(layout, dict(channels)["position"]):
+                continue
+            odd = _follows_noise(layout, place, effect, channels)
+            axes = [axis(layout, place, effect, p, dict(channels)) for p in effect.shape]
+            for shape in itertools.product(*axes):
+                for parts in _parts(effect):
+                    yield Source(place, effect, tuple(channels), shape, parts, odd)
+            if effect.family in OF_ANY_ORDER:
+                yield from _between(layout, Source(place, effect, tuple(channels), (), (), odd))
+
+
+def _between(layout: Layout, wave: Source) -> Iterator[Source]:
+    """Yield a wave at the orders that are not whole and that the error shows most."""
+    angle = dict(wave.channels)[wave.turning]
+    if not angle.endswith("_angle_rad"):
+        return  # the periods of a position are on the grid
+    factors = [channel for role, channel in wave.channels if role != wave.turning]
+    least, most = least_order(layout, angle), last_order(layout, wave.effect, angle)
+    orders, tried = largest_orders(layout, wave.place.home, angle, factors, least, most)
+    (parts,) = _parts(wave.effect)
+    for order in orders:
+        if not _is_whole_elsewhere(layout, wave.effect, angle, order):
+            yield replace(wave, shape=(order,), parts=parts, tried=tried)
+
+
+def _is_whole_elsewhere(layout: Layout, effect: Effect, angle: str, order: float) -> bool:
+    """Whether an order of an angle is, within what the runs resolve, a whole one of another shaft.
+
+    What turns with that shaft makes it then; no belt nor gear that nobody declared is needed.
+    """
+    return any(
+        abs(there - round(there)) <= 2.0 * math.pi / travel_of(layout, other)
+        for other, there in orders_elsewhere(layout, angle, order)
+        if 0.5 < there <= last_order(layout, effect, other)
+    )
+
+
+def _follows_noise(
+    layout: Layout, place: Place, effect: Effect, channels: Sequence[tuple[str, str]]
+) -> bool:
+    """Whether an effect follows noise of a reading that is also in some equation's residual.
+
+    An angle has so little noise that only a linear filter shows it.
+    """
+    readings = [c for _, c in channels if c in layout.measured]
+    if effect.id.startswith(LOOPS) and effect.start() and place.kind == "deflection":
+        readings = [c for c in readings if not c.endswith(ANGLES)]
+    elif not effect.id.startswith(FILTERS):
+        return False
+    return any(
+        (c, entry.equation) not in layout.independent for c in readings for entry in place.enters
+    )
+
+
+def repeats_one_reference(layout: Layout) -> bool:
+    """Whether all runs repeat one motion, so that time within a run is the motion's phase."""
+    angle = next((n for n in layout.measured if n.endswith(("_angle_rad", "_position_m"))), "")
+    if not angle or len(layout.runs) < 2:
+        return False
+    size = min(len(r.channels[angle]) for r in layout.runs)
+    # less the mean speed: shafts that turn one way have angles that grow alike
+    moves = [detrend(r.channels[angle][:size]) for r in layout.runs]
+    first = moves[0]
+    return all(
+        float(first @ m) > 0.99 * math.sqrt(float(first @ first) * float(m @ m)) for m in moves[1:]
+    )
+
+
+def _acts(effect: Effect, place: Place) -> bool:
+    if effect.family in DECLARED_FRICTION or effect.id.startswith(DECLARED_ONLY):
+        return False
+    if effect.id in SYNONYMS:
+        return False
+    if effect.at_rest or effect.id == "coupling.torque":
+        return False
+    if not set(effect.roles) <= set(place.roles):
+        return False
+    kind = place.home.partition(".")[0]
+    if (place.home, place.kind) == ("calibration.encoder", "deflection"):
+        return False  # slower than a count a sample, the pattern of the counts passes for a bend
+    if effect.family in OF_FEW and kind in KNOWN and kind not in effect.balances:
+        return False  # a wrapped cable or a linkage, not a shaft in its bearings
+    if (place.kind == "lever") != (effect.id == "eccentric.load.pulley"):
+        return False
+    if place.kind == "deflection" and effect.id.endswith(".lugre"):
+        return False
+    if place.kind == "loss":
+        return not effect.id.startswith(NOT_A_LOSS)
+    return effect.id.startswith(OF_KIND[place.kind])
+
+
+def _parts(effect: Effect) -> list[tuple[int, ...]]:
+    """Return the sets of columns that compete: all, and of a polynomial every part of it."""
+    count = len(effect.amplitudes)
+    everything = tuple(range(count))
+    polynomial = effect.id.startswith(
+        ("sensor.gain_nonlinear", "friction.position", "spring.position.curved")
+    )
+    if not polynomial:
+        return [everything]
+    return [p for k in range(1, count + 1) for p in itertools.combinations(everything, k)]
