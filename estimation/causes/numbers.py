@@ -27,6 +27,8 @@ class Numbers:
         cause_cost: Further score that a cause costs.
         rare_cost: Further score that an unknown form costs, and acting in some of the runs only.
         kept_evidence: E-value on the test runs from which a cause is kept.
+        least_shown: Share of a cause's gain by which the logarithm of some equation's error on the
+            test runs falls, next to the other causes.
         runs_a_test_run: One run in so many is a test run.
         least_to_name: Training runs from which an effect is named: a sign test over one fewer
             cannot reach 5 %.
@@ -42,6 +44,7 @@ class Numbers:
     cause_cost: float = 0.1
     rare_cost: float = 0.16
     kept_evidence: float = 20.0
+    least_shown: float = 0.1
     runs_a_test_run: int = 3
     least_to_name: int = 5
 

@@ -46,17 +46,34 @@ class Refits:
         self.parts: dict[str, list[Part]] = {name: [] for name in layout.equations}
         self.open: set[str] = set()
 
-    def add(self, candidate: Candidate, acts_in: Mapping[str, bool]) -> None:
-        """Add a cause to every equation it enters, in the runs in which it acts."""
+    def add(self, candidate: Candidate, acts_in: Mapping[str, bool]) -> dict[str, Part]:
+        """Add a cause to every equation it enters, in the runs in which it acts.
+
+        Returns what it added, by equation.
+        """
         runs = [name for name, acts in acts_in.items() if acts]
+        added = {}
         for name in candidate.cause.place.equations:
             if (part := self._part(candidate, name, runs)) is not None:
                 self.parts[name] = [*self.parts[name], part]
+                added[name] = part
+        return added
 
-    def settle(self) -> None:
-        """Give every cause the shape that it was fitted with next to the others."""
+    def remove(self, parts: Mapping[str, Part]) -> None:
+        """Remove what a cause added."""
+        for name, part in parts.items():
+            self.parts[name] = [p for p in self.parts[name] if p is not part]
+
+    def settle(self) -> dict[int, Part]:
+        """Give every cause the shape that it was fitted with next to the others.
+
+        Returns the identity of each part to the part with that shape.
+        """
+        settled: dict[int, Part] = {}
         for name, refit in self.of.items():
-            self.parts[name] = refit.settled(self.parts[name])
+            before, self.parts[name] = self.parts[name], refit.settled(self.parts[name])
+            settled.update(zip(map(id, before), self.parts[name], strict=True))
+        return settled
 
     def before(self, name: str) -> Solved:
         """Return the declared equation."""
@@ -66,9 +83,10 @@ class Refits:
         """Return the equation with the causes added so far."""
         return self.of[name].solve(self.parts[name])
 
-    def test_errors(self, name: str) -> Errors:
-        """Return an equation's errors on the test runs with the causes so far."""
-        return self.of[name].errors(self.after(name), self.open)
+    def test_errors(self, name: str, without: Part | None = None) -> Errors:
+        """Return an equation's errors on the test runs with the causes so far, or all but one."""
+        parts = [p for p in self.parts[name] if p is not without]
+        return self.of[name].errors(self.of[name].solve(parts), self.open)
 
     def models(self) -> list[Model]:
         """Return the models with the causes that a file can hold; see `Refit.written`."""

@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.refit import Errors
+from estimation.causes.refit import Errors, Part
 from estimation.causes.refits import Refits
 from estimation.causes.scoring import DIGITS, probabilities
 from estimation.causes.search import Found, search
@@ -141,30 +141,44 @@ def answer(
     return Answer(diagnosis, layout, found, kept, refits, tuple(written))
 
 
+@dataclass(frozen=True)
+class _Opened:
+    """A cause that the refit has, with what it added to each equation and notes on it."""
+
+    kept: Kept
+    finding: Finding
+    parts: Mapping[str, Part]
+    notes: Sequence[str]
+
+
 def _judged(
     found: Found, held_out: HeldOut, refits: Refits
 ) -> tuple[list[tuple[Kept, Finding]], list[str]]:
     """Return the causes that the test runs confirm with their findings, and notes on the others."""
     confirmed, rejected = _confirmed(found, held_out)
-    notes = list[str]()
-    opened: dict[int, tuple[Kept, Finding]] = {}
-    places: dict[int, tuple[str, int]] = {}
+    opened: dict[int, _Opened] = {}
     spread = [len(one.scored.candidate.cause.place.equations) for one in confirmed]
     # each equation is refitted on its own, where a cause of several ones could stand in for another
     for k in sorted(range(len(confirmed)), key=spread.__getitem__):
-        one, candidate = confirmed[k], confirmed[k].scored.candidate
-        finding, more = _opened(one, [kept for kept, _ in opened.values()], held_out, refits)
-        if finding is None:
+        one = _opened(confirmed[k], [o.kept for o in opened.values()], held_out, refits)
+        if one is None:
+            candidate = confirmed[k].scored.candidate
             rejected.append((candidate, "does not lower the error on the test runs"))
-            continue
-        own = refits.parts[finding.balance]
-        opened[k], places[k] = (one, finding), (finding.balance, len(own) - 1)
-        notes += more
-        if not own[-1].is_written:
-            notes.append(_unwritten(candidate))
-    refits.settle()
-    parts = {k: refits.parts[name][at] for k, (name, at) in places.items()}
-    judged = [(replace(opened[k][0], part=parts[k]), opened[k][1]) for k in sorted(opened)]
+        else:
+            opened[k] = one
+    while (least := min(opened, key=lambda k: _shown(opened[k], refits), default=None)) is not None:
+        if _shown(opened[least], refits) >= refits.numbers.least_shown:
+            break
+        one = opened.pop(least)
+        refits.remove(one.parts)
+        rejected.append((one.kept.scored.candidate, "hardly lowers the error on the test runs"))
+    settled = refits.settle()
+    judged, notes = [], list[str]()
+    for k in sorted(opened):
+        one = opened[k]
+        part = settled[id(one.parts[one.finding.balance])]
+        judged.append((replace(one.kept, part=part), one.finding))
+        notes += one.notes
     names = [kept.scored.candidate.name for kept, _ in judged]
     return judged, [*notes, *(_rejected(one, why, names) for one, why in rejected)]
 
@@ -176,13 +190,8 @@ def _rejected(candidate: Candidate, why: str, found: Collection[object]) -> str:
     return f"{second}{family} ({place}) was found in the training runs and {why}."
 
 
-def _opened(
-    one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits
-) -> tuple[Finding | None, list[str]]:
-    """Add a cause to the equations it enters; return its finding, and notes on runs.
-
-    Without a finding, and nothing added, where no error on the test runs falls.
-    """
+def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) -> _Opened | None:
+    """Add a cause to the equations it enters; None, and nothing added, where no error falls."""
     candidate, sealed = one.scored.candidate, refits.sealed
     acts_in, settled = held_out.acts_in([k.scored.candidate for k in kept], candidate)
     if isinstance(candidate.cause, Moved) and 2 * sum(acts_in.values()) > len(acts_in):
@@ -200,11 +209,12 @@ def _opened(
         )
     place = candidate.cause.place
     before = {name: refits.test_errors(name) for name in place.equations}
-    refits.add(candidate, acts_in)
+    added = refits.add(candidate, acts_in)
     after = {name: refits.test_errors(name) for name in place.equations}
-    if not any(_is_lower(before[name], after[name], refits.numbers) for name in place.equations):
+    least = -0.5 * math.log1p(-refits.numbers.form_floor)
+    if all(_fall(before[name], after[name]) < least for name in place.equations):
         refits.parts, refits.open = parts, uncounted
-        return None, []
+        return None
     old, new = before[place.home], after[place.home]
     finding = replace(
         named(one, sealed.may_name),
@@ -214,7 +224,22 @@ def _opened(
         runs_total=len(old.by_run),
         runs_affected=tuple(name for name, acts in acts_in.items() if acts),
     )
-    return finding, notes
+    if place.home in added and not added[place.home].is_written:
+        notes.append(_unwritten(candidate))
+    return _Opened(one, finding, added, notes)
+
+
+def _shown(one: _Opened, refits: Refits) -> float:
+    """Return the largest fall of an equation's error next to the other causes, of the score's gain.
+
+    The search weighs an equation's bands by their noise and reads predictions; it may find what no
+    measured error shows.
+    """
+    falls = [
+        _fall(refits.test_errors(name, without=part), refits.test_errors(name))
+        for name, part in one.parts.items()
+    ]
+    return max(falls, default=0.0) / max(one.kept.likely[0].gain, np.finfo(float).tiny)
 
 
 def _confirmed(found: Found, held_out: HeldOut) -> tuple[list[Kept], list[tuple[Candidate, str]]]:
@@ -266,12 +291,13 @@ def _tested(one: Kept, others: Sequence[Candidate], held_out: HeldOut) -> tuple[
     return replace(one, scored=found[0].best, likely=found), total
 
 
-def _is_lower(before: Errors, after: Errors, numbers: Numbers) -> bool:
-    """Whether an error on the test runs falls, with each run's mean removed or left in."""
-    least = math.sqrt(1.0 - numbers.form_floor)
-    return (
-        after.rmse <= least * before.rmse or after.rmse_with_means <= least * before.rmse_with_means
-    )
+def _fall(before: Errors, after: Errors) -> float:
+    """Return by how much the logarithm of an error on the test runs falls.
+
+    With each run's mean removed or left in: the larger fall.
+    """
+    falls = ((before.rmse, after.rmse), (before.rmse_with_means, after.rmse_with_means))
+    return max(math.log(old / new) if new else (math.inf if old else 0.0) for old, new in falls)
 
 
 def _unwritten(candidate: Candidate) -> str:

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from benchmarks.rigs import CALIBRATE, DEVELOP, JUDGE, Case, draw, part_of
-from benchmarks.rigs.residual import EQUATIONS, Fitted, Prepared, fit, prepare
+from benchmarks.rigs.residual import EQUATIONS, Fitted, Prepared, declared, fit, prepare
+from benchmarks.rigs.stage import EPOCH_NS
+from estimation.campaign import with_campaign_time
+from estimation.causes.verdict import diagnose
+from estimation.diagnosis.split import split
 from estimation.recording import Recording
 from rig.importers.registry import open_campaign
 
@@ -109,6 +113,14 @@ def test_a_faulty_sensor_does_not_move_the_plant():
     for clean, recording in zip(case.twin, case.recordings, strict=True):
         changed = [n for n in others if not np.array_equal(clean[n], recording[n])]
         assert len(changed) == 1
+
+
+@pytest.mark.long
+def test_what_only_the_weighted_error_shows_is_no_finding():
+    runs = [
+        with_campaign_time(r, EPOCH_NS) for r in draw(1171005, "clean", gear_ratio=35.0).recordings
+    ]
+    assert not diagnose(runs, [declared(name) for name in EQUATIONS], split(runs)).findings
 
 
 def test_written_logs_read_back_equal(tmp_path):
