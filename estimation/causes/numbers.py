@@ -28,7 +28,7 @@ class Numbers:
         rare_cost: Further score that an unknown form costs, and acting in some of the runs only.
         kept_evidence: E-value on the test runs from which a cause is kept.
         least_shown: Share of a cause's gain by which the logarithm of some equation's error on the
-            test runs falls, next to the other causes.
+            test runs falls, next to all other causes or to those added before.
         runs_a_test_run: One run in so many is a test run.
         least_to_name: Training runs from which an effect is named: a sign test over one fewer
             cannot reach 5 %.

@@ -148,6 +148,7 @@ class _Opened:
     kept: Kept
     finding: Finding
     parts: Mapping[str, Part]
+    fall: float
     notes: Sequence[str]
 
 
@@ -171,7 +172,7 @@ def _judged(
             break
         one = opened.pop(least)
         refits.remove(one.parts)
-        rejected.append((one.kept.scored.candidate, "hardly lowers the error on the test runs"))
+        rejected.append((one.kept.scored.candidate, "barely lowers the error on the test runs"))
     settled = refits.settle()
     judged, notes = [], list[str]()
     for k in sorted(opened):
@@ -211,8 +212,8 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
     before = {name: refits.test_errors(name) for name in place.equations}
     added = refits.add(candidate, acts_in)
     after = {name: refits.test_errors(name) for name in place.equations}
-    least = -0.5 * math.log1p(-refits.numbers.form_floor)
-    if all(_fall(before[name], after[name]) < least for name in place.equations):
+    fall = max(_fall(before[name], after[name]) for name in place.equations)
+    if fall < -0.5 * math.log1p(-refits.numbers.form_floor):
         refits.parts, refits.open = parts, uncounted
         return None
     old, new = before[place.home], after[place.home]
@@ -226,20 +227,21 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
     )
     if place.home in added and not added[place.home].is_written:
         notes.append(_unwritten(candidate))
-    return _Opened(one, finding, added, notes)
+    return _Opened(one, finding, added, fall, notes)
 
 
 def _shown(one: _Opened, refits: Refits) -> float:
-    """Return the largest fall of an equation's error next to the other causes, of the score's gain.
+    """Return the largest fall of an equation's error as a share of what the search gained.
 
-    The search weighs an equation's bands by their noise and reads predictions; it may find what no
+    Next to all other causes, or to those added before: another one may have the same columns. The
+    search weighs an equation's bands by their noise and reads predictions; it may find what no
     measured error shows.
     """
     falls = [
         _fall(refits.test_errors(name, without=part), refits.test_errors(name))
         for name, part in one.parts.items()
     ]
-    return max(falls, default=0.0) / max(one.kept.likely[0].gain, np.finfo(float).tiny)
+    return max(one.fall, *falls) / max(one.kept.likely[0].gain, np.finfo(float).tiny)
 
 
 def _confirmed(found: Found, held_out: HeldOut) -> tuple[list[Kept], list[tuple[Candidate, str]]]:
