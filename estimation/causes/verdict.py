@@ -296,10 +296,12 @@ def _tested(one: Kept, others: Sequence[Candidate], held_out: HeldOut) -> tuple[
 def _fall(before: Errors, after: Errors) -> float:
     """Return by how much the logarithm of an error on the test runs falls.
 
-    With each run's mean removed or left in: the larger fall.
+    With each run's mean removed or left in: the larger fall; zero where the other one rises by
+    more.
     """
-    falls = ((before.rmse, after.rmse), (before.rmse_with_means, after.rmse_with_means))
-    return max(math.log(old / new) if new else (math.inf if old else 0.0) for old, new in falls)
+    pairs = ((before.rmse, after.rmse), (before.rmse_with_means, after.rmse_with_means))
+    falls = [math.log(old / new) if new else (math.inf if old else 0.0) for old, new in pairs]
+    return max(falls) if sum(falls) > 0.0 else min(0.0, *falls)
 
 
 def _unwritten(candidate: Candidate) -> str:

@@ -44,3 +44,9 @@ def test_absent_machines_are_named_and_the_others_studied(data, answered):
     text = page.read_text()
     assert "no recordings in sts3215" in text
     assert "(../machines/emps.md)" in text
+
+
+@pytest.mark.long
+def test_no_finding_raises_the_error_on_held_out_recordings(measured_data, answered):
+    rows = answered("study machines", measured_data / "machines")["rows"]
+    assert all(row["found_percent"] <= 1.01 * row["declared_percent"] for row in rows)
