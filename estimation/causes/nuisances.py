@@ -21,7 +21,8 @@ def skews(joint: Joint) -> list[Claim]:
     """Return the readings that are late or early by a little, each as a short delay.
 
     No two boards share a clock, and a reading has an age. A delay as short as that is part of the
-    base, no finding; a longer one is. Where a reading is differentiated its noise hides as short a
+    base, no finding; a longer one is, and so is none that is short only because it stands in for a
+    longer one of another reading. Where a reading is differentiated its noise hides as short a
     delay.
     """
     plain = [
@@ -36,13 +37,17 @@ def skews(joint: Joint) -> list[Claim]:
             (s for s in sources_at(joint.layout, place) if s.effect.id == "sensor.delay"), 1
         )
     ]
-    found = [one for group in groups_of(joint, late) for one in group.candidates]
-    delays = _with_delays(joint, found).left_out([[]]).base[0][joint.size :]
-    return [
-        Claim(one.cause)
-        for one, delay in zip(found, delays, strict=True)
-        if abs(delay / one.size[0]) < MOST_SKEW
-    ]
+    every = sum(claim.cause.place.kind == "angle sensor" for claim in late)
+    while True:
+        found = [one for group in groups_of(joint, late) for one in group.candidates]
+        delays = _with_delays(joint, found).left_out([[]]).base[0][joint.size :]
+        sizes = np.array([d / one.size[0] for d, one in zip(delays, found, strict=True)])
+        angles = np.array([one.cause.place.kind == "angle sensor" for one in found], dtype=bool)
+        if 0 < angles.sum() == every:  # only differences are measured, and no reading is early
+            sizes[angles] -= sizes[angles].min()
+        late = [Claim(one.cause) for one, x in zip(found, sizes, strict=True) if abs(x) < MOST_SKEW]
+        if len(late) == len(found):
+            return late
 
 
 def with_skews(joint: Joint, late: Sequence[Claim]) -> Joint:

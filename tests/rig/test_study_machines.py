@@ -47,6 +47,7 @@ def test_absent_machines_are_named_and_the_others_studied(data, answered):
 
 
 @pytest.mark.long
+@pytest.mark.measured
 def test_no_finding_raises_the_error_on_held_out_recordings(measured_data, answered):
     rows = answered("study machines", measured_data / "machines")["rows"]
     assert all(row["found_percent"] <= 1.01 * row["declared_percent"] for row in rows)
