@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.causes.candidates import Claim, groups_of, without_declared
+from estimation.causes.candidates import Candidate, Claim, groups_of, without_declared
+from estimation.causes.folds import Folds
 from estimation.causes.instruments import above, noisy_bands
 from estimation.causes.joint import Joint
 from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
+from estimation.causes.scoring import assessed
+from estimation.causes.sources import Source
 
 SKEW_S = 1e-3
 MOST_SKEW = 2.0
@@ -48,6 +51,31 @@ def skews(joint: Joint) -> list[Claim]:
         late = [Claim(one.cause) for one, x in zip(found, sizes, strict=True) if abs(x) < MOST_SKEW]
         if len(late) == len(found):
             return late
+
+
+def noticed(
+    joint: Joint, late: Sequence[Claim], causes: Sequence[Candidate], folds: Folds
+) -> dict[str, float]:
+    """Return the angles whose short delay next to causes is worth a cause's price, and it, s.
+
+    Of angles only differences are measured: each is judged without the delays of the others.
+    """
+    others = [one for one in late if one.cause.place.kind != "angle sensor"]
+    base = with_skews(joint, others)
+    for one in causes:
+        base = base.with_cause(one.laid, one.precision)
+    found = {}
+    for claim in late:
+        if claim in others or not isinstance(claim.cause, Source):
+            continue
+        times = [replace(claim.cause, shape=(share * SKEW_S,)) for share in (0.25, 0.5, 1.0, 2.0)]
+        scored = assessed(base, groups_of(base, [Claim(one) for one in times]), folds)
+        best = max(scored, key=lambda s: s.score, default=None)
+        if best is not None and best.score > 0.0 and isinstance(best.candidate.cause, Source):
+            (delay_s,) = best.candidate.cause.shape
+            size = float(best.amplitudes[0] / best.candidate.size[0])
+            found[claim.cause.place.name.removeprefix("sensor ")] = size * delay_s
+    return found
 
 
 def with_skews(joint: Joint, late: Sequence[Claim]) -> Joint:

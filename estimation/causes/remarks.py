@@ -23,6 +23,16 @@ def apart(layout: Layout, found: Iterable[tuple[str, str, float]]) -> Iterator[s
         )
 
 
+def late(found: Mapping[str, float]) -> Iterator[str]:
+    """Yield the angles that are later than others by a little, a sentence each."""
+    for reading, delay_s in found.items():
+        yield (
+            f"{reading}: {1e3 * delay_s:.2g} ms later than the other angles. The search takes so"
+            " short a delay into account and does not count it as a finding; it remains in the"
+            " errors."
+        )
+
+
 def left(layout: Layout, errors: Mapping[str, float], explained: Set[str]) -> Iterator[str]:
     """Yield how large the errors left are next to the noise of the readings, a sentence each.
 

@@ -1,6 +1,6 @@
 """The search over hypotheses: sets of causes, scored together, extended one cause at a time."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
 from estimation.causes.grids import RELATIVE, least_order
 from estimation.causes.joint import Joint
-from estimation.causes.nuisances import skews, with_skews
+from estimation.causes.nuisances import noticed, skews, with_skews
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.scoring import Scored, assessed, best_of_each
 from estimation.causes.sources import LATE, Bend, Source
@@ -48,13 +48,15 @@ class Found:
         joint: The regression of the training runs without causes.
         first: Every candidate when nothing is claimed, best first.
         late: Short delays of readings that are part of the base.
+        noticed: Angles with such a delay that lowers the error as a cause would; the delay, s.
     """
 
     causes: Sequence[Scored]
     conditional: Sequence[Sequence[Scored]]
     joint: Joint
     first: Sequence[Scored]
-    late: Sequence[Claim] = ()
+    late: Sequence[Claim]
+    noticed: Mapping[str, float]
 
 
 def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
@@ -62,12 +64,14 @@ def search(train: Layout, numbers: Numbers = DEFAULT) -> Found:
     plain = Joint(train, numbers)
     late = skews(plain)
     joint = with_skews(plain, late)
-    ranking = Ranking(joint, candidates(joint), folds_of(train))
+    folds = folds_of(train)
+    ranking = Ranking(joint, candidates(joint), folds)
     first = ranking.next_to([])
-    if not first or first[0].score < 0.0:
-        return Found([], [], joint, first, late)
-    causes, conditional = hypothesis(ranking, _starts(first))
-    return Found(causes, conditional, joint, first, late)
+    causes, conditional = list[Scored](), list[Sequence[Scored]]()
+    if first and first[0].score >= 0.0:
+        causes, conditional = hypothesis(ranking, _starts(first))
+    small = noticed(plain, late, [one.candidate for one in causes], folds)
+    return Found(causes, conditional, joint, first, late, small)
 
 
 def hypothesis(

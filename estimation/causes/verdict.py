@@ -130,6 +130,7 @@ def answer(
         notes=(
             *remarks.apart(layout, held_out.apart(found_in)),
             *filter(None, [claim(sealed)]),
+            *remarks.late(found.noticed),
             *remarks.left(layout, left, explained),
             *remarks.at_bounds(written),
             *remarks.limits(timed, layout, sealed),

@@ -496,20 +496,33 @@ def test_a_gear_and_its_sensors_are_kept_apart(fault: dict[str, float], family: 
     assert finding.rmse_after < (0.6 if "slow" in fault else 1.0) * finding.rmse_before
 
 
-def test_the_middle_one_of_three_encoders_is_late_and_not_the_others_early() -> None:
+def _three_encoders(late_s: float) -> list[Recording]:
+    """Return runs of motor, spindle and jaw; the spindle's encoder is late."""
     random, runs = np.random.default_rng(1), []
     for one in cabled():
         spindle = one["spindle_angle_rad"]
-        late = np.interp(one.time_s - 0.004, one.time_s, spindle)
+        late = np.interp(one.time_s - late_s, one.time_s, spindle)
         columns = {
             "motor_angle_rad": 35.0 * (spindle + one["proximal_torque_n_m"] / 50.0),
             "spindle_angle_rad": late + random.normal(0.0, 1e-5, len(late)),
         }
         runs.append(one.with_columns(**columns))
-    finding = _only(runs, gearbox(), *cable())
+    return runs
+
+
+def test_the_middle_one_of_three_encoders_is_late_and_not_the_others_early() -> None:
+    finding = _only(_three_encoders(0.004), gearbox(), *cable())
     assert {finding.family, *finding.alternatives} == {"sensor.delay", "sensor.lag"}
     assert finding.place == "sensor spindle_angle_rad"
     assert finding.parameters["lateness"].value == pytest.approx(0.004, rel=0.02)
+
+
+def test_an_encoder_that_is_late_by_a_millisecond_is_remarked_on() -> None:
+    runs = _three_encoders(0.001)
+    diagnosis = diagnose(runs, [gearbox(), *cable()], split(runs))
+    assert not diagnosis.findings
+    (note,) = (n for n in diagnosis.notes if "later than the other angles" in n)
+    assert note.startswith("spindle_angle_rad: 1 ms")
 
 
 def test_a_wave_of_the_slow_shaft_is_no_broken_order_of_the_fast_one() -> None:
