@@ -4,7 +4,7 @@ Candidates of one place with as many columns each share every step, so a search 
 them costs a few large products.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -68,6 +68,7 @@ class Outcome:
         slopes: Equation to the factor of each channel times a constant within runs, the causes'
             own contribution included, shape (causes, channels).
         by_run: Weighted products within runs, with the base's residual as the target.
+        declared: Declared amplitudes next to each cause, shape (causes, declared).
     """
 
     promising: NDArray[np.bool_]
@@ -76,6 +77,7 @@ class Outcome:
     changes: Mapping[str, FloatArray]
     slopes: Mapping[str, FloatArray]
     by_run: Products
+    declared: FloatArray
 
 
 def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
@@ -101,20 +103,27 @@ def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
     return Block(laid, of, joint.taken_off(laid) if known is None else known.taken)
 
 
-def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) -> Outcome:
+def evaluate(
+    joint: Joint,
+    block: Block,
+    folds: Folds,
+    precision: FloatArray,
+    usual: FloatArray,
+) -> Outcome:
     """Fit every cause together with the base and return its errors on what was left out.
 
-    Prior precisions of the amplitudes have the shape (causes, k).
+    Prior precisions of the amplitudes have the shape (causes, k), the parameters of the base alone
+    (base,).
     """
     (base,), (amplitudes,) = _Fitting(joint, block, precision).left_out([[]])
-    promising = _gain(joint, block, base, amplitudes) >= joint.numbers.cause_cost
+    promising = _gain(joint, block, base, amplitudes, usual) >= joint.numbers.cause_cost
     errors = []
     if promising.any():
         errors = _errors(joint, block.only(promising), folds, precision[promising])
-    inside, usual = [p for p in block.of if p[1] == "within"], joint.left_out([[]]).base[0]
+    inside = [p for p in block.of if p[1] == "within"]
     weights = joint.weights
     cross, own, right = block.summed(weights, inside)
-    declared = joint.whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes)
+    declared = _declared(joint, block, base, amplitudes)
     changes, slopes = {}, {}
     for name in {name for name, _ in block.of}:
         at = [*joint.linear(name)]
@@ -134,7 +143,29 @@ def evaluate(joint: Joint, block: Block, folds: Folds, precision: FloatArray) ->
     right = right + (gram[:, None, None, :count, -1] @ block.taken)[:, :, 0]
     cross = cross + gram[:, None, :-1, :count] @ block.taken
     by_run = Products(cross, own, right - usual @ cross)
-    return Outcome(promising, errors, amplitudes, changes, slopes, by_run)
+    return Outcome(promising, errors, amplitudes, changes, slopes, by_run, declared)
+
+
+def rising(
+    joint: Joint, block: Block, precision: FloatArray
+) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
+    """Yield which amplitudes of the base stay held at their bound next to some causes, and these.
+
+    Shapes (declared,) and (causes,). Only where not all stay that the base alone holds.
+    """
+    if not joint.held.any():
+        return
+    free = joint.holding(np.zeros_like(joint.held))
+    (base,), (amplitudes,) = _Fitting(free, block, precision).left_out([[]])
+    below = joint.held & (_declared(free, block, base, amplitudes) < 0.0)
+    for held in np.unique(below, axis=0):
+        if (held != joint.held).any():
+            yield held, (below == held).all(axis=1)
+
+
+def _declared(joint: Joint, block: Block, base: FloatArray, amplitudes: FloatArray) -> FloatArray:
+    """Return the declared amplitudes, with what was taken off the columns of causes."""
+    return np.asarray(joint.whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes))
 
 
 def _errors(
@@ -178,12 +209,14 @@ class _Fitting:
         return fits.base[:, None] - (through @ amplitudes)[..., 0], amplitudes[..., 0]
 
 
-def _gain(joint: Joint, block: Block, base: FloatArray, amplitudes: FloatArray) -> FloatArray:
+def _gain(
+    joint: Joint, block: Block, base: FloatArray, amplitudes: FloatArray, usual: FloatArray
+) -> FloatArray:
     """Return the score of causes on the runs that they were fitted on, shape (causes,).
 
     What is left out shows less. A cause that is not even worth its least price here is none.
     """
-    usual, total = np.append(joint.left_out([[]]).base[0], -1.0), np.zeros(len(base))
+    usual, total = np.append(usual, -1.0), np.zeros(len(base))
     for p in joint.parts:
         gram, samples = joint.gram[p].sum(axis=0), joint.samples[p].sum()
         products = Products(*(x.sum(axis=0)[None] for x in block.of[p])) if p in block.of else None

@@ -7,6 +7,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.causes.blocks import Block, block_of
 from estimation.causes.equations import Layout, RunSignals
@@ -100,6 +101,11 @@ class Group:
     laid: Laid
     precision: FloatArray
     block: Block | None = None
+
+    def only(self, chosen: NDArray[np.intp]) -> "Group":
+        """Return some of the candidates, without their products."""
+        kept = [self.candidates[int(k)] for k in chosen]
+        return Group(kept, self.laid.only(chosen), self.precision[chosen])
 
     def within(self, equations: Container[str]) -> "Group":
         """Return the same candidates as if they entered some of the equations only."""

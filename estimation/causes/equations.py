@@ -111,6 +111,10 @@ class RunSignals:
         return found
 
 
+LOSSES = ("friction.", "transmission.damping")
+"""Families of declared terms that take energy from the motion."""
+
+
 class Column(NamedTuple):
     """A declared column.
 
@@ -118,11 +122,13 @@ class Column(NamedTuple):
         sign: With which its term enters.
         channel: What it is a constant times; empty where it is another function.
         of_shape: Whether it is the derivative by a shape.
+        is_bounded: Whether it is the amplitude of a loss, which cannot be negative.
     """
 
     sign: int
     channel: str
     of_shape: bool
+    is_bounded: bool
 
 
 @dataclass(frozen=True)
@@ -182,8 +188,10 @@ class Equation:
         for term in self.terms:
             linear = isinstance(term.effect, Proportional)
             channel = next(iter(term.channels.values())) if linear else ""
-            found += [Column(term.sign, channel, False)] * len(term.effect.amplitudes)
-            found += [Column(term.sign, channel, True)] * len(term.effect.shape)
+            sizes = term.effect.amplitudes
+            is_loss = term.effect.family.startswith(LOSSES)
+            found += [Column(term.sign, channel, False, is_loss and p.lower == 0.0) for p in sizes]
+            found += [Column(term.sign, channel, True, False)] * len(term.effect.shape)
         return found
 
     def noise(self, run: RunSignals) -> FloatArray:

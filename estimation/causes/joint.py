@@ -20,6 +20,9 @@ from estimation.causes.laid import TINY, Laid, Part, Projection, centred, invers
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.recording import FloatArray
 
+HELD = 1e6
+"""Precision of an amplitude that is held, in squares of its column: as good as no column."""
+
 Family = Sequence[Sequence[int]]
 """Folds of one kind: each is the runs that are left out together."""
 
@@ -71,15 +74,21 @@ class Joint:
         declared: Parameters of the declared model on all runs.
         projection: Lays candidates out.
         power: Weighted square of all targets within runs.
+        held: Which declared amplitudes are held at zero, their bound, shape (declared,): what takes
+            an inertia, a friction or a damping below zero is a cause that the equation lacks.
     """
 
-    def __init__(self, layout: Layout, numbers: Numbers = DEFAULT) -> None:
+    def __init__(
+        self, layout: Layout, numbers: Numbers = DEFAULT, *, is_one_machine: bool = True
+    ) -> None:
         self.layout, self.numbers = layout, numbers
+        self._is_one_machine = is_one_machine
         self.runs = layout.runs
         counts = [len(equation.kinds) for equation in layout.equations.values()]
         ends = itertools.pairwise(itertools.accumulate(counts, initial=0))
         self._equations_at = {n: range(*at) for n, at in zip(layout.equations, ends, strict=True)}
         self._added, self.taken = np.zeros(0), np.zeros((self._declared_size, 0))
+        self._fits: dict[tuple[tuple[int, ...], ...], LeftOut] = {}
         self.tables: dict[Part, FloatArray] = {}
         self.at: dict[Part, Sequence[int]] = {}
         self.samples: dict[Part, FloatArray] = {}
@@ -169,16 +178,44 @@ class Joint:
             for p in self.parts
         }
         self._run_grams = np.asarray(sum(self.weights[p] * self.gram[p] for p in self.parts))
-        self._fits: dict[tuple[tuple[int, ...], ...], LeftOut] = {}
         whole = self._run_grams.sum(axis=0)
         # no term exceeds half of all signals, and a shape is known to within its own size
         size = self._declared_size
         self._precision = 4.0 * np.diag(whole)[:size] / float(whole[-1, -1])
         shapes = [c.of_shape for e in self.layout.equations.values() for c in e.kinds]
         self._precision[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
+        self._unheld = self._precision
+        bounded = np.zeros(size, dtype=np.bool_)
+        kinds = [c for e in self.layout.equations.values() for c in e.kinds]
+        bounded[: len(kinds)] = [c.is_bounded for c in kinds]
+        self._hold(np.zeros_like(bounded))
+        # of two machines together a friction may be negative: what differs is then a change
+        while (
+            self._is_one_machine
+            and (below := bounded & ~self.held & (self._amplitudes < 0.0)).any()
+        ):
+            self._hold(self.held | below)
+
+    @property
+    def _amplitudes(self) -> FloatArray:
+        """Amplitudes of the declared columns on all runs."""
+        return self.whole(self.left_out(((),)).base[0])
+
+    def _hold(self, held: NDArray[np.bool_]) -> None:
+        """Hold declared amplitudes at their bound of zero, shape (declared,)."""
+        size, power = self._declared_size, np.diag(self._run_grams.sum(axis=0))
+        self.held, self._fits = held, {}
+        self._precision = self._unheld + np.where(held, HELD * power[:size], 0.0)
         self._prior = np.diag(np.append(self._precision, self._added))
         self._prior[:, size:] += self.prior_products(self.taken)
         self._prior[size:, :size] = self._prior[:size, size:].T
+
+    def holding(self, held: NDArray[np.bool_]) -> "Joint":
+        """Return the regression with other declared amplitudes held at their bound of zero."""
+        made = object.__new__(Joint)
+        made.__dict__.update(self.__dict__)
+        made._hold(held)
+        return made
 
     def left_out(self, family: Family) -> LeftOut:
         """Return the base fitted without the runs of each fold."""
@@ -357,7 +394,7 @@ class Joint:
         """Return channel to weight of the terms that are a constant times it, next to the base."""
         base, found = self.whole(self.left_out(((),)).base[0]), dict[str, float]()
         kinds = self.layout.equations[name].kinds
-        for at, (sign, channel, _) in zip(self._equations_at[name], kinds, strict=True):
+        for at, (sign, channel, *_) in zip(self._equations_at[name], kinds, strict=True):
             if channel:
                 found[channel] = found.get(channel, 0.0) + sign * float(base[at])
         return found

@@ -1,16 +1,18 @@
 """The score of a cause next to others, its price, and the probability of each."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.causes.blocks import Outcome, Products, block_of, evaluate
+from estimation.causes.blocks import Block, Outcome, Products, block_of, evaluate, rising
 from estimation.causes.candidates import Candidate, Group
 from estimation.causes.folds import Folds
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
+from estimation.causes.laid import Part
 from estimation.causes.numbers import Numbers
 from estimation.derived import origin_of
 from estimation.recording import FloatArray
@@ -72,25 +74,90 @@ class Scored:
 
 
 def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
-    """Return the score of each candidate given the base; impossible amplitudes are left out."""
-    before, spreads = joint.base_errors(folds), [joint.extrapolated(family) for family in folds]
-    out = []
+    """Return the score of each candidate given the base; impossible amplitudes are left out.
+
+    A declared amplitude that the base holds at its bound may rise from it next to a candidate.
+    """
+    usual = _Usual.of(joint, folds)
+    regressions, out = {joint.held.tobytes(): joint}, []
     for group in pool:
         block = block_of(joint, group.laid, group.block)
-        outcome = evaluate(joint, block, folds, group.precision)
-        replaces = _in_readings(joint, group.candidates, outcome)
-        gains = np.zeros(len(group.candidates))
-        if outcome.errors:
-            gains[outcome.promising] = joint.score(spreads, before, outcome.errors)
+        judged = _judged(joint, group, block, usual)
+        for held, chosen in rising(joint, block, group.precision):
+            if held.tobytes() not in regressions:
+                regressions[held.tobytes()] = joint.holding(held)
+            some = group.only(np.flatnonzero(chosen))
+            further = _judged(regressions[held.tobytes()], some, block.only(chosen), usual)
+            judged = judged.or_better(further, chosen, joint.held & ~held)
         for k, candidate in enumerate(group.candidates):
-            amplitudes = outcome.amplitudes[k]
-            if replaces[k] or _is_impossible(candidate, amplitudes):
+            amplitudes = judged.amplitudes[k]
+            if judged.replaces[k] or _is_impossible(candidate, amplitudes):
                 continue
-            gain, price = round(float(gains[k]), DIGITS), _price(candidate, joint)
+            gain, price = round(float(judged.gains[k]), DIGITS), _price(candidate, joint)
             score = gain - price.score(joint.numbers)
-            by_run = Products(*(x[:, k] for x in outcome.by_run))
+            by_run = Products(*(x[:, k] for x in judged.by_run))
             out.append(Scored(candidate, score, gain, price, amplitudes, by_run))
     return out
+
+
+class _Usual(NamedTuple):
+    """The base alone: its parameters, and its squared errors on what the folds left out."""
+
+    base: FloatArray
+    errors: Sequence[Mapping[Part, FloatArray]]
+    spreads: Sequence[Mapping[Part, float]]
+    folds: Folds
+
+    @classmethod
+    def of(cls, joint: Joint, folds: Folds) -> "_Usual":
+        spreads = [joint.extrapolated(family) for family in folds]
+        return cls(joint.left_out([[]]).base[0], joint.base_errors(folds), spreads, folds)
+
+
+class _Judged(NamedTuple):
+    """The candidates of a group.
+
+    Attributes:
+        gains: Mean of the families of folds, shape (n,).
+        amplitudes: On all runs, shape (n, k).
+        replaces: Whether one replaces a reading, shape (n,).
+        declared: Declared amplitudes next to each, shape (n, declared).
+        by_run: Products of the columns in each run.
+    """
+
+    gains: FloatArray
+    amplitudes: FloatArray
+    replaces: NDArray[np.bool_]
+    declared: FloatArray
+    by_run: Products
+
+    def or_better(
+        self, other: "_Judged", chosen: NDArray[np.bool_], freed: NDArray[np.bool_]
+    ) -> "_Judged":
+        """Return this with what others show of the chosen candidates where that is more.
+
+        The amplitudes that were freed have to be within their bound.
+        """
+        possible = ~other.replaces & (other.declared[:, freed] >= 0.0).all(axis=1)
+        better = possible & (other.gains > np.where(self.replaces, -np.inf, self.gains)[chosen])
+        at = np.flatnonzero(chosen)[better]
+        made = self._replace(
+            gains=self.gains.copy(),
+            amplitudes=self.amplitudes.copy(),
+            replaces=self.replaces.copy(),
+        )
+        made.gains[at], made.amplitudes[at] = other.gains[better], other.amplitudes[better]
+        made.replaces[at] = False
+        return made
+
+
+def _judged(joint: Joint, group: Group, block: Block, usual: _Usual) -> _Judged:
+    outcome = evaluate(joint, block, usual.folds, group.precision, usual.base)
+    replaces = _in_readings(joint, group.candidates, outcome)
+    gains = np.zeros(len(group.candidates))
+    if outcome.errors:
+        gains[outcome.promising] = joint.score(usual.spreads, usual.errors, outcome.errors)
+    return _Judged(gains, outcome.amplitudes, replaces, outcome.declared, outcome.by_run)
 
 
 def best_of_each(scored: Sequence[Scored]) -> list[Scored]:

@@ -87,7 +87,7 @@ def compare(
     add_instruments(layout, train)
     fitted = layout.select(train)
     is_b = [run.name.startswith(B) for run in fitted.runs]
-    plain = Joint(fitted, numbers)
+    plain = Joint(fitted, numbers, is_one_machine=False)
     late = skews(plain)
     joint = with_skews(plain, late)
     pool = pool_of(joint, claims(fitted, is_b))
@@ -215,7 +215,7 @@ def _predicted(
     """Return the errors on the third campaign's runs, by four models."""
     names = [run.name for run in layout.runs]
     of = {mark: np.array([float(n.startswith(mark)) for n in names]) for mark in (A, B, ON)}
-    plain = with_skews(Joint(layout), late)
+    plain = with_skews(Joint(layout, is_one_machine=False), late)
     errors = [_rms(plain, plain.fitted_on(of[side]), of[ON]) for side in (A, B)]
     for taken_as in (A, B):
         grown = plain
