@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,13 +103,7 @@ def answer(
     findings = [
         replace(f, parameters=parameters_of(kept, f, written, refits)) for kept, f in judged
     ]
-    notes += [
-        f"{f.balance}: {f.form} is reported and not added to the model file; next to the declared"
-        " terms not all of its amplitudes can be identified."
-        for kept, f in judged
-        if kept.part is not None and kept.part.is_written
-        if not any(written_term(kept, m) for m in written if m.balance == f.balance)
-    ]
+    notes += _unidentified(judged, written)
     if not findings and sealed.may_name and (changing := unsteady(held_out)):
         findings = [unpredicted(changing, refits)]
         left[changing.equation] = findings[0].rmse_after
@@ -303,6 +297,19 @@ def _fall(before: Errors, after: Errors) -> float:
     pairs = ((before.rmse, after.rmse), (before.rmse_with_means, after.rmse_with_means))
     falls = [math.log(old / new) if new else (math.inf if old else 0.0) for old, new in pairs]
     return max(falls) if sum(falls) > 0.0 else min(0.0, *falls)
+
+
+def _unidentified(
+    judged: Sequence[tuple[Kept, Finding]], written: Sequence[Model]
+) -> Iterator[str]:
+    """Yield the findings that a model file could hold and does not, a sentence each."""
+    for kept, f in judged:
+        model = next(m for m in written if m.balance == f.balance)
+        if kept.part is not None and kept.part.is_written and not written_term(kept, model):
+            yield (
+                f"{f.balance}: {f.form} is reported and not added to the model file; next to the"
+                " declared terms not all of its amplitudes can be identified."
+            )
 
 
 def _unwritten(candidate: Candidate) -> str:
