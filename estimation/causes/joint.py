@@ -75,7 +75,7 @@ class Joint:
         projection: Lays candidates out.
         power: Weighted square of all targets within runs.
         held: Which declared amplitudes are held at zero, their bound, shape (declared,): what takes
-            an inertia, a friction or a damping below zero is a cause that the equation lacks.
+            a friction or a damping below zero is a cause that the equation lacks.
     """
 
     def __init__(

@@ -46,7 +46,7 @@ def skews(joint: Joint) -> list[Claim]:
         delays = _with_delays(joint, found).left_out([[]]).base[0][joint.size :]
         sizes = np.array([d / one.size[0] for d, one in zip(delays, found, strict=True)])
         angles = np.array([one.cause.place.kind == "angle sensor" for one in found], dtype=bool)
-        if 0 < angles.sum() == every:  # only differences are measured, and no reading is early
+        if 1 < angles.sum() == every:  # only differences are measured, and no reading is early
             sizes[angles] -= sizes[angles].min()
         late = [Claim(one.cause) for one, x in zip(found, sizes, strict=True) if abs(x) < MOST_SKEW]
         if len(late) == len(found):
@@ -61,6 +61,8 @@ def noticed(
     Of angles only differences are measured: each is judged without the delays of the others.
     """
     others = [one for one in late if one.cause.place.kind != "angle sensor"]
+    if len(late) - len(others) < 2:
+        return {}
     base = with_skews(joint, others)
     for one in causes:
         base = base.with_cause(one.laid, one.precision)

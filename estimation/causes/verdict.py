@@ -162,8 +162,10 @@ def _judged(
             rejected.append((candidate, "does not lower the error on the test runs"))
         else:
             opened[k] = one
-    while (least := min(opened, key=lambda k: _shown(opened[k], refits), default=None)) is not None:
-        if _shown(opened[least], refits) >= refits.numbers.least_shown:
+    while opened:
+        shown = {k: _shown(one, refits) for k, one in opened.items()}
+        least = min(shown, key=shown.__getitem__)
+        if shown[least] >= refits.numbers.least_shown:
             break
         one = opened.pop(least)
         refits.remove(one.parts)
