@@ -60,7 +60,7 @@ def _learn(
     from estimation.estimators.network import NetworkRecipe
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.models.origins import with_origin
-    from rig.reports.diagnosis_words import display
+    from rig.reports.diagnosis_words import display, in_unit
 
     target = recipe.target
     campaign, steps = with_one_zero(campaign, target)
@@ -83,7 +83,7 @@ def _learn(
         scale, unit = display(unit_of(target), error.rmse)
         said.append(
             f"{target}, closing samples of {len(kept)} runs, each held out once:"
-            f" RMSE {scale * error.rmse:.3g} {unit}."
+            f" RMSE {in_unit(scale * error.rmse, unit)}."
         )
     if out is not None:
         with_origin(estimator, campaign, figures).save(out)

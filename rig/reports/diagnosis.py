@@ -117,7 +117,8 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
             f"{name} {text}".strip() for name, text in words.sizes_of(finding).items()
         )
         facts.append(("Size", sizes))
-    fall = f"{scale * finding.rmse_before:.3g} to {scale * finding.rmse_after:.3g} {unit}"
+    after = words.in_unit(scale * finding.rmse_after, unit)
+    fall = f"{scale * finding.rmse_before:.3g} to {after}"
     runs = f"lower in {finding.runs_improved} of {finding.runs_total} held-out test runs"
     facts.append(("Error", f"{fall}, {runs}"))
     if variables:

@@ -37,7 +37,7 @@ def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:
     tested = counted(finding.runs_total, "test run" if exploratory else "held-out test run")
     fall = (
         f"error on {tested}{' (exploratory)' * exploratory}"
-        f" {scale * finding.rmse_before:.3g} -> {scale * finding.rmse_after:.3g} {shown}"
+        f" {scale * finding.rmse_before:.3g} -> {in_unit(scale * finding.rmse_after, shown)}"
         f" (lower in {finding.runs_improved} of {counted(finding.runs_total, 'run')})"
     )
     also = f" It also enters {', '.join(finding.also_in)}." if finding.also_in else ""
@@ -160,7 +160,12 @@ def wave(order: float, depends_on: Sequence[str]) -> dict[str, str]:
 
 def _measured(value: float, unit: str) -> str:
     scale, shown = display(unit, value)
-    return f"{value:.3g}" if unit == "1" else f"{scale * value:.3g} {shown}"
+    return in_unit(scale * value, shown)
+
+
+def in_unit(value: float, unit: str) -> str:
+    """Return a value to three digits with its unit; a ratio has none."""
+    return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
 
 
 def display(unit: str, size: float = 0.0) -> tuple[float, str]:

@@ -3,7 +3,7 @@
 from estimation.cross_validation import HeldOutError
 from estimation.model import Model
 from rig.output.table import TextTable, counted
-from rig.reports.diagnosis_words import display
+from rig.reports.diagnosis_words import display, in_unit
 
 
 def parameter_table(model: Model) -> TextTable:
@@ -23,9 +23,9 @@ def parameter_table(model: Model) -> TextTable:
         scale, unit = display(model.unit, evidence.rmse_with_means)
         note = (
             f"Fitted on {counted(len(evidence.runs), 'run')}, {evidence.samples:,} samples. RMSE"
-            f" {scale * evidence.rmse:.3g} {unit} with each run's mean removed,"
-            f" {scale * evidence.rmse_with_means:.3g} {unit} with means. Spread: standard deviation"
-            " over a bootstrap of runs; empty at a bound or with one run."
+            f" {in_unit(scale * evidence.rmse, unit)} with each run's mean removed,"
+            f" {in_unit(scale * evidence.rmse_with_means, unit)} with means. Spread: standard"
+            " deviation over a bootstrap of runs; empty at a bound or with one run."
         )
     return TextTable("Fitted model", ["parameter", "side", "value", "spread", "unit"], rows, note)
 
@@ -34,6 +34,7 @@ def held_out_sentence(model: Model, error: HeldOutError) -> str:
     """Return the error on runs not fitted on in words."""
     scale, unit = display(model.unit, error.rmse_with_means)
     return (
-        f"{model.target} on {error.runs} runs not fitted on: RMSE {scale * error.rmse:.3g} {unit}"
-        f" with each run's mean removed, {scale * error.rmse_with_means:.3g} {unit} with means."
+        f"{model.target} on {error.runs} runs not fitted on: RMSE"
+        f" {in_unit(scale * error.rmse, unit)} with each run's mean removed,"
+        f" {in_unit(scale * error.rmse_with_means, unit)} with means."
     )

@@ -68,6 +68,11 @@ def test_a_name_without_alternatives_is_not_said_to_have_one(diagnosed):
     assert "error on 1 held-out test run " in text
 
 
+def test_the_error_of_a_ratio_has_no_unit(diagnosed):
+    (text,) = sentences(replace(diagnosed[0], unit=dict.fromkeys(diagnosed[0].unit, "1")))
+    assert re.search(r" -> [\d.e-]+ \(lower in", text)
+
+
 def test_a_page_is_well_formed_escaped_and_refers_to_nothing_outside(text):
     found = Page(text)
     assert found.open == []
