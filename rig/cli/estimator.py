@@ -91,7 +91,7 @@ def adapt(
             seed=seed,
             on_run=on_run,
         )
-    said = [*sentence(steps)]
+    said = [*sentence(steps), *(f"Check: {zero.sentence}" for zero in result.moved_zeros)]
     if out is not None:
         figures = {"unused_runs_rmse": result.adapted.rmse, "unused_runs_p95": result.adapted.p95}
         with_origin(new, campaign.select(result.used), figures, source).save(out)

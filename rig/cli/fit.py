@@ -58,6 +58,7 @@ def _learn(
     """Fit an estimator that is learnt, not declared, and report its error on runs left out."""
     from estimation.cross_validation import closing_score, held_out_score
     from estimation.estimators.network import NetworkRecipe
+    from estimation.zeros import moved_zeros
     from rig.importers.jaw_steps import sentence, with_one_zero
     from rig.models.origins import with_origin
     from rig.reports.diagnosis_words import display, in_unit
@@ -66,7 +67,8 @@ def _learn(
     campaign, steps = with_one_zero(campaign, target)
     kept, error = campaign.evidence, None
     folds = min(folds, len(kept))
-    said, figures = [*sentence(steps)], {}
+    moved = moved_zeros(kept)
+    said, figures = [*sentence(steps), *(f"Check: {zero.sentence}" for zero in moved)], {}
     with counting("fits", 1 + folds) as advance:
         estimator = recipe.fit(campaign)
         advance()
@@ -88,7 +90,7 @@ def _learn(
     if out is not None:
         with_origin(estimator, campaign, figures).save(out)
         said.append(f"Estimator: {out}")
-    found = {"held_out": error, "jaw_steps": steps, "out": out}
+    found = {"held_out": error, "jaw_steps": steps, "moved_zeros": moved, "out": out}
     present(json_, {"target": target, **facts, **found}, *said)
 
 

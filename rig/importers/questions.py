@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimation.channels import unit_of
 from estimation.recording import FloatArray, Recording, shared_columns
+from estimation.zeros import moved_zeros
 from rig.importers.derivatives import CONFUSED
 from rig.importers.table.units import conversion
 
@@ -51,7 +52,7 @@ SURE = 1.25
 
 
 def questions(recordings: Sequence[Recording], derived: Collection[str] = ()) -> list[str]:
-    """Return the doubts about the channels of runs: questions, each with its channel.
+    """Return the doubts about the channels and zeros of runs: questions, each with its channel.
 
     Args:
         recordings: The runs.
@@ -59,7 +60,7 @@ def questions(recordings: Sequence[Recording], derived: Collection[str] = ()) ->
     """
     names = dict.fromkeys(name for r in recordings for name in r.columns if name not in derived)
     found = [f"{n}: {text}" for n in names for text in of_channel(n, recordings)]
-    return [*found, *apart(recordings)]
+    return [*found, *apart(recordings), *(zero.sentence for zero in moved_zeros(recordings))]
 
 
 def apart(recordings: Sequence[Recording]) -> Iterator[str]:

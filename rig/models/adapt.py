@@ -21,6 +21,7 @@ from estimation.estimators.adaptation import (
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.instrument import instrument_of, only_one
 from estimation.scores import Score, score
+from estimation.zeros import MovedZero, moved_zeros
 from rig.errors import UsageError
 from rig.output.provenance import Provenance
 
@@ -42,6 +43,7 @@ class Adaptation:
         scratch: The same kind fitted on the target's other runs, in folds; None where not done.
         covered: Share of the samples inside the adapted estimator's interval; None without one.
         rmse_by_run: Error of the adapted estimator by run.
+        moved_zeros: Runs at another zero than the others.
     """
 
     schema: str
@@ -56,6 +58,7 @@ class Adaptation:
     scratch: Score | None
     covered: float | None
     rmse_by_run: dict[str, float]
+    moved_zeros: tuple[MovedZero, ...]
     provenance: Provenance
 
 
@@ -77,7 +80,8 @@ def open_source(estimator: Estimator) -> Adaptable:
 def runs_by_rule(source: Adaptable, campaign: Campaign, count: int) -> list[str]:
     """Return the names of `count` runs to adapt with, by their conditions alone.
 
-    The rule is that of `estimation.estimators.adaptation.spread_out`; flagged runs are left out.
+    The rule is that of `estimation.estimators.adaptation.spread_out`; flagged runs are left out,
+    and runs at another zero than most.
 
     Raises:
         UsageError: It is a network, whose runs must be named, or too few runs are there.
@@ -85,7 +89,12 @@ def runs_by_rule(source: Adaptable, campaign: Campaign, count: int) -> list[str]
     if not isinstance(source, BankEstimator):
         raise UsageError("Runs are chosen for state estimators only.", fix="Name them with --runs.")
     whole = {run.name: evidence(source, run) for run in campaign.evidence}
-    usable = {name: run for name, run in whole.items() if run is not None and run.flagged == 0}
+    moved = {name for zero in moved_zeros(campaign.evidence) for name in zero.runs}
+    usable = {
+        name: run
+        for name, run in whole.items()
+        if run is not None and run.flagged == 0 and name not in moved
+    }
     if len(usable) <= count:
         raise UsageError(
             f"{len(usable)} usable runs are there, too few to choose {count} and report on others."
@@ -151,6 +160,7 @@ def run_adaptation(
         scratch=_scratch(source, found, unused, seed) if from_scratch else None,
         covered=_covered(new, [found[run] for run in unused]),
         rmse_by_run={run: _score(new, [found[run]]).rmse for run in unused},
+        moved_zeros=tuple(moved_zeros(campaign.evidence)),
         provenance=Provenance.now(seed),
     )
     return result, new

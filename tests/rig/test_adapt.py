@@ -100,6 +100,19 @@ def test_runs_to_adapt_with_are_chosen_by_their_conditions_alone(folders, states
         runs_by_rule(estimator, campaign, 9)
 
 
+def test_a_run_at_another_zero_is_asked_about_and_not_chosen(folders, states, tmp_path, said):
+    chosen = runs_by_rule(load(states), open_campaign(folders[1]), 1)
+    for k, run in enumerate(open_campaign(folders[1])):
+        zero = 0.1 * k + (30.0 if run.name in chosen else 0.0)
+        conditions = {**run.conditions, "motor_zero_offset_rad": zero}
+        write_recording(tmp_path / f"{run.name}.mcap", replace(run, conditions=conditions))
+    assert runs_by_rule(load(states), open_campaign(tmp_path), 1) != chosen
+    printed = said("adapt", states, tmp_path, "--no-scratch").out
+    assert f"Check: motor_zero_offset_rad: {chosen[0]} has its zero at 3" in " ".join(
+        printed.split()
+    )
+
+
 def test_a_fit_and_an_adaptation_refuse_to_write_over_a_file(folders, states, said):
     before = states.read_bytes()
     for words in (

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
@@ -9,7 +10,8 @@ from estimation.recording import Recording
 from rig.studies.instruments import intervals_page
 from rig.studies.instruments.intervals import TARGETS, run_intervals
 from rig.studies.instruments.page import page
-from rig.studies.instruments.study import run_instruments
+from rig.studies.instruments.study import KINDS, drawn, run_instruments
+from rig.studies.oneill.kinds import recipes
 from rig.studies.oneill.paper import PROXIMAL
 from tests.estimation.synthetic import campaign, campaign_with_jaw
 
@@ -52,7 +54,26 @@ def test_every_single_run_and_threes_are_adapted_with(study):
     # the single run of the first row is one of the choices, there scored on every fourth sample
     wanted = study.rows[0].result.adapted.rmse
     assert min(abs(error - wanted) for error in one.rmse_n_m) < 0.01 * wanted
-    assert [row[2] for row in page(study).tables[1].rows] == ["9", "40"]
+    assert [row[1:4] for row in page(study).tables[1].rows] == [
+        ["all", "1", "9"],
+        ["all", "3", "40"],
+    ]
+
+
+def test_runs_at_another_zero_are_left_out_in_rows_of_their_own():
+    runs = [
+        replace(run, name=f"{k:02}", conditions={**run.conditions, "motor_zero_offset_rad": zero})
+        for k, (run, zero) in enumerate(zip(campaign(), [*np.arange(7.0), 50.0, 51.0], strict=True))
+    ]
+    recipe = recipes()[KINDS[0]]
+    source = recipe.fit(Campaign.of(runs))
+    rows = drawn(source, "other", Campaign.of(other(run) for run in runs), 0)
+    assert [(row.usual, row.runs, len(row.rmse_n_m)) for row in rows] == [
+        (False, 1, 9),
+        (False, 3, 40),
+        (True, 1, 7),
+        (True, 3, 40),
+    ]
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,9 @@ import numpy as np
 
 from estimation.bank.interval import covered_share
 from estimation.campaign import Campaign
-from estimation.estimators.adaptation import adapted_states, evidence, reduced
+from estimation.estimators.adaptation import Evidence, adapted_states, evidence, reduced
 from estimation.estimators.bank import BankEstimator
+from estimation.zeros import moved_zeros
 from rig.models.adapt import Adaptation, open_source, run_adaptation
 from rig.output.provenance import Provenance
 from rig.studies.oneill.kinds import recipes
@@ -42,12 +43,15 @@ class DrawnRow:
     """States adapted with many choices of so many runs, N m.
 
     Attributes:
+        usual: Whether runs at another zero than most are left out, of those adapted with and of
+            those reported on.
         runs: Runs adapted with at a time.
         rmse_n_m: Error on the runs not used, by choice, rising.
         covered: Mean over the choices of the share of samples inside their interval; None without.
     """
 
     instrument: str
+    usual: bool
     runs: int
     rmse_n_m: tuple[float, ...]
     covered: float | None
@@ -106,18 +110,33 @@ def run_instruments(
             if isinstance(estimator, BankEstimator):
                 choices += drawn(estimator, instrument, runs, seed)
     return InstrumentStudy(
-        "rig.study.instruments/2", name, tuple(rows), tuple(choices), Provenance.now(seed)
+        "rig.study.instruments/3", name, tuple(rows), tuple(choices), Provenance.now(seed)
     )
 
 
 def drawn(
     source: BankEstimator, instrument: str, campaign: Campaign, seed: int
 ) -> tuple[DrawnRow, ...]:
-    """Adapt with each single run, and with threes drawn at random; flagged runs are left out."""
-    whole = [evidence(source, recording) for recording in campaign.evidence]
-    runs = reduced(source, [run for run in whole if run is not None and run.flagged == 0])
+    """Adapt with each single run, and with threes drawn at random; flagged runs are left out.
+
+    Where runs are at another zero than most, a gear or cable slipped, once more without them.
+    """
+    whole = {recording.name: evidence(source, recording) for recording in campaign.evidence}
+    sound = {name: run for name, run in whole.items() if run is not None and run.flagged == 0}
+    moved = {name for zero in moved_zeros(campaign.evidence) for name in zero.runs}
+    rows = _drawn(source, instrument, list(sound.values()), seed, usual=False)
+    if moved:
+        usual = [run for name, run in sound.items() if name not in moved]
+        rows += _drawn(source, instrument, usual, seed, usual=True)
+    return tuple(rows)
+
+
+def _drawn(
+    source: BankEstimator, instrument: str, sound: Sequence[Evidence], seed: int, *, usual: bool
+) -> list[DrawnRow]:
+    runs = reduced(source, sound)
     if len(runs) <= THREE:
-        return ()
+        return []
     draw = np.random.default_rng(seed)
     threes = [tuple(draw.choice(len(runs), THREE, replace=False)) for _ in range(DRAWS)]
     rows = []
@@ -133,5 +152,5 @@ def drawn(
                 places = np.concatenate([run.places for run in rest])
                 shares.append(covered_share(error, new.interval.half_width(design, places)) or 0.0)
         covered = float(np.mean(shares)) if shares else None
-        rows.append(DrawnRow(instrument, len(choices[0]), tuple(sorted(errors)), covered))
-    return tuple(rows)
+        rows.append(DrawnRow(instrument, usual, len(choices[0]), tuple(sorted(errors)), covered))
+    return rows
