@@ -1,5 +1,6 @@
-"""A host that sends exactly what a test asks for, right or wrong, to a board in virtual time."""
+"""A host that sends what a test asks for to a board in virtual time, and a scripted bench."""
 
+import ctypes
 from collections.abc import Sequence
 from typing import Any
 
@@ -43,7 +44,6 @@ class RawHost:
         self._take()
 
     def samples(self) -> NDArray[np.void]:
-        """Return every sample so far."""
         if not self._samples:
             return np.empty(0, self.profile.sample)
         return np.concatenate(self._samples)
@@ -102,3 +102,27 @@ class RawHost:
         if len(frames.payloads):
             self._samples.append(frames.payloads.view(self.profile.sample)[:, 0])
         return list(frames.others)
+
+
+TICK_FUNCTION = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p
+)
+
+
+class ScriptedBench:
+    """No physics: the inputs of each tick, shape (n, channels), are given; the last ones stay."""
+
+    def __init__(self, inputs: NDArray[np.int32], outputs: int = 2, tick_us: int = 1000) -> None:
+        self._inputs = np.ascontiguousarray(inputs, np.int32)
+        self._outputs = np.zeros(outputs, np.int32)
+        self._tick_us, self._ticks = tick_us, 0
+
+    def advance_with_board(
+        self, ticks: int, tick_address: int, board_address: int, tick_us: int
+    ) -> None:
+        tick = TICK_FUNCTION(tick_address)
+        for k in range(ticks):
+            inputs = self._inputs[min(self._ticks, len(self._inputs) - 1)]
+            clock_us = (tick_us + self._tick_us * k) % 2**32
+            tick(board_address, clock_us, inputs.ctypes.data, self._outputs.ctypes.data)
+            self._ticks += 1

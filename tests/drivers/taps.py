@@ -24,7 +24,6 @@ def once(tap: Tap) -> Tap:
 
 
 def started(driver: Any, board: Board, **options: Any) -> Any:
-    """Return a driver's device, started on a board."""
     device = driver(SimulatedTransport(board), **options)
     device.start()
     return device

@@ -126,15 +126,12 @@ class TeensyImage:
         return counted[0]
 
     def word(self, address: int) -> int:
-        """Return a word of memory."""
         return int(struct.unpack("<I", self._cpu.mem_read(address, 4))[0])
 
     def half_word(self, address: int) -> int:
-        """Return half a word of memory."""
         return int(struct.unpack("<H", self._cpu.mem_read(address, 2))[0])
 
     def write_word(self, address: int, value: int) -> None:
-        """Change a word of memory."""
         self._cpu.mem_write(address, struct.pack("<I", value))
 
     def last(self, address: int) -> int:

@@ -1,6 +1,7 @@
 """What every registered driver keeps, on its own fake: found by the registry, none left out."""
 
 import inspect
+import re
 import tomllib
 from pathlib import Path
 
@@ -225,3 +226,17 @@ def test_an_unknown_driver_or_option_is_named():
         open_device("nonesuch", "/dev/null")
     with pytest.raises(DriverError, match="no option colour"):
         open_device("teensy", "/dev/null", colour="red")
+
+
+ROOM = PROJECT.parent / "drivers"
+FAKES = {path.stem for path in ROOM.rglob("*fake*.py")}
+IMPORT = re.compile(r"^\s*(?:from|import) (drivers\.\S+)(?: import (.+))?", re.MULTILINE)
+
+
+def test_no_driver_imports_a_fake():
+    assert "fake" in FAKES
+    for path in ROOM.rglob("*.py"):
+        if path.stem not in FAKES:
+            for module, names in IMPORT.findall(path.read_text()):
+                words = {*module.split("."), *re.findall(r"\w+", names)}
+                assert not words & FAKES, f"{path} imports {module}"

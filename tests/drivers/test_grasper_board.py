@@ -15,8 +15,7 @@ from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
 from drivers.teensy.grasper_board import INPUTS
 from drivers.teensy.protocol import Kind, Result, SafeState, Trip
 from drivers.transport.simulated import SimulatedTransport
-from tests.drivers.bench_physics import ScriptedBench
-from tests.drivers.raw_host import RawHost
+from tests.drivers.raw_host import RawHost, ScriptedBench
 
 pytestmark = pytest.mark.integration
 

@@ -10,8 +10,7 @@ from drivers.teensy.core import BoardStart, CoreGuard, FirmwareBoard, FirmwareMi
 from drivers.teensy.protocol import Kind, Result, SafeState, Trip
 from drivers.teensy.reference import Limits
 from rig.simulation.bench import SimulatedBench
-from tests.drivers.bench_physics import ScriptedBench
-from tests.drivers.raw_host import GAINS, RawHost
+from tests.drivers.raw_host import GAINS, RawHost, ScriptedBench
 
 WIDEST = Limits()
 TIGHT = Limits(

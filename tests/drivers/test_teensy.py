@@ -1,7 +1,11 @@
-"""The logger's driver, on the fake and on the firmware core: what a session sees of it."""
+"""The logger's driver, on the fake and on the firmware core; its layouts."""
 
 import itertools
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +14,7 @@ from drivers.errors import (
     CommandRefusedError,
     DisarmUnconfirmedError,
     DriverError,
+    FrameError,
     LinkLostError,
     LinkTimeoutError,
     ProtocolMismatchError,
@@ -19,8 +24,8 @@ from drivers.teensy import protocol
 from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.teensy.fake import PythonBoard
-from drivers.teensy.protocol import Result
-from drivers.teensy.reference import REFERENCE, Limits
+from drivers.teensy.protocol import Kind, Result
+from drivers.teensy.reference import REFERENCE, SAMPLE_DTYPE, SETPOINT_DTYPE, Limits
 from drivers.transport.faulty import FaultyTransport, unchanged
 from drivers.transport.simulated import Board, SimulatedTransport
 from rig.simulation.bench import SimulatedBench
@@ -306,3 +311,53 @@ def test_leaving_the_with_block_disarms(make_board):
     with wire(board)[1] as logger:
         logger.start()
         assert (logger.read(0.1).samples["status"] == protocol.STATUS_REFERENCED).all()
+
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_sample_is_laid_out_as_documented_and_no_other_frame_has_its_size():
+    layout = SAMPLE_DTYPE
+    assert layout.itemsize == 42
+    offsets = {name: layout.fields[name][1] for name in layout.names}
+    assert list(offsets.values()) == [0, 1, 2, 4, 8, 12, 16, 20, 24, 28, 30, 32, 34, 36, 38, 40]
+    assert all(layout[name].str[0] in "<|" for name in layout.names)
+    others = [item.itemsize for kind, item in REFERENCE.layouts.items() if kind != Kind.SAMPLE]
+    assert 42 not in others
+    assert (42 - 4) % SETPOINT_DTYPE.itemsize
+
+
+def test_an_unknown_trip_is_refused():
+    fields = REFERENCE.decode(protocol.encode(Kind.TRIP_REPORT, 1, 99, 255, 0, 0, 0, 0))[2]
+    with pytest.raises(FrameError, match="99"):
+        REFERENCE.decode_trip_report(fields)
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b"\x01\x10\x00",
+        b"\x02\x10\x00\x00",
+        b"\x01\x63\x00\x00",
+        b"\x01\x10\x00\x00\x00",
+        protocol.encode(Kind.SETPOINTS, 1, 0),
+        protocol.encode(Kind.SETPOINTS, 1, 0) + bytes(5),
+        protocol.encode(Kind.SETPOINTS, 1, 0) + bytes(606),
+        bytes([1, Kind.SAMPLE]) + bytes(40),
+    ],
+    ids=["short", "version", "kind", "long", "none", "part", "many", "sample"],
+)
+def test_anything_else_is_refused(payload):
+    with pytest.raises(FrameError):
+        REFERENCE.decode(payload)
+
+
+def test_the_boards_header_is_the_one_made_from_these_tables():
+    done = subprocess.run(
+        [sys.executable, "-c", "import contract; print(contract.header(), end='')"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "firmware")])},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == (ROOT / "firmware" / "core" / "contract.hpp").read_text()

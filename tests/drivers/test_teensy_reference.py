@@ -12,7 +12,7 @@ from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import STATUS_REFERENCED, Result
 from drivers.teensy.reference import Limits
 from drivers.transport.simulated import SimulatedTransport
-from tests.drivers.bench_physics import ScriptedBench
+from tests.drivers.raw_host import ScriptedBench
 
 GAINS = [1.0, 0.0, 0.0, 1.0, 100.0]
 STANDS = np.array([[700, -40, 9, 1, -1, 2, 0], [700, -40, 9, 2, 1, -2, 0]] * 500, np.int32)
