@@ -18,13 +18,14 @@ os.environ["XDG_CONFIG_HOME"] = tempfile.mkdtemp(prefix="rig-tests-")
 os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="rig-tests-")
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from drivers.teensy.core import firmware_library
 
 # compiled code is slow the first time, and a deadline is a wall clock in disguise; examples
-# differ from run to run, so half of the usual hundred are enough
-settings.register_profile("quick", deadline=None, max_examples=50)
+# differ from run to run, so half of the usual hundred are enough; they may share a folder
+SHARED = [HealthCheck.function_scoped_fixture]
+settings.register_profile("quick", deadline=None, max_examples=50, suppress_health_check=SHARED)
 settings.load_profile("quick")
 
 ROOT = Path(__file__).resolve().parents[1]

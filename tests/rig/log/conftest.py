@@ -1,6 +1,5 @@
 """A small log like a recorder's: two streams, 20 ms blocks, marks, attachments."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,6 @@ from rig.log.writer import LogWriter
 RATE_HZ = 1000.0
 STARTED_AT_NS = 1_790_000_000_000_000_000
 CHANNELS = ("motor_current_a", "spindle_angle_rad", "proximal_torque_n_m")
-
-WriteLog = Callable[..., Path]
 
 
 def blocks(samples: int, drop: frozenset[int] = frozenset()):
@@ -39,13 +36,7 @@ def blocks(samples: int, drop: frozenset[int] = frozenset()):
         yield rows, raw, log_time_ns
 
 
-def write_log(
-    path: Path,
-    samples: int = 600,
-    drop: frozenset[int] = frozenset(),
-    duration_s: float | None = None,
-) -> Path:
-    """Write a log of one run."""
+def write_log(path, samples=600, drop=frozenset(), duration_s=None) -> Path:
     run = RunInfo(
         name=path.stem,
         rig="bench 1",
@@ -79,18 +70,10 @@ def write_log(
 
 @pytest.fixture
 def log(tmp_path: Path) -> Path:
-    """A complete log of 600 samples."""
     return write_log(tmp_path / "run.mcap")
 
 
-@pytest.fixture
-def make_log() -> WriteLog:
-    """The function that writes a log."""
-    return write_log
-
-
 def flip(path: Path, place: int, bit: int = 1) -> None:
-    """Change a byte of a file."""
     data = bytearray(path.read_bytes())
     data[place] ^= bit
     path.write_bytes(data)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.errors import DataError, ExitCode, UsageError
@@ -13,7 +13,7 @@ from rig.log.run import RunEnd, RunInfo
 from rig.log.schema import Field, Stream
 from rig.log.streams import COUNTS, SAMPLE
 from rig.log.writer import LogExistsError, LogWriter
-from tests.rig.log.conftest import flip
+from tests.rig.log.conftest import flip, write_log
 
 NUMBERED = Stream(
     "/t",
@@ -49,9 +49,9 @@ def test_a_complete_log_is_left_alone_by_a_repair(tmp_path, log):
     assert [item.name for item in tmp_path.iterdir()] == ["run.mcap"]
 
 
-def test_every_gap_is_listed(tmp_path, make_log):
+def test_every_gap_is_listed(tmp_path):
     drop = frozenset({100, 101, 102, 350})
-    report = check_log(make_log(tmp_path / "a.mcap", drop=drop))
+    report = check_log(write_log(tmp_path / "a.mcap", drop=drop))
     assert report.verdict is Verdict.INCOMPLETE
     assert report.verdict.exit_code == ExitCode.FAILED
     for topic in report.topics:
@@ -67,8 +67,8 @@ def test_every_gap_is_listed(tmp_path, make_log):
     [({"drop": frozenset(range(580, 600))}, 580), ({"samples": 590, "duration_s": 0.6}, 590)],
     ids=["the recorder's count", "the plan"],
 )
-def test_samples_lost_at_the_very_end_are_known(tmp_path, make_log, written, of_sample):
-    report = check_log(make_log(tmp_path / "a.mcap", **written))
+def test_samples_lost_at_the_very_end_are_known(tmp_path, written, of_sample):
+    report = check_log(write_log(tmp_path / "a.mcap", **written))
     assert report.verdict is Verdict.INCOMPLETE
     assert f"{of_sample} of 600" in report.problems[0]
 
@@ -233,12 +233,7 @@ def examine(folder, data, truth):
     return verdict
 
 
-FUZZ = settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-
-
-@FUZZ
+@settings(max_examples=150)
 @given(
     place=st.floats(0, 1, exclude_max=True),
     junk=st.binary(max_size=40),

@@ -21,11 +21,7 @@ from tests.rig.simulated import short_protocol, simulated
 @pytest.fixture
 def rig(said, answered):
     """Run `rig log ...`; return what it printed, as JSON where that is asked for."""
-
-    def run(*words, json=False, code=0):
-        return (answered if json else said)("log", *words, code=code)
-
-    return run
+    return lambda *words, json=False, code=0: (answered if json else said)("log", *words, code=code)
 
 
 def test_info_for_people(rig, log):
@@ -36,10 +32,10 @@ def test_info_for_people(rig, log):
     assert "2026-09-21T" in out
 
 
-def test_the_first_line_of_info_is_what_was_lost(rig, tmp_path, make_log):
-    first = make_log(tmp_path / "a.mcap")
+def test_the_first_line_of_info_is_what_was_lost(rig, tmp_path):
+    first = write_log(tmp_path / "a.mcap")
     assert rig("info", first).out.startswith(f"{first}: complete, nothing lost")
-    second = make_log(tmp_path / "b.mcap", drop=frozenset({30, 31}))
+    second = write_log(tmp_path / "b.mcap", drop=frozenset({30, 31}))
     assert "2 samples" in rig("info", second).out.splitlines()[0]
     (found,) = rig("info", second, json=True)["logs"]
     assert found["lost"]["/rig/sample"] == 2
@@ -61,13 +57,13 @@ def test_brackets_and_colons_are_printed_as_they_were_typed(rig, tmp_path, log):
     assert str(folder / "a.mcap") in rig("check", folder, code=1).out
 
 
-def test_check_of_a_folder_ends_with_the_worst_code(rig, tmp_path, make_log):
-    make_log(tmp_path / "a.mcap")
+def test_check_of_a_folder_ends_with_the_worst_code(rig, tmp_path):
+    write_log(tmp_path / "a.mcap")
     rig("check", tmp_path)
-    make_log(tmp_path / "b.mcap", drop=frozenset({30, 31}))
+    write_log(tmp_path / "b.mcap", drop=frozenset({30, 31}))
     out = rig("check", tmp_path, code=ExitCode.FAILED).out
     assert "gap at 0.0290 s, 3.0 ms: 2 samples, 30 to 31" in out
-    whole = make_log(tmp_path / "c.mcap")
+    whole = write_log(tmp_path / "c.mcap")
     whole.write_bytes(whole.read_bytes()[:-1])
     out = rig("check", tmp_path, json=True, code=ExitCode.DATA)
     assert out["exit_code"] == ExitCode.DATA
@@ -75,10 +71,10 @@ def test_check_of_a_folder_ends_with_the_worst_code(rig, tmp_path, make_log):
     assert out["logs"][1]["topics"][0]["gaps"][0]["samples"] == 2
 
 
-def test_check_does_not_count_what_was_recorded_again(rig, tmp_path, make_log):
-    data = make_log(tmp_path / "a.mcap").read_bytes()
+def test_check_does_not_count_what_was_recorded_again(rig, tmp_path):
+    data = write_log(tmp_path / "a.mcap").read_bytes()
     (tmp_path / "a.aborted-1.mcap.part").write_bytes(data[: data.find(b"rig.end") - 20])
-    make_log(tmp_path / "b.mcap")
+    write_log(tmp_path / "b.mcap")
     out = rig("check", tmp_path).out
     assert f"superseded  {tmp_path / 'a.aborted-1.mcap.part'}" in out
     last = out.splitlines()[-1]
@@ -87,8 +83,8 @@ def test_check_does_not_count_what_was_recorded_again(rig, tmp_path, make_log):
     assert rig("check", tmp_path, json=True, code=ExitCode.DATA)["superseded"] == []
 
 
-def test_a_whole_log_that_was_set_aside_is_no_second_run(rig, tmp_path, make_log):
-    whole = make_log(tmp_path / "a.mcap")
+def test_a_whole_log_that_was_set_aside_is_no_second_run(rig, tmp_path):
+    whole = write_log(tmp_path / "a.mcap")
     aside = tmp_path / "a.aborted-1.mcap"
     aside.write_bytes(whole.read_bytes())
     assert rig("check", tmp_path, json=True)["superseded"] == [str(aside)]

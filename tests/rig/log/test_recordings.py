@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -67,7 +67,6 @@ def assert_equal(one, other):
     assert one.flags.tobytes() == other.flags.tobytes()
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(recording=recordings())
 def test_a_recording_survives_the_log(tmp_path, recording):
     path = tmp_path / "a.mcap"
@@ -135,9 +134,9 @@ def kill(path):
     return part
 
 
-def test_an_unclosed_log_is_opened_but_is_no_evidence_until_repaired(tmp_path, make_log):
+def test_an_unclosed_log_is_opened_but_is_no_evidence_until_repaired(tmp_path):
     write_recording(tmp_path / "whole.mcap", simple("whole"))
-    part = kill(make_log(tmp_path / "killed.mcap"))
+    part = kill(write_log(tmp_path / "killed.mcap"))
     campaign = IMPORTER.open(tmp_path)
     assert set(campaign.names) == {"whole", "killed"}
     assert campaign.evidence.names == ("whole",)
@@ -152,19 +151,19 @@ def test_an_unclosed_log_is_opened_but_is_no_evidence_until_repaired(tmp_path, m
     assert "did not end as planned: repaired" in killed.notes
 
 
-def test_a_run_recorded_again_stands_before_the_repair_of_its_first_half(tmp_path, make_log):
-    first = kill(make_log(tmp_path / "sine.mcap", samples=300))
+def test_a_run_recorded_again_stands_before_the_repair_of_its_first_half(tmp_path):
+    first = kill(write_log(tmp_path / "sine.mcap", samples=300))
     repair_log(first)
     first.rename(tmp_path / "sine.aborted-1.mcap.part")  # as a resumed recording does
-    make_log(tmp_path / "sine.mcap", samples=600)
+    write_log(tmp_path / "sine.mcap", samples=600)
     (run,) = IMPORTER.open(tmp_path).runs
     assert run.source == tmp_path / "sine.mcap"
     assert run.excluded is None
     assert len(run.recording()) == 600
 
 
-def test_the_repair_of_a_closed_log_stands_in_for_it(tmp_path, make_log):
-    log = make_log(tmp_path / "sine.mcap")
+def test_the_repair_of_a_closed_log_stands_in_for_it(tmp_path):
+    log = write_log(tmp_path / "sine.mcap")
     flip(log, log.read_bytes().find(b"zstd") + 60)
     repaired = repair_log(log).repaired
     (run,) = IMPORTER.open(tmp_path).runs
