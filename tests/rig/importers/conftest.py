@@ -76,7 +76,6 @@ class Log:
         return rows
 
     def text(self) -> str:
-        """Return the log's text."""
         c = self.command_decimals
         formats = ["%.3f", "%d", "%d", "%.4f", "%d", "%d", "%.4f", f"%.{c}f", "%d", "%.4f"]
         lines = [",".join(f % v for f, v in zip(formats, row, strict=True)) for row in self.rows()]

@@ -4,7 +4,7 @@ import lzma
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.errors import DataError
@@ -100,9 +100,7 @@ def test_other_text_is_not_recognised(tmp_path):
         IMPORTER.open(empty)
 
 
-@settings(
-    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=100)
 @given(
     where=st.floats(0, 1),
     removed=st.integers(0, 30),

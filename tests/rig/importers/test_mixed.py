@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from estimation.recording import Instrument, Recording
-from rig.cli.main import main
 from rig.importers.registry import MixedRunsError, left_out, open_campaign
 from rig.log.convert import write_recording
 
@@ -28,17 +27,16 @@ def run(name: str, serial: str = "4", **changes: object) -> Recording:
 
 
 @pytest.mark.parametrize(
-    ("other", "said"),
+    ("other", "words"),
     [
         (run("b", serial="5"), "instruments: a of Maryland 4, b of Maryland 5"),
         (run("b", rig="another"), "rigs: a of bench, b of another"),
     ],
 )
-def test_runs_of_two_rigs_are_refused(tmp_path, capsys, other, said):
+def test_runs_of_two_rigs_are_refused(tmp_path, said, other, words):
     for recording in (run("a"), other, run("c")):
         write_recording(tmp_path / f"{recording.name}.mcap", recording)
-    assert main(["fit", str(tmp_path)]) == 5
-    assert said in capsys.readouterr().err
+    assert words in said("fit", tmp_path, code=5).err
     with pytest.raises(MixedRunsError):
         list(open_campaign(tmp_path))
     assert open_campaign(tmp_path).runs[1].recording().name == "b"  # one by itself is shown
@@ -52,7 +50,7 @@ def test_an_excluded_run_of_another_rig_does_no_harm(tmp_path):
     assert left_out(tmp_path, campaign) == ["Run b does not count: another tool"]
 
 
-def test_files_of_another_format_and_earlier_attempts_are_named(tmp_path, make_log, capsys):
+def test_files_of_another_format_and_earlier_attempts_are_named(tmp_path, make_log, said):
     for name in ("a", "b", "c"):
         write_recording(tmp_path / f"{name}.mcap", run(name))
     whole = (tmp_path / "a.mcap").read_bytes()
@@ -60,16 +58,15 @@ def test_files_of_another_format_and_earlier_attempts_are_named(tmp_path, make_l
     (tmp_path / "more").mkdir()
     (tmp_path / "more" / "007.TXT").write_text(make_log().text())
     (tmp_path / "notes.txt").write_text("the cable was oiled")
-    assert main(["fit", str(tmp_path)]) == 0
-    said = capsys.readouterr().err
-    assert "another format; --format mrdlab opens it: more/007.TXT." in said
-    assert "an earlier attempt of a run, or repaired: a.aborted-1.mcap.part." in said
-    assert "notes.txt" not in said
+    err = said("fit", tmp_path).err
+    assert "another format; --format mrdlab opens it: more/007.TXT." in err
+    assert "an earlier attempt of a run, or repaired: a.aborted-1.mcap.part." in err
+    assert "notes.txt" not in err
 
 
-@pytest.mark.parametrize("words", [["fit"], ["diagnose", "--quick", "--equation", "motor"]])
+@pytest.mark.parametrize("words", ["fit", "diagnose --quick --equation motor"])
 def test_a_damaged_run_stops_a_command_unless_it_is_asked_to_skip_it(
-    tmp_path, make_log, capsys, words, monkeypatch
+    tmp_path, make_log, said, words, monkeypatch
 ):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     folder = tmp_path / "runs"
@@ -78,25 +75,20 @@ def test_a_damaged_run_stops_a_command_unless_it_is_asked_to_skip_it(
         text = make_log(seconds=8.0, load_a=load_a).text()
         (folder / f"{number:03}.TXT").write_text(text)
     (folder / "003.TXT").write_text(make_log().text() + "1.0, garbage\n")
-    call = [*words, str(folder)]
-    assert main(call) == 5
-    assert "003.TXT" in capsys.readouterr().err
-    assert main([*call, "--skip-bad"]) == 0
-    said = capsys.readouterr().err
-    assert "Run 003 does not count:" in said
-    assert "003.TXT" in said
+    assert "003.TXT" in said(words, folder, code=5).err
+    err = said(words, folder, "--skip-bad").err
+    assert "Run 003 does not count:" in err
+    assert "003.TXT" in err
 
 
-def test_a_folder_without_recordings_is_described(tmp_path, capsys):
-    assert main(["fit", str(tmp_path)]) == 5
-    assert "holds no file" in capsys.readouterr().err
+def test_a_folder_without_recordings_is_described(tmp_path, said):
+    assert "holds no file" in said("fit", tmp_path, code=5).err
     (tmp_path / "bench.png").write_bytes(b"\x89PNG")
-    assert main(["fit", str(tmp_path)]) == 5
-    assert "1 .png" in capsys.readouterr().err
+    assert "1 .png" in said("fit", tmp_path, code=5).err
 
 
 @pytest.mark.parametrize("ending", ["parquet", "csv"])
-def test_an_exported_campaign_is_read_back(tmp_path, capsys, ending):
+def test_an_exported_campaign_is_read_back(tmp_path, said, ending):
     pytest.importorskip("pyarrow")
     folder, table = tmp_path / "runs", tmp_path / f"all.{ending}"
     folder.mkdir()
@@ -105,8 +97,7 @@ def test_an_exported_campaign_is_read_back(tmp_path, capsys, ending):
     made = [run("a", conditions={"load_command_a": 0.2}, notes="oiled"), run("b", flags=flags)]
     for recording in made:
         write_recording(folder / f"{recording.name}.mcap", recording)
-    export = ["log", "export", str(folder), "--format", ending, "--out", str(table)]
-    assert main(export) == 0
+    said("log export", folder, "--format", ending, "--out", table)
     for before, after in zip(made, open_campaign(table), strict=True):
         assert after.name == before.name
         assert after.instrument == before.instrument
@@ -115,17 +106,14 @@ def test_an_exported_campaign_is_read_back(tmp_path, capsys, ending):
         np.testing.assert_array_equal(after.flags, before.flags)
         for name, values in before.columns.items():
             np.testing.assert_allclose(after[name], values, rtol=1e-12, atol=1e-15)
-    capsys.readouterr()
-    assert main(["log", "info", str(table)]) == 0
-    said = capsys.readouterr().out
-    assert "2 runs. Channels: motor_current_a" in said
-    assert "a  1.999 s, 1000 Hz  load_command_a = 0.2" in said
-    assert "flagged samples: 1" in said
+    out = said("log info", table).out
+    assert "2 runs. Channels: motor_current_a" in out
+    assert "a  1.999 s, 1000 Hz  load_command_a = 0.2" in out
+    assert "flagged samples: 1" in out
 
 
-def test_one_run_is_fitted_without_an_error_on_others(tmp_path, capsys):
+def test_one_run_is_fitted_without_an_error_on_others(tmp_path, said):
     write_recording(tmp_path / "a.mcap", run("a"))
-    assert main(["fit", str(tmp_path), "--json"]) == 0
-    said = capsys.readouterr()
-    assert json.loads(said.out)["held_out"] is None
-    assert "One run: there is no error on runs" in said.err
+    printed = said("fit --json", tmp_path)
+    assert json.loads(printed.out)["held_out"] is None
+    assert "One run: there is no error on runs" in printed.err

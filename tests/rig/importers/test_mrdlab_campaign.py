@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.cli.main import main
 from rig.errors import DataError
 from rig.importers import archive
 from rig.importers.jaw_steps import JAW, with_one_zero
@@ -178,11 +177,9 @@ def test_a_jaw_step_is_found_between_runs_of_the_same_load_and_taken_off(slipped
     )
 
 
-def test_a_fit_of_the_jaws_angle_states_the_steps(slipped, capsys):
-    words = ["fit", str(slipped), "--model", "states", "--target", "jaw_angle_rad", "--json"]
-    assert main(words) == 0
-    said = capsys.readouterr()
-    assert [step["run"] for step in json.loads(said.out)["jaw_steps"]] == ["06"]
-    assert "deg before run 06" in said.err
-    assert main([*words[:-2], "proximal_torque_n_m", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["jaw_steps"] == []
+def test_a_fit_of_the_jaws_angle_states_the_steps(slipped, said, answered):
+    words = ("fit", slipped, "--model states --target")
+    printed = said(*words, "jaw_angle_rad --json")
+    assert [step["run"] for step in json.loads(printed.out)["jaw_steps"]] == ["06"]
+    assert "deg before run 06" in printed.err
+    assert answered(*words, "proximal_torque_n_m")["jaw_steps"] == []

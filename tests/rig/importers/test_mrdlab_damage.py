@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rig.errors import DataError
@@ -103,9 +103,7 @@ MUTATIONS = st.lists(
 )
 
 
-@settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=150)
 @given(mutations=MUTATIONS)
 @example(mutations=[(0.99, 0, "999")])
 @example(mutations=[(0.8, 9, "")])
@@ -132,7 +130,7 @@ def test_a_mutated_log_gives_its_values_or_a_data_error(path, lines, mutations):
     np.testing.assert_allclose(recording["jaw_angle_rad"], raw[4] * np.deg2rad(0.09), rtol=1e-14)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.lists(
         st.decimals(-(10**9), 10**9, places=5, allow_nan=False).map(str), min_size=3, max_size=30

@@ -30,14 +30,11 @@ motor_current_a = "i:mA"
 """
 
 
-@pytest.fixture
-def machine(tmp_path):
-    def _machine(text=MAPPED):
-        path = tmp_path / "bench.toml"
-        path.write_text(text)
-        return read_mapping(path, [])
-
-    return _machine
+def machine(folder, text=MAPPED):
+    """Write a machine file and return its mapping."""
+    path = folder / "bench.toml"
+    path.write_text(text)
+    return read_mapping(path, [])
 
 
 def write(folder, kind):
@@ -62,8 +59,8 @@ def write(folder, kind):
 
 
 @pytest.mark.parametrize("kind", ["csv", "tsv", "parquet", "mat", "npz", "jsonl", "json"])
-def test_every_format_gives_the_same_samples_in_si_units(tmp_path, machine, kind):
-    (run,) = open_table(write(tmp_path, kind), machine())
+def test_every_format_gives_the_same_samples_in_si_units(tmp_path, kind):
+    (run,) = open_table(write(tmp_path, kind), machine(tmp_path))
     np.testing.assert_allclose(run.time_s, TIME_MS / 1000)
     np.testing.assert_allclose(run["motor_angle_rad"], np.radians(ANGLE_DEG))
     np.testing.assert_allclose(run["motor_current_a"], CURRENT_MA / 1000)
@@ -72,11 +69,11 @@ def test_every_format_gives_the_same_samples_in_si_units(tmp_path, machine, kind
     assert run.valid.all()
 
 
-def test_a_table_without_a_head_or_a_clock_is_mapped_by_number_and_rate(tmp_path, machine):
+def test_a_table_without_a_head_or_a_clock_is_mapped_by_number_and_rate(tmp_path):
     path = tmp_path / "run.csv"
     np.savetxt(path, np.column_stack([ANGLE_DEG, CURRENT_MA]), delimiter=";")
     text = '[data]\nsample_rate_hz = 200\n[data.columns]\nmotor_angle_rad = "1:deg"\n'
-    (run,) = open_table(path, machine(text))
+    (run,) = open_table(path, machine(tmp_path, text))
     np.testing.assert_allclose(run["motor_angle_rad"], np.radians(ANGLE_DEG))
     assert run.sample_rate_hz == pytest.approx(200)
 
@@ -175,11 +172,11 @@ READ = {
 
 
 @pytest.mark.parametrize("case", READ.values(), ids=READ)
-def test_what_a_table_holds_becomes_si(tmp_path, machine, case):
+def test_what_a_table_holds_becomes_si(tmp_path, case):
     content, mapping, expected, *remark = case
     path, remarks = tmp_path / "run.csv", []
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    (run,) = read_runs(path, machine(mapping), remarks)
+    (run,) = read_runs(path, machine(tmp_path, mapping), remarks)
     for name, values in expected.items():
         np.testing.assert_allclose(run[name], values, atol=1e-12)
     assert run.valid.all()
@@ -188,36 +185,34 @@ def test_what_a_table_holds_becomes_si(tmp_path, machine, case):
     assert run.started_at_ns is None
 
 
-def test_a_column_that_is_not_mapped_is_left_out_and_a_second_value_at_a_time_refused(
-    tmp_path, machine
-):
+def test_a_column_that_is_not_mapped_is_left_out_and_a_second_value_at_a_time_refused(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("time_s,motor_angle_rad,Remark\n0,1,0\n0.1,2,0\n")
-    (run,) = open_table(path, machine("[data]\n"))
+    (run,) = open_table(path, machine(tmp_path, "[data]\n"))
     assert set(run.columns) == {"motor_angle_rad"}
     path.write_text("time_s,motor_angle_rad\n0,1\n0.1,2\n0.1,2.5\n0.2,3\n")
     with pytest.raises(DataError, match="line 4: time goes from") as error:
-        open_table(path, machine("[data]\n"))
+        open_table(path, machine(tmp_path, "[data]\n"))
     assert "1 sample has the time of the one before it" in error.value.why
     assert "even_rate_hz = 10 under [data]" in error.value.fix
     assert "resets" not in error.value.fix
     path.write_text("t,enc,i\n23:59:59.500,0,0\n")
     with pytest.raises(DataError) as error:
-        open_table(path, machine())
+        open_table(path, machine(tmp_path))
     assert error.value.fix == "Write time_s = 't:iso8601'."
 
 
-def test_samples_that_do_not_count_are_flagged_with_the_reason(tmp_path, machine):
+def test_samples_that_do_not_count_are_flagged_with_the_reason(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("time_s,motor_angle_rad,drive_ratio\n0,1,1\n0.1,,1\n0.2,3,0\n0.3,4,0\n")
     text = '[[data.invalid]]\nwhen = "drive_ratio < 1"\nreason = "the drive was off"\n'
-    (run,) = open_table(path, machine(text))
+    (run,) = open_table(path, machine(tmp_path, text))
     assert run.valid.tolist() == [True, False, False, False]
     (stretch,) = run.stretches
     assert (stretch.start_s, stretch.stop_s, stretch.reason) == (0.2, 0.3, "the drive was off")
 
 
-def test_a_reading_that_is_none_is_bridged_before_a_filter_smears_it(tmp_path, machine):
+def test_a_reading_that_is_none_is_bridged_before_a_filter_smears_it(tmp_path):
     path = tmp_path / "run.csv"
     time_s = np.arange(200) / 100
     angle = np.sin(2 * time_s)
@@ -233,14 +228,14 @@ def test_a_reading_that_is_none_is_bridged_before_a_filter_smears_it(tmp_path, m
         reason = "the servo did not answer"
         missing = true
         """
-    (run,) = open_table(path, machine(text))
+    (run,) = open_table(path, machine(tmp_path, text))
     filtered = filter_recording(run, LowPass(15.0, 3))
     assert not filtered.valid[100]
     error = (filtered["motor_angle_rad"] - angle)[filtered.valid]
     assert np.abs(error[10:-10]).max() < 1e-3
 
 
-def test_names_in_a_mat_file_are_those_of_structs_matrices_and_single_values(tmp_path, machine):
+def test_names_in_a_mat_file_are_those_of_structs_matrices_and_single_values(tmp_path):
     path = tmp_path / "run.mat"
     joints = np.column_stack([ANGLE_DEG, 2 * ANGLE_DEG])
     log = {"t": TIME_MS, "q": joints, "z": joints * 1j, "vir": CURRENT_MA}
@@ -253,13 +248,13 @@ def test_names_in_a_mat_file_are_those_of_structs_matrices_and_single_values(tmp
         [data.conditions]
         note = "note"
         """
-    (run,) = open_table(path, machine(text))
+    (run,) = open_table(path, machine(tmp_path, text))
     np.testing.assert_allclose(run["joint_2_angle_rad"], 2 * np.radians(ANGLE_DEG))
     np.testing.assert_allclose(run["drive_force_n"], 35.15 * CURRENT_MA)
     assert run.conditions == {"note": "calm"}
 
 
-def test_a_formula_is_of_channels_and_conditions_in_si(tmp_path, machine):
+def test_a_formula_is_of_channels_and_conditions_in_si(tmp_path):
     path = write(tmp_path, "json")
     text = f"""
         [data.conditions]
@@ -267,29 +262,29 @@ def test_a_formula_is_of_channels_and_conditions_in_si(tmp_path, machine):
         [data.formulas]
         weight_n_m = "load_mass_kg * g_m_s2 * 0.1 * sin(motor_angle_rad)"
         {MAPPED}"""
-    (run,) = open_table(path, machine(text))
+    (run,) = open_table(path, machine(tmp_path, text))
     assert run.conditions == {"load_mass_kg": 0.25}
     expected = 0.25 * 9.80665 * 0.1 * np.sin(np.radians(ANGLE_DEG))
     np.testing.assert_allclose(run["weight_n_m"], expected)
 
 
-def test_dates_are_a_clock_and_the_start_of_the_run(tmp_path, machine):
+def test_dates_are_a_clock_and_the_start_of_the_run(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text(
         "when,enc\n2024-05-01T12:00:00+00:00,1\n2024-05-01T12:00:00.250+00:00,2\n"
         "2024-05-01T12:00:00.500+00:00,3\n"
     )
     text = '[data.columns]\ntime_s = "when:iso8601"\nmotor_angle_rad = "enc:deg"\n'
-    (run,) = open_table(path, machine(text))
+    (run,) = open_table(path, machine(tmp_path, text))
     np.testing.assert_allclose(run.time_s, [0, 0.25, 0.5])
     assert run.started_at_ns == 1714564800 * 10**9
 
 
-def cut(tmp_path, machine, rule, columns):
+def cut(tmp_path, rule, columns):
     path = tmp_path / "run.csv"
     text_table(path, columns)
     runs = f'[data.columns]\ntime_s = "t"\nmotor_angle_rad = "enc:deg"\n[data.runs]\n{rule}\n'
-    return [run["motor_angle_rad"] for run in open_table(path, machine(runs))]
+    return [run["motor_angle_rad"] for run in open_table(path, machine(tmp_path, runs))]
 
 
 CUTS = [
@@ -304,23 +299,23 @@ CUTS = [
 
 
 @pytest.mark.parametrize(("rule", "columns"), CUTS)
-def test_runs_are_cut_where_the_mapping_states(tmp_path, machine, rule, columns):
-    parts = cut(tmp_path, machine, rule, {**columns, "enc": [1, 2, 3, 4, 5, 6]})
+def test_runs_are_cut_where_the_mapping_states(tmp_path, rule, columns):
+    parts = cut(tmp_path, rule, {**columns, "enc": [1, 2, 3, 4, 5, 6]})
     assert [np.degrees(part).round().tolist() for part in parts] == [[1, 2, 3], [4, 5, 6]]
 
 
-def test_each_run_is_on_a_clock_of_its_own_and_a_short_rest_is_left_out(tmp_path, machine):
+def test_each_run_is_on_a_clock_of_its_own_and_a_short_rest_is_left_out(tmp_path):
     path = tmp_path / "run.csv"
     text_table(path, {"t": [0.1 * k for k in range(7)], "enc": list(range(7))})
     text = '[data.columns]\ntime_s = "t"\nmotor_angle_rad = "enc:deg"\n[data.runs]\nlap_s = 0.3\n'
     remarks = []
-    runs = list(read_runs(path, machine(text), remarks))
+    runs = list(read_runs(path, machine(tmp_path, text), remarks))
     assert [run.name for run in runs] == ["run-00", "run-01"]
     assert [run.time_s[0] for run in runs] == [0, 0]
     assert any("left out" in text for _, text in remarks)
 
 
-def test_conditions_come_from_columns_names_of_files_and_a_side_file(tmp_path, machine):
+def test_conditions_come_from_columns_names_of_files_and_a_side_file(tmp_path):
     for load, trial in ((100, 1), (200, 2)):
         columns = {"t": [0.0, 0.1, 0.2], "enc": [1, 2, 3], "trial": [trial] * 3}
         text_table(tmp_path / f"load_{load}g.csv", columns)
@@ -341,7 +336,7 @@ def test_conditions_come_from_columns_names_of_files_and_a_side_file(tmp_path, m
         arm_m = "arm:cm"
         bench = { value = "B2" }
         """
-    first, second = open_table(tmp_path, machine(text))
+    first, second = open_table(tmp_path, machine(tmp_path, text))
     assert first.conditions == {
         "load_mass_kg": pytest.approx(0.1),
         "trial": 1,
@@ -353,35 +348,37 @@ def test_conditions_come_from_columns_names_of_files_and_a_side_file(tmp_path, m
     assert second.conditions["load_mass_kg"] == pytest.approx(0.2)
 
 
-def test_channels_of_two_rates_in_one_table_are_each_interpolated(tmp_path, machine):
+def test_channels_of_two_rates_in_one_table_are_each_interpolated(tmp_path):
     time = np.arange(200) / 100
     rows = "".join(
         f"{t * 1000},{90 * t},{100 * t if k % 5 == 0 else ''}\n" for k, t in enumerate(time)
     )
     (tmp_path / "run.csv").write_text("t,enc,i\n" + rows)
     remarks = []
-    list(read_runs(tmp_path / "run.csv", machine(), remarks))
+    list(read_runs(tmp_path / "run.csv", machine(tmp_path), remarks))
     assert "160 samples with an empty cell flagged" in remarks[-1][1]
     assert "even_rate_hz = 20.1 interpolates" in remarks[-1][1]
-    (run,) = open_table(tmp_path / "run.csv", machine("[data]\neven_rate_hz = 50\n" + MAPPED))
+    (run,) = open_table(
+        tmp_path / "run.csv", machine(tmp_path, "[data]\neven_rate_hz = 50\n" + MAPPED)
+    )
     inside = run.time_s <= 1.95
     assert not run.flags[inside].any()
     np.testing.assert_allclose(run["motor_current_a"][inside], 0.1 * run.time_s[inside], atol=1e-9)
     np.testing.assert_allclose(run["motor_angle_rad"], np.radians(90 * run.time_s), atol=1e-9)
 
 
-def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path, machine):
+def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path):
     path = tmp_path / "run.csv"
     time_s = np.cumsum(np.random.default_rng(0).uniform(0.008, 0.012, 300))
     text_table(path, {"t": time_s.tolist(), "enc": (10 * time_s).tolist()})
     text = '[data]\neven_rate_hz = 100\n[data.columns]\ntime_s = "t"\nmotor_angle_rad = "enc"\n'
-    (run,) = open_table(path, machine(text))
+    (run,) = open_table(path, machine(tmp_path, text))
     np.testing.assert_allclose(np.diff(run.time_s), 0.01)
     np.testing.assert_allclose(run["motor_angle_rad"], 10 * (run.time_s + time_s[0]), atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["matrices", "array of structs", "cells", "npz"])
-def test_each_trial_of_a_file_is_a_run(tmp_path, machine, kind):
+def test_each_trial_of_a_file_is_a_run(tmp_path, kind):
     """Trials of different lengths, as variables, structs or cells, with a single value each."""
     times = [np.arange(n) / 10.0 for n in (4, 6, 5)]
     matrices = [np.column_stack([t, 2.0 * t]) for t in times]
@@ -409,7 +406,7 @@ def test_each_trial_of_a_file_is_a_run(tmp_path, machine, kind):
     text += f'motor_angle_rad = "{names[1]}"\n'
     if kind == "array of structs":
         text += '\n[data.conditions]\nload_mass_kg = "mass"\n'
-    runs = list(open_table(path, machine(text)))
+    runs = list(open_table(path, machine(tmp_path, text)))
     assert [len(run.time_s) for run in runs] == [4, 6, 5]
     for run, time_s in zip(runs, times, strict=True):
         np.testing.assert_allclose(run["motor_angle_rad"], 2.0 * time_s)
@@ -418,7 +415,7 @@ def test_each_trial_of_a_file_is_a_run(tmp_path, machine, kind):
 
 
 @pytest.mark.parametrize("kind", ["matrix", "fields"])
-def test_one_array_of_numpy_is_a_table(tmp_path, machine, kind):
+def test_one_array_of_numpy_is_a_table(tmp_path, kind):
     rows = np.column_stack([*COLUMNS.values()])
     text = MAPPED
     if kind == "fields":
@@ -427,12 +424,12 @@ def test_one_array_of_numpy_is_a_table(tmp_path, machine, kind):
         for k, name in enumerate(COLUMNS):
             text = text.replace(f'"{name}:', f'"{k + 1}:')
     np.save(tmp_path / "run.npy", rows)
-    (run,) = open_table(tmp_path / "run.npy", machine(text))
+    (run,) = open_table(tmp_path / "run.npy", machine(tmp_path, text))
     np.testing.assert_allclose(run["motor_current_a"], CURRENT_MA / 1000)
 
 
 @pytest.mark.parametrize("kind", ["files", "logs", "trials"])
-def test_numbers_in_the_names_of_runs_count_by_their_value(tmp_path, machine, kind):
+def test_numbers_in_the_names_of_runs_count_by_their_value(tmp_path, kind):
     numbers = [*range(1, 12)]
     text, path = MAPPED, tmp_path / "data"
     path.mkdir()
@@ -445,7 +442,7 @@ def test_numbers_in_the_names_of_runs_count_by_their_value(tmp_path, machine, ki
         for k in numbers:
             columns = {"t": TIME_MS.tolist(), "enc": [float(k)] * N, "i": [0.1] * N}
             text_table(path / f"test {k}.csv", columns)
-    runs = open_table(path, machine(text))
+    runs = open_table(path, machine(tmp_path, text))
     if kind == "logs":
         for run in runs:
             write_recording(tmp_path / f"{run.name}.mcap", run)
@@ -454,7 +451,7 @@ def test_numbers_in_the_names_of_runs_count_by_their_value(tmp_path, machine, ki
     assert angles == sorted(angles)
 
 
-def test_files_of_one_name_in_several_folders_are_runs_of_their_own(tmp_path, machine):
+def test_files_of_one_name_in_several_folders_are_runs_of_their_own(tmp_path):
     columns = {name: values.tolist() for name, values in COLUMNS.items()}
     for k in (1, 2, 10):
         (tmp_path / "data" / f"run{k}").mkdir(parents=True)
@@ -462,15 +459,15 @@ def test_files_of_one_name_in_several_folders_are_runs_of_their_own(tmp_path, ma
     text = '[data]\nfiles = "*/*.csv"\nfile_name = "run(?P<load>[0-9]+)/"\n' + MAPPED
     text += '[data.conditions]\nload_mass_kg = "load:g"\n'
     with pytest.raises(UsageError, match="no file of a known kind") as error:
-        open_table(tmp_path / "data", machine())
+        open_table(tmp_path / "data", machine(tmp_path))
     assert 'files = "*/*.csv"' in error.value.fix
-    runs = open_table(tmp_path / "data", machine(text))
+    runs = open_table(tmp_path / "data", machine(tmp_path, text))
     assert runs.names == ("run1-log", "run2-log", "run10-log")
     assert [run.conditions["load_mass_kg"] for run in runs] == pytest.approx([1e-3, 2e-3, 1e-2])
 
 
-def test_a_pattern_of_trials_that_nothing_fits_names_what_there_is(tmp_path, machine):
+def test_a_pattern_of_trials_that_nothing_fits_names_what_there_is(tmp_path):
     savemat(tmp_path / "lab.mat", {"run1": np.eye(4)})
     text = '[data]\ntrials = "test*"\n\n[data.columns]\ntime_s = "1"\nmotor_angle_rad = "2"\n'
     with pytest.raises(DataError, match=r"no variable 'test\*'\. Its variables are run1\."):
-        open_table(tmp_path / "lab.mat", machine(text))
+        open_table(tmp_path / "lab.mat", machine(tmp_path, text))

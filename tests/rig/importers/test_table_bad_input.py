@@ -21,21 +21,15 @@ motor_angle_rad = "angle:deg"
 """
 
 
-@pytest.fixture
-def refused(tmp_path):
+def refused(folder, content=TABLE, mapping=GOOD, name="run.csv", flags=()):
     """Return the words of the error that a table and a mapping raise."""
-
-    def _refused(content=TABLE, mapping=GOOD, name="run.csv", flags=()):
-        path = tmp_path / name
-        if content is not None:
-            path.write_bytes(content.encode() if isinstance(content, str) else content)
-        file = tmp_path / "bench.toml"
-        file.write_text(mapping)
-        with pytest.raises(RigError) as error:
-            open_table(path, read_mapping(file, list(flags)))
-        return str(error.value)
-
-    return _refused
+    path, file = folder / name, folder / "bench.toml"
+    if content is not None:
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+    file.write_text(mapping)
+    with pytest.raises(RigError) as error:
+        open_table(path, read_mapping(file, list(flags)))
+    return str(error.value)
 
 
 ANGLE = "motor_angle_rad"
@@ -84,21 +78,21 @@ MAPPINGS = {
 
 
 @pytest.mark.parametrize("case", MAPPINGS.values(), ids=MAPPINGS)
-def test_what_is_wrong_in_a_mapping_is_named_with_its_line(refused, case):
+def test_what_is_wrong_in_a_mapping_is_named_with_its_line(tmp_path, case):
     old, new, line, *words = case
-    said = refused(mapping=re.sub(old, new, GOOD, count=1))
+    said = refused(tmp_path, mapping=re.sub(old, new, GOOD, count=1))
     assert all(word in said for word in words), said
     assert line is None or f"line {line}" in said
 
 
-def test_what_is_wrong_on_the_command_line_is_named_as_it_was_typed(refused):
+def test_what_is_wrong_on_the_command_line_is_named_as_it_was_typed(tmp_path):
     def typed(column):
         return (("columns", ANGLE), column, f"--column {ANGLE}={column}")
 
-    said = refused(flags=[typed("angel")])
+    said = refused(tmp_path, flags=[typed("angel")])
     assert f"--column {ANGLE}=angel" in said
     assert "line" not in said.split(":")[0]
-    assert f"{ANGLE} is stated twice" in refused(flags=[typed("angle"), typed("current")])
+    assert f"{ANGLE} is stated twice" in refused(tmp_path, flags=[typed("angle"), typed("current")])
 
 
 ROWS = TABLE.splitlines(keepends=True)
@@ -117,14 +111,14 @@ TABLES = {
 
 
 @pytest.mark.parametrize("case", TABLES.values(), ids=TABLES)
-def test_what_is_wrong_in_a_table_is_named(refused, case):
+def test_what_is_wrong_in_a_table_is_named(tmp_path, case):
     content, *words = case
-    said = refused(content)
+    said = refused(tmp_path, content)
     assert all(word in said for word in words), said
 
 
 @pytest.mark.parametrize("kind", ["mat", "npz", "parquet", "json", "jsonl"])
-def test_half_a_file_of_any_format(refused, tmp_path, kind):
+def test_half_a_file_of_any_format(tmp_path, kind):
     whole = tmp_path / f"whole.{kind}"
     columns = {"time": np.arange(400) / 100, "angle": np.random.default_rng(0).normal(size=400)}
     if kind == "mat":
@@ -141,30 +135,30 @@ def test_half_a_file_of_any_format(refused, tmp_path, kind):
         lines = "\n".join(json.dumps(row) for row in rows)
         whole.write_text(json.dumps(rows) if kind == "json" else lines)
     content = whole.read_bytes()
-    said = refused(content[: len(content) // 2 + 3], name=f"run.{kind}")
+    said = refused(tmp_path, content[: len(content) // 2 + 3], name=f"run.{kind}")
     assert f"run.{kind}" in said
     assert any(word in said for word in ("cut off", "damaged", "ends in the middle", "whole"))
 
 
-def test_an_archive_of_objects_is_not_unpickled(refused, tmp_path):
+def test_an_archive_of_objects_is_not_unpickled(tmp_path):
     np.savez(tmp_path / "whole.npz", time=np.array([{"a": 1}], dtype=object))
-    assert "run.npz" in refused((tmp_path / "whole.npz").read_bytes(), name="run.npz")
+    assert "run.npz" in refused(tmp_path, (tmp_path / "whole.npz").read_bytes(), name="run.npz")
 
 
-def test_a_velocity_that_contradicts_its_angle(refused):
+def test_a_velocity_that_contradicts_its_angle(tmp_path):
     time = np.arange(0, 4, 0.01)
     angle, speed = np.sin(2 * time), 2 * np.cos(2 * time)
     rows = [f"{t},{a},{s}" for t, a, s in zip(time, angle, speed, strict=True)]
     mapping = GOOD.replace("angle:deg", "angle") + 'motor_velocity_rad_s = "speed:deg/s"\n'
-    said = refused("time,angle,speed\n" + "\n".join(rows) + "\n", mapping=mapping)
+    said = refused(tmp_path, "time,angle,speed\n" + "\n".join(rows) + "\n", mapping=mapping)
     assert "motor_angle_rad changes" in said
     assert "motor_velocity_rad_s" in said
 
 
 @pytest.mark.parametrize("column", ["q [deg]", "angle (DEG)", "angle_deg", "angle/deg"])
-def test_a_unit_in_the_name_of_a_column_is_not_passed_over(refused, tmp_path, column):
+def test_a_unit_in_the_name_of_a_column_is_not_passed_over(tmp_path, column):
     table, mapping = TABLE.replace("angle", column), GOOD.replace("angle:deg", column)
-    said = refused(table, mapping)
+    said = refused(tmp_path, table, mapping)
     assert f"the name of the column {column!r} states" in said
     assert f"Write motor_angle_rad = '{column}:deg'" in said
     (tmp_path / "bench.toml").write_text(mapping.replace(column, f"{column}:rad"))
@@ -172,7 +166,9 @@ def test_a_unit_in_the_name_of_a_column_is_not_passed_over(refused, tmp_path, co
     assert run["motor_angle_rad"][-1] == 19.0
 
 
-def test_a_unit_of_another_quantity_in_the_name_of_a_column(refused):
-    said = refused(TABLE.replace("angle", "angle_rpm"), GOOD.replace("angle:deg", "angle_rpm"))
+def test_a_unit_of_another_quantity_in_the_name_of_a_column(tmp_path):
+    said = refused(
+        tmp_path, TABLE.replace("angle", "angle_rpm"), GOOD.replace("angle:deg", "angle_rpm")
+    )
     assert "the name of the column 'angle_rpm' states rpm" in said
     assert "if they are in SI units, write motor_angle_rad = 'angle_rpm:rad'" in said

@@ -7,7 +7,6 @@ import pytest
 from scipy.io import savemat
 
 from estimation.files import write_text_atomic
-from rig.cli.main import main
 from rig.errors import ExitCode
 from rig.importers.registry import open_campaign
 from rig.importers.table.mapping import read_mapping
@@ -135,27 +134,24 @@ def test_a_velocity_that_contradicts_its_angle_is_asked(tmp_path):
     assert "motor_velocity_rad_s" in question
 
 
-def test_import_writes_recordings_that_open(tmp_path, capsys):
+def test_import_writes_recordings_that_open(tmp_path, said):
     table = text_table(tmp_path / "bench.csv", {"t": 1e3 * TIME, "q": np.degrees(WAVE)})
-    words = ["--column", "time_s=t:ms", "--column", "motor_angle_rad=q:deg", "--runs", "lap_s=4"]
-    assert main(["import", str(table), *words, "--out", str(tmp_path / "logs")]) == 0
-    assert "wrote 2 recordings" in capsys.readouterr().out
+    columns = "--column time_s=t:ms --column motor_angle_rad=q:deg --runs lap_s=4"
+    words = ("import", table, columns, "--out", tmp_path / "logs")
+    assert "wrote 2 recordings" in said(*words).out
     runs = list(open_campaign(tmp_path / "logs"))
     assert [len(run) for run in runs] == [400, 400]
     np.testing.assert_allclose(runs[1]["motor_angle_rad"], WAVE[400:], atol=1e-7)
-    # nothing recorded is overwritten
-    assert main(["import", str(table), *words, "--out", str(tmp_path / "logs")]) == 2
+    said(*words, code=2)  # nothing recorded is overwritten
 
 
-def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, capsys):
+def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, said):
     table = text_table(
         tmp_path / "bench.csv", {"t": 1e3 * TIME, "q": np.degrees(WAVE), "i": 0 * TIME}
     )
-    words = ["--column", "time_s=t:ms", "--column", "motor_angle_rad=q:deg"]
     page = tmp_path / "p.html"
-    words += ["--column", "motor_current_a=i:mA", "--preview", "--json", "--plots", str(page)]
-    assert main(["import", str(table), *words]) == 0
-    answer = capsys.readouterr()
+    columns = "--column time_s=t:ms --column motor_angle_rad=q:deg --column motor_current_a=i:mA"
+    answer = said("import", table, columns, "--preview --json --plots", page)
     shown = json.loads(answer.out)["preview"]
     assert shown["first"]["motor_angle_rad"][1] == pytest.approx(WAVE[1])
     (angle, current) = shown["channels"]
@@ -189,7 +185,7 @@ def test_structs_that_differ_in_their_number_are_proposed_as_trials(tmp_path, sa
     assert (proposed in printed) == (names[1] == "trial2")
 
 
-def test_a_campaign_of_this_program_is_named_as_one(tmp_path, capsys):
+def test_a_campaign_of_this_program_is_named_as_one(tmp_path, said):
     write_text_atomic(tmp_path / "campaign.json", "{}")
-    assert main(["import", str(tmp_path), "--preview"]) == ExitCode.USAGE
-    assert "a recording of this program already" in capsys.readouterr().err
+    err = said("import", tmp_path, "--preview", code=ExitCode.USAGE).err
+    assert "a recording of this program already" in err
