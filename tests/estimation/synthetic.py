@@ -15,15 +15,7 @@ Extra = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 def run(
-    name: str,
-    frequency_hz: float,
-    load_n_m: float,
-    *,
-    seed: int,
-    seconds: float = 8.0,
-    noise_n_m: float = 1e-3,
-    offset_n_m: float = 0.0,
-    extra: Extra | None = None,
+    name, frequency_hz, load_n_m, *, seed, seconds=8.0, noise_n_m=1e-3, offset_n_m=0.0, extra=None
 ) -> Recording:
     """Return one run of the analytic rig.
 
@@ -89,3 +81,27 @@ def campaign_with_jaw() -> Campaign:
         )
         for run in campaign()
     )
+
+
+def runs(extra=None, count=12, seconds=6.0, first_seed=0):
+    random = np.random.default_rng(first_seed)
+    return [
+        run(
+            f"run{k:02d}",
+            0.2 + 0.15 * (k % 3),
+            0.05 * (1 + k // 3),
+            seed=first_seed + k,
+            seconds=seconds,
+            offset_n_m=0.02 + 0.005 * random.normal(),
+            extra=extra,
+        )
+        for k in range(count)
+    ]
+
+
+def spring(motor_rad, speed_rad_s, load_n_m):
+    return 0.02 * motor_rad / 35
+
+
+def spring_and_ripple(motor_rad, speed_rad_s, load_n_m):
+    return spring(motor_rad, speed_rad_s, load_n_m) + 0.0025 * np.sin(3 * motor_rad)

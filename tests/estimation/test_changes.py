@@ -118,7 +118,6 @@ def test_a_ripple_that_came_is_stated_with_its_period():
     sentence = next(lines(found))
     assert sentence.startswith("Came: ripple.motor at motor, ")
     period = re.search(r", period (\S+) m \(confidence", sentence)
-    assert period is not None
     assert float(period[1]) == pytest.approx(0.02, rel=0.02)
 
 

@@ -14,7 +14,7 @@ from estimation.fit_problem import prepared
 from estimation.fitting import _evidence
 from estimation.recording import Flag, Stretch
 from tests.estimation import synthetic
-from tests.estimation.campaigns import runs, spring, spring_and_ripple
+from tests.estimation.synthetic import runs, spring, spring_and_ripple
 
 pytestmark = pytest.mark.long
 
@@ -34,24 +34,6 @@ def test_flagged_stretches_are_left_out():
 
     found = diagnosed([broken(r) for r in runs(spring)])
     assert found.diagnosis.findings[0].family == "spring.position"
-
-
-def test_a_missing_effect_of_the_catalogue_is_named_and_confirmed():
-    found = diagnosed(runs(spring))
-    (finding,) = found.diagnosis.findings
-    assert finding.family == "spring.position"
-    # one equation reads one torque sensor, whose crosstalk from the angle would look the same, and
-    # over the spindle's small travel so would a weight
-    others = {"sensor.crosstalk", "hysteresis.presliding", "gravity.payload"}
-    assert {*finding.alternatives} <= others
-    assert finding.rmse_after < 0.2 * finding.rmse_before
-    assert finding.runs_improved == finding.runs_total == 4
-    stiffness = finding.parameters["stiffness"]
-    low, high = stiffness.ci95
-    # a spring subtracts from the target of this equation, so its stiffness is positive there
-    assert stiffness.value == pytest.approx(0.02, rel=0.05)  # along the spindle's angle
-    assert low <= stiffness.value <= high
-    assert stiffness.unit == "N m/rad"
 
 
 def test_the_model_written_with_two_causes_has_the_reported_errors_on_the_test_runs():

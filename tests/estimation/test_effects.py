@@ -80,7 +80,7 @@ def by_role(kind, channels, seed: int) -> dict[str, np.ndarray]:
 
 
 @EVERY
-@settings(deadline=None, max_examples=6)
+@settings(max_examples=6)
 @given(seed=st.integers(0, 1000), place=st.floats(0, 1))
 def test_offline_columns_and_live_steps_agree_to_rounding(kind, seed, place):
     shape = [at(p, place) for p in kind.shape]
@@ -278,7 +278,7 @@ def test_an_unknown_effect_names_the_nearest():
     ids=lambda e: e.id,
 )
 @given(place=st.floats(0.1, 0.9), seed=st.integers(0, 2**16))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_friction_opposes_the_motion_against_loads_of_both_signs(kind, place, seed):
     random = np.random.default_rng(seed)
     inputs = {role: random.normal(0.0, 1.0, 200) for role in kind.roles}

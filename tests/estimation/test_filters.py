@@ -41,7 +41,6 @@ def test_coefficients_are_the_published_ones(points, degree, expected):
     assert holoborodko_coefficients(points, degree) == pytest.approx(expected, abs=1e-15)
 
 
-@settings(deadline=None, max_examples=50)
 @given(st.lists(st.floats(-3, 3), min_size=5, max_size=5))
 def test_derivative_is_exact_on_polynomials_and_at_the_edges_on_parabolas(factors):
     x = np.linspace(-1, 1, 60)
@@ -172,7 +171,7 @@ def test_derived_channels_are_the_derivatives(source, tolerance):
     assert found["gearbox_differential_rad"] == pytest.approx(np.zeros(3000), abs=1e-9)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     cuts=st.lists(st.integers(0, 500), max_size=8), seed=st.integers(0, 5), tracked=st.booleans()
 )

@@ -35,9 +35,7 @@ def test_a_sound_machine_has_no_channel_of_the_opposite_sign(sound: list[Recordi
 
 
 @pytest.mark.parametrize("channel", ["crank_torque_n_m", "crank_angle_rad"])
-def test_the_drive_is_named_where_either_sign_is_wrong(
-    sound: list[Recording], channel: str
-) -> None:
+def test_the_drive_is_named_where_either_sign_is_wrong(sound, channel):
     assert _opposed(_negated(sound, channel)).startswith("crank_torque_n_m has the opposite sign")
 
 

@@ -20,7 +20,7 @@ from estimation.diagnosis.split import (
 )
 from estimation.recording import Recording
 from rig.importers.registry import open_campaign
-from tests.estimation.campaigns import runs
+from tests.estimation.synthetic import runs
 
 
 def moving(seed: int = 0, **more: np.ndarray) -> Recording:

@@ -84,14 +84,7 @@ elbow_angle_rad = "q2"
 """
 
 
-def axis_table(
-    file: Path,
-    runs: int = 10,
-    asymmetry: float = 0.0,
-    cogging: float = 0.0,
-    warming: str = "",
-    seed: int = 1,
-) -> None:
+def axis_table(file, runs=10, asymmetry=0.0, cogging=0.0, warming="", seed=1):
     """Write a table of an axis.
 
     Args:
@@ -119,15 +112,7 @@ def axis_table(
     np.savetxt(file, rows, delimiter=",", header=head, comments="", fmt="%.9g")
 
 
-def drive_table(
-    file: Path,
-    ratio: float = 35.0,
-    runs: int = 9,
-    rubs: float = 0.0,
-    lost_rad: float = 0.0,
-    wave_rad: float = 0.0,
-    seed: int = 1,
-) -> None:
+def drive_table(file, ratio=35.0, runs=9, rubs=0.0, lost_rad=0.0, wave_rad=0.0, seed=1):
     """Write a table of a belt drive with a torque cell.
 
     Args:

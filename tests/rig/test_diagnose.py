@@ -21,14 +21,13 @@ from rig.diagnosis import subject
 from rig.diagnosis.ledger import Ledger, look_at
 from rig.diagnosis.run import run_diagnosis
 from rig.diagnosis.schema import DiagnosisSchema
-from tests.estimation.campaigns import runs, spring
+from tests.estimation.synthetic import runs, spring
 from tests.rig.simulated import protocol_file
 
 pytestmark = pytest.mark.long
 
 
 def run(folder: Path, *words: str) -> dict[str, Any]:
-    """Diagnose, and return the JSON."""
     out, ledger = folder / "diagnosis.json", str(folder / "looks.jsonl")
     whole = ["diagnose", str(folder), "--json-out", str(out), "--ledger", ledger, *words]
     assert main(whole) == 0
@@ -81,6 +80,13 @@ def test_a_diagnosis_leaves_json_report_and_model(whole):
     # few short runs of one equation cannot exclude these
     others = {"hysteresis.presliding", "sensor.crosstalk", "gravity.payload"}
     assert set(finding["alternatives"]) <= others
+    assert finding["rmse_after"] < 0.2 * finding["rmse_before"]
+    assert finding["runs_improved"] == finding["runs_total"] == len(found["runs"]["confirm"])
+    stiffness = finding["parameters"]["stiffness"]
+    # a spring subtracts from the target of this equation, so its stiffness is positive there
+    assert stiffness["value"] == pytest.approx(0.02, rel=0.05)  # along the spindle's angle
+    assert stiffness["ci95"][0] <= stiffness["value"] <= stiffness["ci95"][1]
+    assert stiffness["unit"] == "N m/rad"
     assert found["verdict"] == ("one_of" if finding["alternatives"] else "identified")
     assert (found["next_experiment"] is None) == (not finding["alternatives"])
     assert found["exploratory"] is False

@@ -10,7 +10,7 @@ import pytest
 from estimation.campaign import Campaign
 from estimation.recording import Instrument, Recording
 from rig.diagnosis import subject
-from tests.estimation.campaigns import runs, spring
+from tests.estimation.synthetic import runs, spring
 
 pytestmark = pytest.mark.long
 
@@ -33,7 +33,6 @@ def without(channel: str, places: slice = slice(None)) -> Spoil:
 
 
 def every(change: Callable[[Recording], Recording]) -> Spoil:
-    """Change every run."""
     return lambda recordings: [change(r) for r in recordings]
 
 
@@ -50,7 +49,6 @@ def holed(r: Recording) -> Recording:
 
 
 def jumping(recording: Recording) -> Recording:
-    """The clock jumps."""
     time_s = recording.time_s.copy()
     time_s[700:] += 0.4
     return replace(recording, time_s=time_s)

@@ -10,7 +10,7 @@ from rig.diagnosis.durations import add, expected, work_of
 from rig.diagnosis.ledger import Ledger, LedgerError, look_at
 from rig.diagnosis.subject import subject
 from rig.output.console import time_left
-from tests.estimation.campaigns import runs
+from tests.estimation.synthetic import runs
 
 STAGES = ("reading", "searching", "opening")
 FIRST = runs(count=6, seconds=1.0)

@@ -17,7 +17,6 @@ Effect = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 def motor() -> Model:
-    """Return the shipped equation of the motor."""
     return model_file.read(Path("motor"))
 
 
@@ -62,15 +61,11 @@ def _run(k: int, lost: Effect | None, random: np.random.Generator, spring: bool)
 
 
 def gearbox() -> Model:
-    """Return the shipped equation of the gearbox."""
     return model_file.read(Path("gearbox"))
 
 
 def geared(
-    slow: float = 0.0,
-    bend: float = 0.0,
-    creep: float = 0.0,
-    wave: float = 0.0,
+    slow: float = 0.0, bend: float = 0.0, creep: float = 0.0, wave: float = 0.0
 ) -> list[Recording]:
     """Return runs of motor and gearbox against a load of both signs that moves in steps.
 
@@ -156,9 +151,7 @@ def _lagging(values: FloatArray, time_s: float) -> FloatArray:
 
 AXIS = """
 schema = "rig.machine/1"
-[machine]
-name = "linkage"
-run_offsets = false
+machine = { name = "linkage", run_offsets = false }
 [[axis]]
 name = "crank"
 unit = "rad"
@@ -174,16 +167,12 @@ reads = "position"
 
 
 def axis(drive: str = "crank_torque_n_m") -> Model:
-    """Return the equation of `AXIS`."""
     (model,) = declared(plant_file.parse(AXIS.replace("DRIVE", drive)))
     return model
 
 
 def turning(
-    torque: Effect = lambda angle, *_: 0.0 * angle,
-    *,
-    always_ahead: bool = False,
-    size: float = 1.0,
+    torque: Effect = lambda angle, *_: 0.0 * angle, *, always_ahead: bool = False, size: float = 1.0
 ) -> list[Recording]:
     """Return runs of one axis with inertia and friction; angle, speed and acceleration add torque.
 

@@ -56,6 +56,5 @@ def test_what_nothing_explains_is_stated_with_the_terms_at_their_bounds() -> Non
     found = diagnose(runs, [axis()], split(runs))
     assert found.findings == ()
     ratio = re.search(r"the error on the test runs is (\S+) times the noise", found.notes[0])
-    assert ratio is not None
     assert float(ratio[1]) > 5.0
     assert "at a bound: inertia.missing inertia" in found.notes[1]

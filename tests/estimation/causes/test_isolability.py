@@ -10,7 +10,6 @@ from tests.estimation.causes.synthetic import motor, recordings
 
 
 def _at_one_load(runs: list[Recording]) -> list[Recording]:
-    """Return the runs of one of the three loads."""
     return [run for k, run in enumerate(runs) if k % 3 == 0]
 
 
