@@ -52,12 +52,10 @@ def test_a_theorem_holds_for_the_core_and_not_for_a_damaged_one(
     folder = tmp_path / "firmware"
     shutil.copytree(FIRMWARE, folder, ignore=shutil.ignore_patterns("build"))
     program = core_proofs.build(folder)
-    assert program is not None
     assert core_proofs.decide(program, theorem, str(PROOFS_PYTHON)).broken == ()
     source = folder / "core" / file
     text = source.read_text()
     assert sound in text
     source.write_text(text.replace(sound, broken, 1))
     program = core_proofs.build(folder)
-    assert program is not None
     assert core_proofs.decide(program, theorem, str(PROOFS_PYTHON)).broken

@@ -149,7 +149,6 @@ CURVE = FsrCurve((0.1, 1.5), 0.04, 0.96)
 
 
 def remembered(gap, creep):
-    """What six presses with a gap remember."""
     t, runs = np.arange(0, 8, 0.02), []
     for k in range(6):
         volts = 0.05 + 0.9 * RNG(k).uniform(0.97, 1.0) * np.sin(np.pi * t / 8) ** 2

@@ -1,18 +1,38 @@
-"""An arm against Pinocchio and NumPy: tip, Jacobians, regressor, closed chains, payloads."""
+"""An arm against Pinocchio and NumPy: tip, Jacobians, regressor, payloads, wrench, excitation."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+from estimation.arm.excitation import (
+    ACCELERATION_PER_SPEED,
+    FUNDAMENTAL_HZ,
+    by_active_set,
+    condition,
+    fitted,
+    improved,
+    numbers_of,
+    start,
+)
 from estimation.arm.kinematics import ArmError, built, tip_pose
 from estimation.arm.motion import Motion, motion_of
 from estimation.arm.payload import added_mass, carried_torque, point_mass
-from estimation.arm.regressor import regressor
+from estimation.arm.regressor import names, regressor
 from estimation.arm.tables import PSM, Arm, DhRow, PointMass, Tool
-from estimation.arm.wrench import body_jacobians, spatial_jacobians, tip_jacobians
+from estimation.arm.wrench import (
+    LiveWrench,
+    body_jacobians,
+    by_pseudo_inverse,
+    most_likely,
+    spatial_jacobians,
+    tip_jacobians,
+)
+from rig.cli.study import study_app
 from rig.studies.delsol.hydraulic_arm import HYDRAULIC
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (extra arm)")
@@ -178,3 +198,112 @@ def test_a_mass_on_a_link_without_a_mass_of_its_own_is_refused():
     arm = PSM.with_payload(PointMass("weight", 4, (0.0, 0.0, 0.0), 0.1))
     with pytest.raises(ArmError, match="Link 4"):
         carried_torque(arm, motion())
+
+
+WRENCH = np.array([3.0, -2.0, 1.0, 0.2, 0.1, -0.1])
+ERROR = np.array([0.02, 0.02, 0.1, 0.001, 0.002, 0.002])
+
+
+def poses(n: int = 200) -> np.ndarray:
+    rng = np.random.default_rng(4)
+    lower, upper = (np.array([getattr(j, k) for j in PSM.joints]) for k in ("lower", "upper"))
+    return rng.uniform(lower, upper, (n, 6))
+
+
+def test_both_ways_give_back_the_wrench_that_was_applied():
+    jacobians = spatial_jacobians(PSM, poses())
+    torque = np.einsum("nij,i->nj", jacobians, WRENCH)
+    told = np.linalg.cond(jacobians) < 1e3
+    np.testing.assert_allclose(
+        by_pseudo_inverse(jacobians, torque)[told], WRENCH + np.zeros((told.sum(), 6)), atol=1e-6
+    )
+    found = most_likely(jacobians, torque, ERROR)
+    spread = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
+    assert np.all(np.abs(found.value - WRENCH) < 3 * spread)
+
+
+def test_the_covariance_is_that_of_the_errors():
+    rng = np.random.default_rng(6)
+    jacobians = np.repeat(spatial_jacobians(PSM, poses(1)), 4000, axis=0)
+    noise = ERROR * rng.normal(size=(4000, 6))
+    found = most_likely(jacobians, np.einsum("nij,i->nj", jacobians, WRENCH) + noise, ERROR)
+    off = found.value - found.value.mean(axis=0)
+    distance = np.einsum("ni,nij,nj->n", off, np.linalg.inv(found.covariance), off)
+    # likely wrenches take a little of the scatter away
+    assert 4.5 < distance.mean() < 6.3
+
+
+def test_a_singular_pose_gives_a_finite_wrench_and_a_wide_covariance():
+    singular = np.array([[0.0, 0.0, 0.02, 0.0, 0.0, 0.0]])  # the wrist in the remote centre
+    jacobians = spatial_jacobians(PSM, singular)
+    assert np.linalg.cond(jacobians[0]) > 1e6
+    found = most_likely(jacobians, ERROR[None], ERROR)
+    assert np.abs(found.value).max() < 40
+    widest = np.sqrt(np.linalg.eigvalsh(found.covariance[0])[-1])
+    ordinary = most_likely(spatial_jacobians(PSM, np.full((1, 6), 0.1)), ERROR[None], ERROR)
+    assert widest > 3 * np.sqrt(np.linalg.eigvalsh(ordinary.covariance[0])[-1])
+
+
+def test_the_live_wrench_is_the_one_applied_half_a_window_ago():
+    rng = np.random.default_rng(0)
+    values, period = 0.1 * rng.normal(size=68), 1e-3
+    # friction's sign does not commute with the window
+    values[[name.startswith("Fs") for name in names(PSM)]] = 0
+    time = np.arange(0, 1.5, period)[:, None]
+    turn = 1 + np.arange(6)
+    size = np.array([0.3, 0.3, 0.03, 0.5, 0.5, 0.5])
+    middle = np.array([0, 0, 0.1, 0, 0, 0])
+    wave = (size * np.sin(turn * time), size * turn * np.cos(turn * time))
+    motion = Motion(middle + wave[0], wave[1], -(turn**2) * wave[0], period)
+    pushed = WRENCH * np.sin(2 * time)
+    jacobians = spatial_jacobians(PSM, motion.position)
+    torque = regressor(PSM, motion) @ values + np.einsum("nij,ni->nj", jacobians, pushed)
+    live = LiveWrench(PSM, values, ERROR, period)
+    found = [live.step(q, t) for q, t in zip(motion.position, torque, strict=True)]
+    assert found[59] is None
+    ready = np.array(found[60:])
+    np.testing.assert_allclose(ready, pushed[30 : 30 + len(ready)], atol=0.12)
+
+
+def test_wrong_numbers_are_named():
+    with pytest.raises(ArmError, match="68 parameters"):
+        LiveWrench(PSM, np.zeros(3), ERROR, 1e-3)
+    with pytest.raises(ArmError, match="positive error"):
+        most_likely(spatial_jacobians(PSM, poses(1)), ERROR[None], np.zeros(6))
+    with pytest.raises(ArmError, match="finite"):
+        spatial_jacobians(PSM, np.full((1, 6), np.nan))
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 10_000), st.floats(0, 1))
+def test_limits_hold_between_the_sampled_instants(seed, phase):
+    time = (np.arange(7919) + phase) / (7919 * FUNDAMENTAL_HZ)
+    motion = fitted(PSM, start(PSM, seed)).motion(time)
+    for k, joint in enumerate(PSM.joints):
+        assert joint.lower <= motion.position[:, k].min()
+        assert motion.position[:, k].max() <= joint.upper
+        assert np.abs(motion.velocity[:, k]).max() <= joint.speed
+        assert np.abs(motion.acceleration[:, k]).max() <= ACCELERATION_PER_SPEED * joint.speed
+
+
+def test_the_command_writes_a_table_and_a_trajectory_within_limits(tmp_path):
+    out, path = tmp_path / "excitation.md", tmp_path / "trajectory.csv"
+    words = ["excitation", "--starts", "1", "--evaluations", "150", "--out", str(out)]
+    ran = CliRunner().invoke(study_app, [*words, "--trajectory", str(path), "--json"])
+    assert ran.exit_code == 0, ran.output
+    (row,) = json.loads(ran.stdout)["starts"]
+    assert row["ours"]["condition"] < row["condition"]
+    assert row["ours"]["limits_share"] <= 1 + 1e-9
+    assert "active set: condition" in out.read_text()
+    values = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert values.shape == (2000, 7)
+    for k, joint in enumerate(PSM.joints):
+        assert joint.lower <= values[:, k + 1].min() < values[:, k + 1].max() <= joint.upper
+
+
+@pytest.mark.long
+def test_a_search_is_never_worse_than_its_start():
+    """From this start the last trial of a search is eight times worse than the start."""
+    first = by_active_set(PSM, fitted(PSM, start(PSM, 1)), 3000)
+    scaled = fitted(PSM, numbers_of(PSM, first))
+    assert condition(PSM, improved(PSM, first, 3000)) <= condition(PSM, scaled)

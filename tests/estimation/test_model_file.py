@@ -49,7 +49,7 @@ def models(draw: st.DrawFn) -> Model:
     )
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(several=st.lists(models(), min_size=1, max_size=4))
 def test_what_is_written_is_read_back(several):
     text = to_toml(*several)
@@ -58,20 +58,11 @@ def test_what_is_written_is_read_back(several):
 
 
 def test_shipped_models_are_declared_and_not_fitted():
-    targets = {
-        "cable": "proximal_torque_n_m",
-        "gearbox": "gearbox_differential_rad",
-        "grip": "distal_torque_n_m",
-        "linear": "proximal_torque_n_m",
-        "motor": "proximal_torque_n_m",
-        "stretch": "jaw_angle_rad",
-    }
-    assert targets.keys() <= {*names()}
-    for name, target in targets.items():
+    assert {"cable", "gearbox", "grip", "linear", "motor", "stretch"} <= {*names()}
+    for name in names():
         model = read(Path(name))
-        assert (model.name, model.target) == (name, target)
+        assert model.name == name
         assert not model.is_fitted
-    assert [term.sign for term in read(Path("motor")).terms] == [1, -1, -1, -1, 1]
 
 
 DECLARED = to_toml(read(Path("motor")))

@@ -200,18 +200,6 @@ SLIDE = Plant(
 )
 
 
-def test_a_linear_axis_is_fitted_in_metres_and_newtons():
-    (model,) = declared(SLIDE)
-    fitted = fit(model, Campaign.of([slide(k) for k in range(4)]), bootstrap=0)
-    values = {t.effect.id: t for t in fitted.terms}
-    inertia, viscous = values["inertia.missing"], values["friction.viscous"]
-    assert inertia.values["inertia"].value == pytest.approx(90.0, rel=0.05)
-    assert viscous.values["damping"].value == pytest.approx(200.0, rel=0.05)
-    assert values["friction.coulomb"].values["friction"].value == pytest.approx(20.0, rel=0.1)
-    units = [t.unit(t.parameters[0], fitted.target) for t in (inertia, viscous)]
-    assert units == ["N s^2/m", "N s/m"]
-
-
 def test_the_unit_of_a_travel_does_not_matter():
     sensor = Sensor("carriage_angle_rad", "carriage", "position", counts=1e3)
     shaft = replace(SLIDE, axes=(Axis("carriage", "rad"),), sensors=(sensor,))

@@ -18,30 +18,24 @@ from rig.machines.shipped import read_machine, shipped
 
 SLIDE = """
 schema = "rig.machine/1"
-
 [machine]
 name = "slide"
 run_offsets = false
-
 [[axis]]
 name = "carriage"
 unit = "m"
-
 [[actuator]]
 name = "drive_force_n"
 axis = "carriage"
-
 [[sensor]]
 name = "carriage_position_m"
 axis = "carriage"
 reads = "position"
-
 [data]
 [data.columns]
 time_s = "t"
 carriage_position_m = "x:mm"
 drive_force_n = "volts:35 N"
-
 [data.runs]
 lap_s = 3.0
 """
@@ -83,9 +77,10 @@ def test_a_table_in_millimetres_and_volts_is_fitted_in_metres_and_newtons(
 ):
     file, table = slide
     (equation,) = answered("machine check", file, table)["check"]["equations"]
-    values = {(p["effect"], p["name"]): p for p in equation["parameters"]}
-    assert values["inertia.missing", "inertia"]["value"] == pytest.approx(95.0, rel=0.05)
-    assert values["friction.viscous", "damping"]["unit"] == "N s/m"
+    found = {p["name"]: (p["value"], p["unit"]) for p in equation["parameters"]}
+    assert found["inertia"] == (pytest.approx(95.0, rel=0.05), "N s^2/m")
+    assert found["damping"] == (pytest.approx(200.0, rel=0.05), "N s/m")
+    assert found["friction"] == (pytest.approx(20.0, rel=0.1), "N")
     model = tmp_path / "slide.model.toml"
     said("fit", table, "--machine", file, "--out", model)
     words = ("replay", table, "--machine", file, "--model", model)
@@ -124,7 +119,6 @@ LOADED = SLIDE.replace(
 name = "belt_force_n"
 axis = "carriage"
 reads = "effort"
-
 [data]
 """,
 ).replace('drive_force_n = "volts:35 N"', 'drive_force_n = "volts:35 N"\nbelt_force_n = "cell"')
