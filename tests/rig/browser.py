@@ -41,5 +41,4 @@ class Opened:
         self.page.wait_for_selector("html[data-drawn=yes]", timeout=60_000)
 
     def close(self) -> None:
-        """Close the page and its context."""
         self.page.context.close()

@@ -52,7 +52,6 @@ def newcomer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def program(library: Path) -> Path:
-    """The firmware as a program."""
     if not PROGRAM.is_file():
         pytest.skip("the firmware process is built on Linux only")
     return PROGRAM

@@ -31,7 +31,6 @@ def simulated(**simulation: object) -> Config:
 
 
 def transport(config: Config) -> SimulatedTransport:
-    """A transport to the configured simulated rig."""
     return open_simulated_logger(config.simulation, watchdog_s=config.safety.watchdog_s)
 
 

@@ -45,7 +45,6 @@ def added(rig, tmp_path):
 
 @pytest.fixture
 def log(rig, tmp_path):
-    """The log of one short run."""
     rig("record -p", protocol_file(tmp_path), "--out", tmp_path / "runs")
     (log,) = (tmp_path / "runs").glob("*.mcap")
     return log

@@ -34,7 +34,6 @@ def with_ft(**changes):
 
 
 def narrow(rig, limits):
-    """Narrow a limit while the rig moves."""
     rig.companions[0]._limits = limits.further
 
 

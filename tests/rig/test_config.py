@@ -9,12 +9,6 @@ from rig.configuration.config import SIMULATED, load_config, shipped_configs, to
 from rig.errors import ExitCode, UsageError
 
 
-def test_the_simulated_rig_is_the_default():
-    config = load_config()
-    assert config.is_simulated
-    assert config.calibration_set().name == "reference"
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

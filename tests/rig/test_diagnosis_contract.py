@@ -65,7 +65,7 @@ DIAGNOSES = st.builds(
 )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(diagnosis=DIAGNOSES)
 def test_every_field_is_there_and_no_number_is_undefined(diagnosis):
     text = json.dumps(diagnosis.to_json(), allow_nan=False)

@@ -4,18 +4,22 @@ import io
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from estimation.diagnosis.result import VERDICTS
-from rig.diagnosis.traces import Traces
+from estimation import model_file
+from estimation.causes.verdict import answer
+from estimation.diagnosis.result import VERDICTS, Diagnosis
+from estimation.diagnosis.split import split
+from rig.diagnosis.traces import Traces, traces
 from rig.output.provenance import Provenance
 from rig.reports.diagnosis import page
 from rig.reports.diagnosis_words import next_sentence, sentences
+from tests.estimation.synthetic import campaign
 from tests.rig.browser import Opened, chromium
-from tests.rig.diagnosed import example
 from tests.rig.test_reports import Page
 
 pytestmark = pytest.mark.integration
@@ -27,8 +31,24 @@ PROFILE = "#chart-residual-1-1"
 
 
 @pytest.fixture(scope="module")
-def diagnosed():
-    return example()
+def diagnosed() -> tuple[Diagnosis, Traces]:
+    """Return a diagnosis that found a ripple of seven waves a motor turn, and its signals.
+
+    Its name is made less sure than it is, so that a page of it has every part.
+    """
+    runs = list(campaign(lambda angle, speed, load: 3e-3 * np.sin(7 * angle)))
+    found = answer(runs, [model_file.read(Path("motor"))], split(runs, 0))
+    (sure,) = found.diagnosis.findings
+    assert sure.family == "ripple.motor"
+    doubted = replace(
+        sure,
+        verdict="one_of",
+        alternatives=("ripple.current",),
+        confidence=0.71,
+        probabilities={"ripple.motor": 0.71, "ripple.current": 0.25},
+    )
+    told = {"notes": ("A note with a <tag> & more.",), "noise_floor": {"motor": 1e-3}}
+    return replace(found.diagnosis, findings=(doubted,), **told), traces(found)
 
 
 @pytest.fixture(scope="module")

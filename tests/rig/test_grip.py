@@ -26,8 +26,6 @@ def test_a_torque_the_load_cannot_give_is_reported(said):
 
 
 class Constant:
-    """An estimator that says one number."""
-
     target_channel = "distal_torque_n_m"
     inside = None
 

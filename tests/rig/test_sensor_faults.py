@@ -1,4 +1,4 @@
-"""Encoders and the current read-back that fail while the rig moves, held by the firmware core."""
+"""Sensors that fail while the rig moves, held by the firmware core; a share of soak and fuzz."""
 
 import ctypes
 import math
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.reliability import dead_encoders
+from benchmarks.reliability import dead_encoders, fuzz
 from benchmarks.reliability.encoder_faults import (
     FAULTS,
     JAW,
@@ -20,9 +20,13 @@ from benchmarks.reliability.encoder_faults import (
     ride,
     sound,
 )
+from benchmarks.reliability.faults import SENSOR_FAULTS, inject
+from benchmarks.reliability.targets import TARGETS
+from drivers.registry import fakes
 from drivers.teensy.core import CoreGuard, FirmwareBoard
 from drivers.teensy.logic import Drive
 from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, Kind, Result, Trip
+from drivers.transport.faulty import Fault
 from rig.configuration.config import load_config
 from rig.machines.choose import machine_of
 from rig.protocols.motion import motion_of
@@ -182,3 +186,29 @@ def test_a_grasper_with_a_wrong_decoder_input_stops(library, shares_an_input):
     tripped = (samples["status"] & STATUS_LIMIT_TRIPPED) != 0
     assert tripped.any() == shares_an_input
     assert (rig.farthest_rad < [1.4, 1.0, 1.0]).all()
+
+
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+def test_a_decoder_refuses_or_reads_right_whatever_comes(target):
+    tally = fuzz.Tally()
+    fuzz.run_block(target, 10**6, tally, size=150)
+    assert tally.failures == []
+    assert tally.inputs == 150
+    good = [target.run(seed) for seed in target.seeds()]
+    assert all(good), "an unharmed input is not accepted"
+
+
+def test_faults_of_every_kind_are_detected_and_end_safe_in_time(library):
+    kinds = len(SENSOR_FAULTS) + len(FAULTS) + 2 + len(Fault) * len(fakes())
+    outcomes = list(inject(kinds, seed=5))
+    assert len({outcome.kind for outcome in outcomes}) == kinds
+    for outcome in outcomes:
+        assert outcome.crash == ""
+        assert outcome.detected, outcome
+        of_a_link = " on the link of " in outcome.kind  # not every protocol tells faults apart
+        assert outcome.named or of_a_link, outcome
+        assert outcome.mis_stamped == 0, outcome
+        silence = outcome.kind in ("host killed", "cable cut")
+        if outcome.safe_after_s is not None:
+            assert outcome.safe_after_s <= (0.052 if silence else 0.020), outcome
+    assert sum(outcome.safe_after_s is not None for outcome in outcomes) == len(SENSOR_FAULTS) + 2

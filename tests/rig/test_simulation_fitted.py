@@ -1,4 +1,4 @@
-"""The rig of fitted models: it is the plant that was recorded, with the recordings' noise."""
+"""The rig of fitted models: the recorded plant with its noise; effects its equations may have."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
+from estimation.effects import effect
 from estimation.fitting import fit
 from estimation.model import Model, NotFittedError
 from estimation.recording import MissingChannelError, Recording
@@ -18,6 +19,7 @@ from rig.simulation.campaign import bench_at, simulated_run
 from rig.simulation.fitted import DECLARED_PLANT, plant_of
 from rig.simulation.fitted_rig import fitted_rig, noise_std
 from rig.simulation.parameters import SensorParameters, vary
+from rig.simulation.reference_roles import candidates
 
 pytestmark = pytest.mark.integration
 
@@ -98,3 +100,21 @@ def test_runs_without_trajectory_or_channels_and_an_unfitted_model_are_refused(r
         fitted_rig(fitted, [replace(run, columns={"motor_angle_rad": run["motor_angle_rad"]})])
     with pytest.raises(NotFittedError):
         fitted_rig(model_file.reference_rig(), recorded)
+
+
+CHANNELS = ("motor_current_a", "motor_angle_rad", "spindle_angle_rad")
+
+
+def test_what_acts_at_rest_is_searched_where_samples_at_rest_count():
+    moving = {t.effect.id for t in candidates("motor", CHANNELS)}
+    resting = {t.effect.id for t in candidates("motor", CHANNELS, at_rest=True)}
+    assert {i for i in resting if effect(i).at_rest} == resting - moving
+    assert "friction.load.sticking" in resting
+
+
+def test_a_channel_may_play_the_roles_of_another():
+    instead = {"motor_current_a": "motor_command_ratio", "motor_load_n_m": "motor_command_ratio"}
+    measured = ("motor_command_ratio", "motor_angle_rad", "spindle_angle_rad")
+    found = [term.channels for term in candidates("motor", measured, instead)]
+    assert any(c.get("current") == "motor_command_ratio" for c in found)
+    assert all("motor_current_a" not in c.values() for c in found)

@@ -135,12 +135,6 @@ def test_equation_5_is_the_difference_of_equations_1_and_4(alpha, beta, ratio):
     assert path.shortening_m(alpha, beta) == pytest.approx(change, abs=1e-15)
 
 
-def test_the_papers_wrist_turns_twice_its_input():
-    assert Planetary(1.0).yaw_over_carrier == 2.0
-    assert Planetary(1.0).decoupling_pulley_ratio == 1.0  # equation 11
-    assert Planetary(1.0, -1.0).decoupling_pulley_ratio == 0.5  # equation 10
-
-
 @pytest.mark.parametrize("gear_ratios", [(1.0, 2.0, 3.0), (1.0, 1 / 2, 1 / 3)])
 def test_of_27_designs_the_papers_is_the_most_compact(gear_ratios):
     found = designs(gear_ratios)
