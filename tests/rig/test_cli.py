@@ -50,6 +50,7 @@ SLIPS = {
     "grip --torque 0.05 --duration inf --sim": "--duration inf cannot be used",
     "grasper follow --sim --duration inf": "--duration inf cannot be used",
     "live -c simulatd": "Did you mean 'simulated'",
+    "config check nothere.toml": "why: No such file or directory\n",
     "live --sim --duration -1": "--duration -1 cannot be used",
     "live --sim --duration nan": "--duration nan cannot be used",
     "live --sim --pace -1": "--pace -1 cannot be used",
