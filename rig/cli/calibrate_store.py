@@ -170,16 +170,28 @@ def diagnose(
     json: JsonFlag = False,
 ) -> None:
     """Run the diagnosis on the raw logs of a calibration."""
+    from estimation.diagnosis.split import SplitError
     from rig.calibrate.declared import declared_by_record
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import of_calibration
     from rig.reports.diagnosis_words import sentences
 
-    asked = of_calibration(declared_by_record(holding(record, store).get(record)))
+    declared = declared_by_record(holding(record, store).get(record))
     looks = Ledger(ledger or default_ledger())
-    with stages() as on_stage:
-        done, look = run_diagnosis(asked, looks, seed=seed, on_stage=on_stage)
+    try:
+        with stages() as on_stage:
+            done, look = run_diagnosis(
+                of_calibration(declared), looks, seed=seed, on_stage=on_stage
+            )
+    except SplitError as error:
+        if len(declared.recordings) > 2:
+            raise
+        raise SplitError(
+            f"The calibration has {len(declared.recordings)} runs, too few for a diagnosis.",
+            "A run is one pass, move or press, or one axis in a round of poses.",
+            "Calibrate again with more: --repeats 4 with weights, --repeats 3 with poses.",
+        ) from error
     looks.enter(look)
     data = done.diagnosis.to_json() if json else None
     present(json, data, *sentences(done.diagnosis), *done.diagnosis.notes)
