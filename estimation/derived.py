@@ -123,6 +123,17 @@ def origin_of(name: str) -> tuple[str, int]:
     return name, 0
 
 
+def rates_of(position: str) -> tuple[str, ...]:
+    """Return the names of the speed and the acceleration of an angle or a position; else none."""
+    if position.endswith("_angle_rad"):
+        return tuple(
+            position.removesuffix("_angle_rad") + rate for rate in (VELOCITY, ACCELERATION)
+        )
+    if position.endswith("_position_m"):
+        return tuple(position.removesuffix("_position_m") + rate for rate in SLIDES)
+    return ()
+
+
 def _source(name: str, signals: Signals) -> tuple[str, int]:
     """Return the channel or combination a channel is the derivative of, and how many times."""
     return origin_of(name) if signals.combination(name) is None else (name, 0)

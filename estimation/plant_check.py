@@ -12,16 +12,17 @@ from estimation.campaign import Campaign
 from estimation.channels import unit_of
 from estimation.derived import CLOCKS, measured_channels, zero_phase_channels
 from estimation.errors import EstimationError, nearest
+from estimation.filters import LowPass
 from estimation.fitting import fit
 from estimation.model import Evidence, Model, balance_channels, settled
 from estimation.noise import MOST_NOISE, noise_width, noisy_sentence, white_noise
 from estimation.opposed import FIX, opposed, size_of_target
 from estimation.plant import Plant
-from estimation.plant_equations import Missing, missing, unused
+from estimation.plant_equations import Missing, missing, signals, unused
 from estimation.plant_models import declared
 from estimation.recording import Recording, move_condition, shared_columns
 from estimation.signals import Reading
-from estimation.travel import FOLLOWS, slope
+from estimation.travel import FOLLOWS, other_ratio, slope
 
 ALIKE = 3.0
 """Factor between a noise that is stated and that of the recordings."""
@@ -293,8 +294,14 @@ def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) ->
         driving, driven = plant.position(joint.input), plant.position(joint.output)
         if joint.ratio is None or driving is None or driven is None:
             continue
-        wound = [s.name for s in plant.sensors if s.reads == "effort" and s.axis == joint.output]
-        change = slope(recordings, driven.name, driving.name, wound if joint.compliant else ())
+        if joint.compliant:
+            wound = [
+                s.name for s in plant.sensors if s.reads == "effort" and s.axis == joint.output
+            ]
+            low_pass, ends = LowPass(plant.cutoff_hz, plant.order), (driving.name, driven.name)
+            change = other_ratio(recordings, ends, joint.ratio, wound, low_pass, signals(plant))
+        else:
+            change = slope(recordings, driven.name, driving.name)
         if change is not None and abs(change / joint.ratio - 1.0) > FOLLOWS:
             yield (
                 f"{file} states the ratio {joint.ratio:g} for {joint.name}, but {driving.name}"

@@ -9,10 +9,12 @@ from estimation.campaign import Campaign
 from estimation.causes.equations import LayoutError
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
+from estimation.filters import LowPass
 from estimation.fitting import fit
 from estimation.opposed import opposed
 from estimation.recording import Recording
-from estimation.travel import slope
+from estimation.signals import Signals
+from estimation.travel import other_ratio, slope
 from tests.estimation.causes.synthetic import axis, turning
 
 
@@ -60,6 +62,49 @@ def test_a_compliance_is_not_taken_for_another_ratio(ratio, compliance):
     runs = [run(ratio, compliance)]
     found = slope(runs, "spindle_angle_rad", "motor_angle_rad", ["proximal_torque_n_m"])
     assert found == pytest.approx(ratio, rel=1e-6)
+
+
+def bent(ratio: float, frequencies: list[float]) -> list[Recording]:
+    """Return runs of a spring behind a gear, with a mass before the sensor of torque at its end."""
+    runs = []
+    for k, frequency in enumerate(frequencies):
+        time_s = np.arange(0.0, 10.0, 0.005)
+        phase = 2.0 * np.pi * frequency * time_s
+        angle = 0.5 * np.sin(phase) + 0.1 * np.sin(2.0 * phase + 1.0)
+        speed = np.gradient(angle, time_s)
+        load = 40.0 * (angle - 0.5 * np.sin(phase - 0.25)) + 2.0 * speed
+        bend = (load + 0.15 * speed + 0.3 * np.gradient(speed, time_s)) / 250.0
+        columns = {"motor_angle_rad": ratio * (angle + bend)}
+        columns |= {"knee_angle_rad": angle, "knee_torque_n_m": load}
+        runs.append(Recording(f"{k}", time_s, columns))
+    return runs
+
+
+def found_ratio(runs: list[Recording], stated: float) -> float | None:
+    ends, efforts = ("motor_angle_rad", "knee_angle_rad"), ["knee_torque_n_m"]
+    return other_ratio(runs, ends, stated, efforts, LowPass(20.0), Signals())
+
+
+def test_the_bend_by_a_mass_before_the_sensor_is_not_taken_for_another_ratio():
+    runs = bent(80.0, [0.5, 0.7, 0.9, 1.1])
+    ends = "knee_angle_rad", "motor_angle_rad"
+    assert abs(slope(runs, *ends, ["knee_torque_n_m"]) - 80.0) > 1.6
+    assert found_ratio(runs, 80.0) is None
+
+
+@pytest.mark.parametrize("stated", [76.0, 84.0, -80.0])
+def test_another_ratio_of_a_flexible_transmission_is_found_with_its_value(stated):
+    runs = bent(80.0, [0.5, 0.7, 0.9, 1.1])
+    assert found_ratio(runs, stated) == pytest.approx(80.0, rel=0.002)
+
+
+def test_motion_of_one_frequency_does_not_hide_another_ratio():
+    torque = "proximal_torque_n_m"
+    ends = "motor_angle_rad", "spindle_angle_rad"
+    for stated, expected in ((35.0, None), (20.0, pytest.approx(35.0, rel=0.01))):
+        runs = [run(35.0, 0.01)]
+        found = other_ratio(runs, ends, stated, [torque], LowPass(20.0), Signals())
+        assert found == expected
 
 
 def test_what_never_moves_has_no_slope():
