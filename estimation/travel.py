@@ -16,8 +16,8 @@ FOLLOWS = 0.02
 """Share by which two readings of one travel may differ."""
 
 OWN, CLEAR = 0.01, 2.0
-"""Share of a travel's square that its rates must not explain: of one frequency, they are the travel. And
-the travel that a stated ratio is wrong by, over what nothing explains, at least."""
+"""Share of a travel's square that its rates must not explain, since of one frequency they are the
+travel; and the travel that a stated ratio is wrong by over what nothing explains, at least."""
 
 
 class Slope(NamedTuple):

@@ -22,6 +22,10 @@ ALIKE, FACTOR = 0.7, 2.0
 """Correlation from which a run follows the prediction of the others, and the factor from which it
 is remarked on."""
 
+UNEXPLAINED, AS_USUAL = 0.1, 1.5
+"""Share of a run's own variation that the prediction times a factor may not explain: the first, or
+so many times that of half of the runs. A run in which another effect dominates has more."""
+
 OPEN = 0.05
 """Probability of acting, or of not acting, below which the training runs decide."""
 
@@ -79,7 +83,8 @@ class HeldOut:
         """Return equation, run and factor where a run's target is not what the others predict.
 
         The factor is the slope of the target over the prediction of the other runs: -1 where a sign
-        is swapped, 57 where degrees were taken for radians.
+        is swapped, 57 where degrees were taken for radians. The run's variation has to be the
+        prediction times that factor, as closely as in most runs.
 
         Args:
             kept: The causes found, each with the runs in which it acts; they predict too.
@@ -94,8 +99,11 @@ class HeldOut:
             both = np.einsum("rb,rb->r", fits.base, gram[:, :-1, -1])
             predicted = np.einsum("rb,rbc,rc->r", fits.base, gram[:, :-1, :-1], fits.base) + TINY
             alike = np.abs(both) / np.sqrt(predicted * gram[:, -1, -1] + TINY)
+            rest = 1.0 - alike**2
+            most = max(UNEXPLAINED, AS_USUAL * float(np.median(rest)))
+            is_scaled = (alike > ALIKE) & (rest < most)
             for run, slope, agrees in zip(
-                self.layout.runs, both / predicted, alike > ALIKE, strict=True
+                self.layout.runs, both / predicted, is_scaled, strict=True
             ):
                 if agrees and not 1.0 / FACTOR < slope < FACTOR:
                     found.append((name, run.name, float(slope)))

@@ -39,6 +39,40 @@ def test_a_run_with_a_swapped_sign_is_the_first_note() -> None:
     assert len(found.notes) > 1
 
 
+def uneven(factor: float, share: float) -> tuple[list[Recording], str]:
+    """Return runs that the equation predicts but for a slow part, and a test run apart from them.
+
+    Its torque is so many times the predicted one, with a slow part of such a share of that.
+    """
+    random = np.random.default_rng(3)
+    runs = turning(lambda angle, speed, acceleration: 0.0 * speed)
+    (name, *_) = split(runs).confirm
+    out = []
+    for run in runs:
+        slow = np.cumsum(random.normal(0, 1.0, len(run.time_s)))
+        slow = (slow - slow.mean()) / slow.std()
+        torque = run["crank_torque_n_m"]
+        gain, part = (factor, share) if run.name == name else (1.0, 0.2)
+        torque = gain * (torque + part * torque.std() * slow)
+        out.append(run.with_columns(crank_torque_n_m=torque))
+    return out, name
+
+
+@pytest.mark.parametrize("factor", [4.448, 0.2248])
+def test_a_run_in_another_unit_is_remarked_on_with_the_factor(factor: float) -> None:
+    runs, name = uneven(factor, 0.2)
+    (note,) = [one for one in diagnose(runs, [axis()], split(runs)).notes if REMARK in one]
+    said = re.fullmatch(rf"{name}: crank_torque_n_m is (\S+) {REMARK} .*", note)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(factor, rel=0.15)
+
+
+def test_a_run_that_a_factor_explains_worse_than_the_others_is_not_remarked_on() -> None:
+    runs, _ = uneven(0.3, 0.55)
+    found = diagnose(runs, [axis()], split(runs))
+    assert not [note for note in found.notes if REMARK in note]
+
+
 def test_a_term_that_differs_is_stated_of_the_fewer_runs() -> None:
     pairs = zip(turning(lambda *_: 0.0), turning(lambda _, speed, __: 0.02 * speed), strict=True)
     runs = [one if k in (1, 5, 8) else two for k, (one, two) in enumerate(pairs)]
