@@ -8,11 +8,11 @@ import numpy as np
 
 from estimation.channels import UnknownUnitError, unit_of, unit_or_none
 from estimation.recording import FloatArray
-from rig.errors import DataError
+from rig.errors import DataError, UsageError
 from rig.importers.table.data import DATE, TIME, Source
 from rig.importers.table.delimited import bad_cell
-from rig.importers.table.formula import FormulaError, evaluate, names_in
-from rig.importers.table.mapping import Mapping
+from rig.importers.table.formula import names_in
+from rig.importers.table.mapping import Mapping, worked_out
 from rig.importers.table.raw import Raw, Values
 from rig.importers.table.units import BASE, conversion, stated_in_name
 
@@ -61,8 +61,8 @@ def to_samples(raw: Raw, mapping: Mapping) -> Samples:
     """Convert a file.
 
     Raises:
-        DataError: A mapped column is not there, holds text, or is empty; a formula reads a name
-            that is neither a channel nor a condition.
+        DataError: A mapped column is not there, holds text, or is empty.
+        UsageError: A formula reads a name that is neither a channel nor a condition.
     """
     data = mapping.data
     sources = data.columns or _by_name(raw, mapping)
@@ -90,13 +90,11 @@ def to_samples(raw: Raw, mapping: Mapping) -> Samples:
         )
     for name, formula in _in_order(mapping):
         known = {**conditions, **channels, TIME: time_s}
+        where = mapping.where("formulas", name)
         try:
-            values = np.asarray(evaluate(formula, known), dtype=np.float64)
-        except (FormulaError, ValueError, TypeError) as error:
-            raise DataError(
-                f"{mapping.where('formulas', name)}: {error}.",
-                f"There are {', '.join(known)}.",
-            ) from error
+            values = np.asarray(worked_out(where, formula, known), dtype=np.float64)
+        except (ValueError, TypeError) as error:
+            raise DataError(f"{where}: {error}.", f"There are {', '.join(known)}.") from error
         channels[name] = np.broadcast_to(values, time_s.shape).astype(np.float64)
     return Samples(raw, mapping, time_s, channels, conditions, started_at_ns)
 
@@ -261,7 +259,7 @@ def _in_order(mapping: Mapping) -> list[tuple[str, str]]:
     while left:
         ready = [n for n, text in left.items() if not set(names_in(text)) & set(left)]
         if not ready:
-            raise DataError(
+            raise UsageError(
                 f"{mapping.where('formulas', next(iter(left)))}: formulas read one another in a"
                 f" circle: {', '.join(left)}."
             )
@@ -271,5 +269,5 @@ def _in_order(mapping: Mapping) -> list[tuple[str, str]]:
             unit_of(name)
         except UnknownUnitError as error:
             where = mapping.where("formulas", name)
-            raise DataError(f"{where}: {error.what}", error.why, error.fix) from error
+            raise UsageError(f"{where}: {error.what}", error.why, error.fix) from error
     return ordered

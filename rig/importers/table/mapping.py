@@ -12,10 +12,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from estimation.channels import UNIT_BY_SUFFIX, UnknownUnitError, unit_of
+from estimation.derived import origin_of
 from rig.configuration.validation import explain, line_of
 from rig.errors import UsageError
 from rig.importers.table.data import DATE, TIME, Data, Invalid, Runs, Section, Source
-from rig.importers.table.formula import FormulaError, names_in
+from rig.importers.table.formula import FormulaError, evaluate, names_in
 from rig.importers.table.units import NotAUnitError, conversion
 
 EXAMPLES = Path(str(files("rig"))) / "machines" / "examples"
@@ -150,6 +151,28 @@ def _formula(where: str, formula: str) -> None:
         names_in(formula)
     except FormulaError as error:
         raise UsageError(f"{where}: {error}.") from error
+
+
+def worked_out(where: str, formula: str, known: Names[str, Any]) -> Any:
+    """Return the values of a formula of the mapping.
+
+    Raises:
+        UsageError: It reads a name that is neither a channel nor a condition, or is not a formula.
+    """
+    lacking = [name for name in names_in(formula) if name not in known]
+    if not lacking:
+        try:
+            return evaluate(formula, known)
+        except FormulaError as error:
+            raise UsageError(f"{where}: {error}.", f"There are {', '.join(known)}.") from error
+    fix = ""
+    if origin_of(lacking[0])[1]:
+        fix = f"Let an effect of an [[equation]] read {lacking[0]}: it is differentiated there."
+    raise UsageError(
+        f"{where}: no channel or condition is called {lacking[0]!r}.",
+        f"Formulas read columns and conditions only. There are {', '.join(known)}.",
+        fix,
+    )
 
 
 def _check_source(mapping: Mapping, part: str, name: str, source: Source) -> None:

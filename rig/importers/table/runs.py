@@ -11,8 +11,7 @@ from estimation.recording import Flag, FloatArray, Recording, RecordingError, St
 from rig.errors import DataError
 from rig.importers.table.arrays import TRIAL
 from rig.importers.table.channels import Samples, find
-from rig.importers.table.formula import FormulaError, evaluate
-from rig.importers.table.mapping import Mapping
+from rig.importers.table.mapping import Mapping, worked_out
 from rig.importers.table.raw import Remark, Values
 from rig.output.table import counted
 
@@ -231,13 +230,11 @@ def _without_invalid(run: Recording, mapping: Mapping) -> Recording:
     """Flag the samples for which a formula of the mapping is true."""
     known = {**run.conditions, **run.columns, "time_s": run.time_s}
     for number, invalid in enumerate(mapping.data.invalid):
+        where = mapping.where("invalid", number, "when")
         try:
-            found = np.broadcast_to(evaluate(invalid.when, known), run.time_s.shape)
-        except (FormulaError, ValueError) as error:
-            raise DataError(
-                f"{mapping.where('invalid', number, 'when')}: {error}.",
-                f"There are {', '.join(known)}.",
-            ) from error
+            found = np.broadcast_to(worked_out(where, invalid.when, known), run.time_s.shape)
+        except ValueError as error:
+            raise DataError(f"{where}: {error}.", f"There are {', '.join(known)}.") from error
         edges = np.flatnonzero(np.diff(np.concatenate([[False], found.astype(bool), [False]])))
         for first, end in edges.reshape(-1, 2):
             start_s, stop_s = float(run.time_s[first]), float(run.time_s[end - 1])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from rig.errors import RigError
+from rig.errors import RigError, UsageError
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table
 
@@ -61,6 +61,10 @@ MAPPINGS = {
         *("\n$", '\n[data.formulas]\nweight_n_m = "2 * sin(motor_angel_rad)"\n'),
         *(7, "motor_angel_rad"),
     ),
+    "a formula of a derived channel": (
+        *("\n$", '\n[data.formulas]\nweight_n = "motor_acceleration_rad_s2"\n'),
+        *(7, "Formulas read columns and conditions only", "[[equation]] read motor_accel"),
+    ),
     "a formula that is code": (
         *("\n$", '\n[data.formulas]\nweight_n_m = "__import__(1)"\n'),
         *(7, "not part of a formula"),
@@ -83,6 +87,24 @@ def test_what_is_wrong_in_a_mapping_is_named_with_its_line(tmp_path, case):
     said = refused(tmp_path, mapping=re.sub(old, new, GOOD, count=1))
     assert all(word in said for word in words), said
     assert line is None or f"line {line}" in said
+
+
+FORMULAS = {
+    "a derived channel": '[data.formulas]\nweight_n = "motor_acceleration_rad_s2"\n',
+    "too many arguments": '[data.formulas]\nweight_n = "sin(motor_angle_rad, 1, 2, 3)"\n',
+    "a name without a unit": '[data.formulas]\nweight = "2 * motor_angle_rad"\n',
+    "a circle": '[data.formulas]\nweight_n = "weight_n + 1"\n',
+    "of samples": '[[data.invalid]]\nwhen = "motor_velocity_rad_s > 1"\nreason = "fast"\n',
+}
+
+
+@pytest.mark.parametrize("formula", FORMULAS.values(), ids=FORMULAS)
+def test_a_wrong_formula_is_a_mistake_of_the_machine_file(tmp_path, formula):
+    file, table = tmp_path / "bench.toml", tmp_path / "run.csv"
+    table.write_text(TABLE)
+    file.write_text(GOOD + formula)
+    with pytest.raises(UsageError):
+        open_table(table, read_mapping(file, []))
 
 
 def test_what_is_wrong_on_the_command_line_is_named_as_it_was_typed(tmp_path):
