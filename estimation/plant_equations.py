@@ -276,12 +276,16 @@ def missing(plant: Plant) -> Iterator[Missing]:
         )
     for chain in chains(plant):
         axes, drive = ", ".join(chain.axes), chain.actuator.name
-        scale, kind = unit_of(drive), EFFORT[plant.axis(chain.axes[-1]).unit]
+        scale, kinds = unit_of(drive), [EFFORT[plant.axis(axis).unit] for axis in chain.axes]
         if scale not in EFFORT.values() and not any(plant.effort(axis) for axis in chain.axes):
             yield Missing(
                 f"What {drive} drives with is known in {scale} only:"
                 " inertia and friction come out in units of the drive.",
-                f"A sensor of effort ({kind}) on one of {axes}.",
+                f"A sensor of effort ({kinds[0]}) on one of {axes}."
+                if len({*kinds}) == 1
+                else "A sensor of effort on one of "
+                + ", ".join(f"{a} ({k})" for a, k in zip(chain.axes, kinds, strict=True))
+                + ".",
             )
         if not _driven(plant, chain.axes):
             yield Missing(
