@@ -5,6 +5,7 @@ object. A parameter without a value is one that has not been fitted yet.
 """
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -235,6 +236,22 @@ class Model:
     def is_fitted(self) -> bool:
         """Whether every parameter has a value."""
         return all(p.name in term.values for term in self.terms for p in term.parameters)
+
+
+def parameter_keys(model: Model) -> list[tuple[Term, Parameter, str]]:
+    """Return the parameters of a model with a name each, such as `friction.coulomb.friction`.
+
+    A name that two terms would share has their channels too:
+    `transmission.ratio(rod_force_n).ratio`.
+    """
+    known = [(term, p) for term in model.terms for p in term.parameters]
+    count = Counter((term.effect.id, p.name) for term, p in known)
+    found = []
+    for term, p in known:
+        is_shared = count[term.effect.id, p.name] > 1
+        which = f"({', '.join(term.channels.values())})" if is_shared else ""
+        found.append((term, p, f"{term.effect.id}{which}.{p.name}"))
+    return found
 
 
 def balance_channels(model: Model, recording: Recording) -> Recording:

@@ -100,6 +100,12 @@ def named(one: Kept, may_name: bool) -> Finding:
         finding,
         family=lead.family,
         alternatives=tuple(others),
+        alternative_places={
+            p.family: where
+            for p in one.likely
+            for where in [p.best.candidate.cause.place.name]
+            if p.family in others and where != place.name
+        },
         probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]},
     )
     cause = lead.best.candidate.cause

@@ -66,10 +66,12 @@ def at_bounds(models: Sequence[Model]) -> Iterator[str]:
             yield f"{model.balance}: at a bound: {', '.join(bound)}. {AT_BOUND}"
 
 
-def limits(recordings: Sequence[Recording], layout: Layout, sealed: Sealed) -> list[str]:
-    """Return the limits of these runs, one sentence each."""
+def limits(
+    recordings: Sequence[Recording], layout: Layout, sealed: Sealed, read: Set[str] = frozenset()
+) -> list[str]:
+    """Return the limits of these runs, one sentence each; `read` are channels of the findings."""
     training = [r for r in recordings if r.name in sealed.discover]
-    found = audit(training)
+    found = audit(training, read)
     if not sealed.may_name:
         found.append(
             f"{len(sealed.discover)} training runs: with fewer than {DEFAULT.least_to_name} no"

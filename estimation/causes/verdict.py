@@ -35,7 +35,7 @@ from estimation.causes.search import Found, search
 from estimation.causes.unsteady import unsteady
 from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.split import Sealed, claim
-from estimation.model import Model
+from estimation.model import Model, parameter_keys
 from estimation.recording import Recording
 
 LEAST_SHARE = 0.001
@@ -112,6 +112,7 @@ def answer(
             " that no recorded signal predicts."
         )
     explained = {name for f in findings for name in (f.balance, *f.also_in)}
+    read = {name for kept, _ in judged for name in kept.scored.candidate.cause.reads}
     found_in = [(kept.scored.candidate, f.runs_affected) for kept, f in judged]
     diagnosis = Diagnosis(
         findings=tuple(findings),
@@ -121,14 +122,18 @@ def answer(
         moved={m.balance: _moved(layout.equations[m.balance].model, m) for m in written},
         sealed=sealed,
         undecided=dict(layout.undecided),
-        notes=(
-            *remarks.apart(layout, held_out.apart(found_in)),
-            *filter(None, [claim(sealed)]),
-            *remarks.late(found.noticed),
-            *remarks.left(layout, left, explained),
-            *remarks.at_bounds(written),
-            *remarks.limits(timed, layout, sealed),
-            *notes,
+        notes=tuple(
+            dict.fromkeys(  # two findings of one family may have the same note
+                [
+                    *remarks.apart(layout, held_out.apart(found_in)),
+                    *filter(None, [claim(sealed)]),
+                    *remarks.late(found.noticed),
+                    *remarks.left(layout, left, explained),
+                    *remarks.at_bounds(written),
+                    *remarks.limits(timed, layout, sealed, read),
+                    *notes,
+                ]
+            )
         ),
         seconds=time.perf_counter() - began,
     )
@@ -332,9 +337,11 @@ def _unwritten(candidate: Candidate) -> str:
 
 def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
     """Return the declared parameters before and after the findings."""
-    out = {}
-    for old, new in zip(before.terms, after.terms, strict=False):
-        for p in old.parameters:
-            key = f"{old.effect.id}.{p.name}"
-            out[key] = {"before": old.values[p.name].value, "after": new.values[p.name].value}
-    return out
+    moved = {id(old): new for old, new in zip(before.terms, after.terms, strict=False)}
+    return {
+        key: {
+            "before": term.values[p.name].value,
+            "after": moved[id(term)].values[p.name].value,
+        }
+        for term, p, key in parameter_keys(before)
+    }

@@ -5,7 +5,7 @@ nobody flagged they join samples that were apart, which looks like a fast motion
 All else decides nothing; its sentences are the limits of a search on these runs.
 """
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +42,11 @@ def steady(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]
     return kept, lost
 
 
-def audit(recordings: Sequence[Recording]) -> list[str]:
-    """Return the limits that the clocks and the conditions of used runs set, one sentence each."""
+def audit(recordings: Sequence[Recording], read: Set[str] = frozenset()) -> list[str]:
+    """Return the limits that the clocks and the conditions of used runs set, one sentence each.
+
+    What an effect that was found reads is not a limit: between runs it was decided.
+    """
     said = []
     for recording in recordings:
         begins, lengths, _ = _gaps(recording)
@@ -54,7 +57,8 @@ def audit(recordings: Sequence[Recording]) -> list[str]:
                 f" {lengths[longest]:.3g} s at {begins[longest] - recording.time_s[0]:.3g} s:"
                 " an effect of time or history is not decided across it."
             )
-    return said + [line for name in shared_columns(recordings) if (line := _held(name, recordings))]
+    others = [name for name in shared_columns(recordings) if name not in read]
+    return said + [line for name in others if (line := _held(name, recordings))]
 
 
 def _held(name: str, recordings: Sequence[Recording], steady: float = 1e-3) -> str:

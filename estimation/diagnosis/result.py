@@ -51,6 +51,7 @@ class Finding:
         form: Id of the form of it that was found, such as `spring.position.curved`; empty without.
         verdict: What is claimed of it.
         alternatives: Families that these runs cannot distinguish from it.
+        alternative_places: Family to the place where it would act, where that is another one.
         probabilities: Family to its probability, for the family and its alternatives.
         depends_on: Variables it depends on.
         confidence: Probability that the name is right, or None without a name.
@@ -69,6 +70,7 @@ class Finding:
     form: str = ""
     verdict: str
     alternatives: tuple[str, ...] = ()
+    alternative_places: Mapping[str, str] = field(default_factory=dict)
     probabilities: Mapping[str, float] = field(default_factory=dict)
     depends_on: tuple[str, ...] = ()
     confidence: float | None = None

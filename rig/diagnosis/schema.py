@@ -42,6 +42,8 @@ class Finding(_Strict):
     """Id of the effect's form that was found, empty of an unknown one."""
     verdict: Name
     alternatives: list[Family]
+    alternative_places: dict[Family, str]
+    """Of the alternatives that would act at another place."""
     probabilities: dict[Family, Annotated[float, Field(ge=0, le=1)]]
     """Of the family and its alternatives."""
     depends_on: list[Variable]

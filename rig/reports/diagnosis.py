@@ -9,6 +9,7 @@ from typing import Any
 from estimation.causes.verdict import Answer
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.files import write_text_atomic
+from estimation.model import parameter_keys
 from rig.diagnosis.traces import Traces, traces
 from rig.output.charts import render
 from rig.output.provenance import Provenance
@@ -132,7 +133,9 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
     if finding.confidence is not None:
         facts.append(("Confidence", f"{finding.confidence:.0%}"))
     if finding.alternatives:
-        alternatives = "; ".join(f"{words.meaning(a) or a} [{a}]" for a in finding.alternatives)
+        alternatives = "; ".join(
+            f"{words.meaning(a) or a} [{words.placed(finding, a)}]" for a in finding.alternatives
+        )
         facts.append(("Could also be", alternatives))
     title = words.meaning_of(finding) if named else f"something that depends on {variables}"
     if not named and not variables:
@@ -212,10 +215,9 @@ def _moved(diagnosis: Diagnosis, signals: Traces) -> list[TextTable]:
     for name, parameters in diagnosis.moved.items():
         known = [signals.equations[name].model] if name in signals.equations else []
         units = {
-            f"{term.effect.id}.{parameter.name}": term.unit(parameter, model.target)
+            key: term.unit(parameter, model.target)
             for model in known
-            for term in model.terms
-            for parameter in term.parameters
+            for term, parameter, key in parameter_keys(model)
         }
         rows = []
         for key, value in parameters.items():

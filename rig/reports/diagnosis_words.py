@@ -59,13 +59,25 @@ def _claim(finding: Finding) -> str:
     if finding.verdict == "one_of":
         if not finding.alternatives:
             return f"{_named(finding)}; these runs are not enough to be sure of it"
-        others = ", ".join(finding.alternatives)
+        others = ", ".join(placed(finding, name) for name in finding.alternatives)
         return f"{_named(finding)}; also possible: {others}; these runs cannot distinguish them"
     if finding.verdict == "depends_on":
-        others = ", ".join(finding.alternatives)
+        others = ", ".join(placed(finding, name) for name in finding.alternatives)
         also = f"; also possible: {others}; these runs cannot distinguish them" if others else ""
         return f"unmodelled effect of unknown form; it depends on {words}{also}"
     return "the model is incomplete, and the cause cannot be identified from these runs"
+
+
+def placed(finding: Finding, alternative: str) -> str:
+    """Return the name of an alternative, with its place where that is not the finding's.
+
+    And with the finding's where only the alternative is of a sensor: of which one, is not clear.
+    """
+    place = finding.alternative_places.get(alternative, "")
+    is_sensor = [name.startswith("sensor.") for name in (finding.family, alternative)]
+    if not place and is_sensor == [False, True] and finding.place != finding.balance:
+        place = finding.place
+    return f"{alternative} ({place})" if place else alternative
 
 
 def _named(finding: Finding) -> str:
@@ -195,7 +207,8 @@ def _where_it_acts(finding: Finding) -> str:
 def _others(finding: Finding) -> str:
     if finding.alternatives:
         likely = ", ".join(
-            f"{name} {finding.probabilities.get(name, 0.0):.0%}" for name in finding.alternatives
+            f"{placed(finding, name)} {finding.probabilities.get(name, 0.0):.0%}"
+            for name in finding.alternatives
         )
         said = f"These also fit: {likely}."
     elif finding.family in catalogue():

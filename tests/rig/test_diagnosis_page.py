@@ -79,6 +79,20 @@ def test_a_quick_diagnosis_of_several_names_states_that_none_was_searched_for(di
     assert "no named hypotheses compete" in next_sentence(sure)
 
 
+def test_an_alternative_at_another_place_is_said_with_that_place(diagnosed):
+    diagnosis, signals = diagnosed
+    (finding,) = diagnosis.findings
+    placed = replace(finding, alternative_places={"ripple.current": "sensor motor_current_a"})
+    found = replace(diagnosis, findings=(placed,))
+    name = "ripple.current (sensor motor_current_a)"
+    assert f"also possible: {name}; these" in sentences(found)[0]
+    assert f"[{name}]" in page(found, signals, Provenance.now(1))
+    assert "also possible: ripple.current;" in sentences(diagnosis)[0]
+    of_drive = replace(finding, place="actuator motor_current_a", alternatives=("sensor.delay",))
+    (said,) = sentences(replace(diagnosis, findings=(of_drive,)))
+    assert "also possible: sensor.delay (actuator motor_current_a); these" in said
+
+
 def test_a_name_without_alternatives_is_not_said_to_have_one(diagnosed):
     (finding,) = diagnosed[0].findings
     alone = replace(finding, alternatives=(), runs_improved=1, runs_total=1)

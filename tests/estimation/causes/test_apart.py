@@ -73,6 +73,12 @@ def test_a_run_that_a_factor_explains_worse_than_the_others_is_not_remarked_on()
     assert not [note for note in found.notes if REMARK in note]
 
 
+def test_a_note_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("estimation.causes.remarks.late", lambda _: ["Twice.", "Twice."])
+    runs = turning(lambda *_: 0.0)[:6]
+    assert diagnose(runs, [axis()], split(runs)).notes.count("Twice.") == 1
+
+
 def test_a_term_that_differs_is_stated_of_the_fewer_runs() -> None:
     pairs = zip(turning(lambda *_: 0.0), turning(lambda _, speed, __: 0.02 * speed), strict=True)
     runs = [one if k in (1, 5, 8) else two for k, (one, two) in enumerate(pairs)]

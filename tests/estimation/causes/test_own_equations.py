@@ -79,6 +79,24 @@ def _waves(random: np.random.Generator, time: FloatArray, most_hz: float, count:
     return np.asarray(sum(np.sin(2 * np.pi * f * time + p) for f, p in waves))
 
 
+def test_two_terms_of_one_effect_have_a_name_each_in_what_moved() -> None:
+    second = '[[equation.effects]]\nid = "motor.torque_constant"\n'
+    second += 'channels.source = "fan_current_a"\n'
+    before, found, after = DYNO.partition('[[equation.effects]]\nid = "sensor.offset"')
+    (model,) = declared(plant_file.parse(before + second + found + after))
+    random = np.random.default_rng(1)
+    runs = []
+    for run in driven():
+        fan = np.cumsum(random.normal(0, 0.05, len(run.time_s)))
+        torque = run["hub_torque_n_m"] + 3.0 * fan
+        runs.append(run.with_columns(fan_current_a=fan, hub_torque_n_m=torque))
+    moved = diagnose(runs, [model], split(runs)).moved["hub"]
+    sizes = {name: value["before"] for name, value in moved.items()}
+    assert sizes["motor.torque_constant(brake_current_a).gain"] == pytest.approx(9.0, rel=0.02)
+    assert sizes["motor.torque_constant(fan_current_a).gain"] == pytest.approx(3.0, rel=0.02)
+    assert "inertia.missing.inertia" in sizes
+
+
 @pytest.mark.parametrize(
     ("fault", "channel", "family"),
     [
