@@ -12,6 +12,7 @@ from estimation.diagnosis.split import Sealed
 from estimation.model import AT_BOUND, Model
 from estimation.noise import MOST_NOISE, noisy_sentence
 from estimation.recording import Recording
+from estimation.signals import Signals
 
 
 def apart(layout: Layout, found: Iterable[tuple[str, str, float]]) -> Iterator[str]:
@@ -23,13 +24,23 @@ def apart(layout: Layout, found: Iterable[tuple[str, str, float]]) -> Iterator[s
         )
 
 
-def late(found: Mapping[str, float]) -> Iterator[str]:
-    """Yield the angles that are later than others by a little, a sentence each."""
+def late(found: Mapping[str, float], signals: Signals) -> Iterator[str]:
+    """Yield the angles that are later than others by a little, a sentence each.
+
+    A damped spring between two angles bends with its rate too, as if one of them were late.
+    """
+    bends = [c for c in signals.combinations if len(c.shares) == 2]
     for reading, delay_s in found.items():
+        others = [s.channel for c in bends if c.gain(reading) for s in c.shares]
+        damped = [
+            f" Damping of the flexible part between {other} and {reading} shows in the same way."
+            for other in dict.fromkeys(others)
+            if other != reading
+        ]
         yield (
             f"{reading}: {1e3 * delay_s:.2g} ms later than the other angles. The search takes so"
             " short a delay into account and does not count it as a finding; it remains in the"
-            " errors."
+            f" errors.{''.join(damped)}"
         )
 
 

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from estimation.causes import remarks
 from estimation.causes.acting import Moved
+from estimation.causes.angles import signals_of
 from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Layout, lay_out, on_one_clock
 from estimation.causes.findings import (
@@ -127,7 +128,7 @@ def answer(
                 [
                     *remarks.apart(layout, held_out.apart(found_in)),
                     *filter(None, [claim(sealed)]),
-                    *remarks.late(found.noticed),
+                    *remarks.late(found.noticed, signals_of(layout)),
                     *remarks.left(layout, left, explained),
                     *remarks.at_bounds(written),
                     *remarks.limits(timed, layout, sealed, read),

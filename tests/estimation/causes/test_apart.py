@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 
+from estimation.causes.remarks import late
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
+from estimation.signals import Combination, Share, Signals
 from tests.estimation.causes.synthetic import axis, turning
 
 REMARK = "times what the other runs predict"
@@ -73,8 +75,20 @@ def test_a_run_that_a_factor_explains_worse_than_the_others_is_not_remarked_on()
     assert not [note for note in found.notes if REMARK in note]
 
 
+def test_a_short_delay_may_be_the_damping_of_a_flexible_part_between_two_angles() -> None:
+    shares = (Share("motor_angle_rad", over=80.0), Share("knee_angle_rad", times=-1.0))
+    geared = Signals((Combination("spring_rad", shares),))
+    of_knee = late({"knee_angle_rad": 1.2e-3}, geared), late({"knee_angle_rad": 1.2e-3}, Signals())
+    ((bent,), (rigid,)) = of_knee
+    assert "1.2 ms later than the other angles" in bent
+    assert bent.endswith("part between motor_angle_rad and knee_angle_rad shows in the same way.")
+    assert "Damping" not in rigid
+    (other,) = late({"hip_angle_rad": 1.2e-3}, geared)
+    assert "Damping" not in other
+
+
 def test_a_note_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("estimation.causes.remarks.late", lambda _: ["Twice.", "Twice."])
+    monkeypatch.setattr("estimation.causes.remarks.late", lambda *_: ["Twice.", "Twice."])
     runs = turning(lambda *_: 0.0)[:6]
     assert diagnose(runs, [axis()], split(runs)).notes.count("Twice.") == 1
 
