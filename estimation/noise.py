@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from estimation.derived import origin_of
 from estimation.recording import FloatArray, Recording
 from estimation.signals import Reading, Signals
 
@@ -14,6 +15,10 @@ WHOLE = 0.05
 
 MOST_NOISE = 0.3
 """Share of a channel that may be noise of its reading: a term of it is too small by its square."""
+
+
+MOST_ERROR = 0.7
+"""Share of an equation's error that is one channel's noise: half of its square."""
 
 
 def white_noise(recording: Recording, measured: Sequence[str], signals: Signals) -> Recording:
@@ -35,6 +40,12 @@ def white_noise(recording: Recording, measured: Sequence[str], signals: Signals)
         integral = source != name
         made[name] = cumulative_trapezoid(noise, recording.time_s, initial=0) if integral else noise
     return recording.with_columns(**made)
+
+
+def noise_of(channel: str, signals: Signals) -> str:
+    """Return in words whose noise that of a derivative is."""
+    source = origin_of(channel)[0]
+    return f"noise of {signals.integrals.get(source, source)} in {channel}"
 
 
 def noisy_sentence(channel: str, share: float, remedy: str) -> str:

@@ -3,14 +3,17 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 
-from estimation.causes.equations import Layout
+import numpy as np
+
+from estimation.causes.equations import Equation, Layout
 from estimation.causes.folds import unvaried
 from estimation.causes.instruments import noise_share
 from estimation.causes.numbers import DEFAULT
+from estimation.derived import origin_of
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.split import Sealed
 from estimation.model import AT_BOUND, Model
-from estimation.noise import MOST_NOISE, noisy_sentence
+from estimation.noise import MOST_ERROR, MOST_NOISE, noise_of, noisy_sentence
 from estimation.recording import Recording
 from estimation.signals import Signals
 
@@ -50,7 +53,8 @@ def left(layout: Layout, errors: Mapping[str, float], explained: Set[str]) -> It
     Of an equation that a finding explains, only where most of its error is not noise.
     """
     for name, error in errors.items():
-        noise = math.sqrt(sum(layout.equations[name].noises(layout.runs)))
+        equation = layout.equations[name]
+        noise = math.sqrt(sum(equation.noises(layout.runs)))
         if noise == 0.0:
             continue
         unexplained = error**2 > 2.0 * noise**2  # more than half of its power
@@ -62,6 +66,24 @@ def left(layout: Layout, errors: Mapping[str, float], explained: Set[str]) -> It
             f"{name}: the error {which} the test runs is {error / noise:.2g} times the noise that"
             f" its readings show. {rest}"
         )
+        channel, own = _loudest(equation, layout)
+        if own > MOST_ERROR * error:
+            whose = noise_of(channel, equation.model.signals)
+            yield f"{name}: most of that error is {whose}. {_remedy(equation)}"
+
+
+def _loudest(equation: Equation, layout: Layout) -> tuple[str, float]:
+    """Return the derivative with the most noise in an equation, and that in the target's unit."""
+    sizes = {
+        channel: abs(gain) * math.sqrt(np.mean([np.var(r.noise[channel]) for r in layout.runs]))
+        for channel, gain in equation.channels.items()
+        if origin_of(channel)[1]
+    }
+    return max(sizes.items(), key=lambda one: one[1], default=("", 0.0))
+
+
+def _remedy(equation: Equation) -> str:
+    return f"A cutoff_hz below {equation.model.low_pass.cutoff_hz:g} removes more of it."
 
 
 def at_bounds(models: Sequence[Model]) -> Iterator[str]:
@@ -103,8 +125,7 @@ def _noisy(layout: Layout) -> list[str]:
     for equation in layout.equations.values():
         for channel in equation.channels:
             share = noise_share(layout.runs, channel)
-            cutoff = equation.model.low_pass.cutoff_hz
             if share > MOST_NOISE:
-                remedy = f"A cutoff_hz below {cutoff:g} removes more of it."
-                found.append(f"{equation.name}: {noisy_sentence(channel, share, remedy)}")
+                sentence = noisy_sentence(channel, share, _remedy(equation))
+                found.append(f"{equation.name}: {sentence}")
     return found

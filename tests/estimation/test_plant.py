@@ -1,5 +1,6 @@
 """A machine as a value: its file, the equations that follow from it, and what it cannot measure."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -227,6 +228,26 @@ SLIDE = Plant(
     sensors=(Sensor("carriage_position_m", "carriage", "position", counts=1e6),),
     run_offsets=False,
 )
+
+
+@pytest.mark.parametrize(("noise_m", "is_named"), [(1e-5, True), (1e-7, False)])
+def test_noise_of_an_acceleration_that_swamps_the_drive_is_named(noise_m, is_named):
+    plant = replace(SLIDE, cutoff_hz=40.0, sensors=(replace(SLIDE.sensors[0], counts=None),))
+    runs = []
+    for k in range(4):
+        run, random = slide(k), np.random.default_rng(k)
+        position = run["carriage_position_m"] + random.normal(0.0, noise_m, len(run))
+        runs.append(run.with_columns(carriage_position_m=position))
+    (equation,) = check(plant, Campaign.of(runs)).equations
+    said = " ".join(equation.limits)
+    lead = "Most of the residual is noise of carriage_position_m in carriage_acceleration_m_s2."
+    assert (lead in said) == is_named
+    proposed = re.search(r"cutoff_hz = (\S+) under \[machine\] removes enough", said)
+    assert bool(proposed) == is_named
+    if proposed:
+        lower = replace(plant, cutoff_hz=float(proposed[1]))
+        (equation,) = check(lower, Campaign.of(runs)).equations
+        assert not equation.limits
 
 
 def test_the_unit_of_a_travel_does_not_matter():

@@ -87,6 +87,19 @@ def test_a_short_delay_may_be_the_damping_of_a_flexible_part_between_two_angles(
     assert "Damping" not in other
 
 
+@pytest.mark.parametrize("noise_rad", [2e-4, 0.0])
+def test_noise_of_an_acceleration_is_named_where_it_is_most_of_the_error(noise_rad: float) -> None:
+    random, runs = np.random.default_rng(0), []
+    for run in turning(lambda *_: 0.0):
+        angle = run["crank_angle_rad"] + random.normal(0.0, noise_rad, len(run))
+        runs.append(run.with_columns(crank_angle_rad=angle))
+    found = diagnose(runs, [axis()], split(runs))
+    said = " ".join(found.notes)
+    whose = "crank: most of that error is noise of crank_angle_rad in crank_acceleration_rad_s2."
+    assert "Most of it is noise." in said
+    assert (f"{whose} A cutoff_hz below" in said) == (noise_rad > 0.0)
+
+
 def test_a_note_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("estimation.causes.remarks.late", lambda *_: ["Twice.", "Twice."])
     runs = turning(lambda *_: 0.0)[:6]
