@@ -112,8 +112,8 @@ def off_ratio(model: Model, recordings: Sequence[Recording]) -> str:
     if combination is None or len(combination.shares) != 2 or combination.direction:
         return ""
     driving, driven = combination.shares
-    if driving.gain * driven.gain >= 0.0:
-        return ""
+    if driving.gain * driven.gain >= 0.0 or not rates_of(driven.channel):
+        return ""  # a sum, or a difference of what is not a travel, such as two pressures
     stated = -driven.gain / driving.gain
     there = set.intersection(*(set(r.columns) for r in recordings)) if recordings else set()
     besides = [name for name in model.channels if name in there]

@@ -12,9 +12,11 @@ from estimation.diagnosis.split import split
 from estimation.filters import LowPass
 from estimation.fitting import fit
 from estimation.opposed import opposed
+from estimation.plant_file import parse
+from estimation.plant_models import declared
 from estimation.recording import Recording
 from estimation.signals import Signals
-from estimation.travel import other_ratio, slope
+from estimation.travel import off_ratio, other_ratio, slope
 from tests.estimation.causes.synthetic import axis, turning
 
 
@@ -105,6 +107,43 @@ def test_motion_of_one_frequency_does_not_hide_another_ratio():
         runs = [run(35.0, 0.01)]
         found = other_ratio(runs, ends, stated, [torque], LowPass(20.0), Signals())
         assert found == expected
+
+
+CYLINDER = """
+schema = "rig.machine/1"
+[machine]
+name = "cylinder"
+[[axis]]
+name = "piston"
+unit = "m"
+[[sensor]]
+name = "piston_position_m"
+axis = "piston"
+reads = "position"
+[[sensor]]
+name = "head_pressure_pa"
+[[sensor]]
+name = "rod_pressure_pa"
+[[derived]]
+name = "net_pressure_pa"
+shares = [{ channel = "head_pressure_pa" }, { channel = "rod_pressure_pa", times = -0.64 }]
+[[equation]]
+name = "cylinder"
+target = "net_pressure_pa"
+[[equation.effects]]
+id = "inertia.missing"
+channels.acceleration = "piston_acceleration_m_s2"
+"""
+
+
+def test_a_difference_of_two_pressures_is_not_taken_for_a_deflection():
+    (model,) = declared(parse(CYLINDER))
+    time_s = np.arange(0.0, 4.0, 0.002)
+    position = 0.01 * np.sin(9.0 * time_s)
+    rod = 1e6 - 2e8 * position
+    head = 0.64 * rod - 81.0 * 6e5 * position
+    columns = {"piston_position_m": position, "head_pressure_pa": head, "rod_pressure_pa": rod}
+    assert off_ratio(model, [Recording("run", time_s, columns)]) == ""
 
 
 def test_what_never_moves_has_no_slope():
