@@ -117,3 +117,42 @@ def test_the_machine_of_the_page_is_one():
     plant = parse(text)
     assert [model.balance for model in declared(plant)] == ["motor", "gearbox", "cell"]
     assert "counts" in text
+
+
+STIFFNESS, INERTIA, DAMPING = 8e8, 6e5, 4e6
+"""Of a cylinder, over the area of its head side: Pa/m, Pa s^2/m, Pa s/m."""
+
+
+def pull(seed):
+    """Return the table of a cylinder that pulls a specimen, and holds it for a while."""
+    random, time_s = np.random.default_rng(seed), np.arange(0.0, 8.0, 2e-3)
+    ramp = np.clip(time_s - 1.0, 0.0, 1.0) - np.clip(time_s - 6.0, 0.0, 1.0)
+    position = 4e-3 * ramp**2 + 2e-3 * ramp * np.sin(2 * np.pi * (1.0 + 0.4 * seed) * time_s)
+    speed = np.gradient(position, time_s)
+    net = STIFFNESS * position + INERTIA * np.gradient(speed, time_s) + DAMPING * speed
+    rod = 4e6 + 1e6 * np.sin(time_s + seed)
+    read = [1e3 * position, 1e-5 * (net + 0.64 * rod), 1e-5 * rod]
+    noise = [random.normal(0.0, size, time_s.size) for size in (1e-4, 0.02, 0.02)]
+    return np.column_stack([1e3 * time_s, *(x + e for x, e in zip(read, noise, strict=True))])
+
+
+@pytest.mark.integration
+def test_the_equation_of_one_s_own_is_fitted_as_it_stands(tmp_path, answered):
+    (text,) = re.findall(r"```toml\n# cylinder.toml\n(.*?)```", PAGE.read_text(), flags=re.DOTALL)
+    file, runs = tmp_path / "cylinder.toml", tmp_path / "runs"
+    file.write_text(text)
+    runs.mkdir()
+    for k in range(4):
+        head = "t_ms,x_mm,head_bar,rod_bar"
+        np.savetxt(runs / f"{k}.csv", pull(k), delimiter=",", header=head, comments="")
+    found = answered("machine check", file, runs)
+    (equation,) = found["check"]["equations"]
+    sizes = {one["effect"]: one["value"] for one in equation["parameters"]}
+    assert found["sound"]
+    assert sizes["spring.position"] == pytest.approx(STIFFNESS, rel=0.01)
+    assert sizes["inertia.missing"] == pytest.approx(INERTIA, rel=0.1)
+    assert sizes["friction.viscous"] == pytest.approx(DAMPING, rel=0.05)
+    assert equation["relative_error"] < 0.05
+    answer = answered("diagnose --quick", runs, "--machine", file)
+    assert answer["findings"] == []
+    assert answer["undecided"] == {}
