@@ -12,6 +12,7 @@ from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.functions import Function
 from estimation.causes.instruments import instrumented, signal
 from estimation.causes.joint import Joint
+from estimation.causes.laid import centred
 from estimation.causes.places import places_of
 from estimation.causes.sources import Source
 from estimation.effects import effect
@@ -202,32 +203,35 @@ def amplitudes_of(layout: Layout) -> Iterator[Moved]:
 
 
 def gains_of(layout: Layout) -> Iterator[Moved]:
-    """Yield the gain of what reads an equation's target, read as the equation predicts it.
+    """Yield the gains of drives that are targets, and of all sensors of a torque or a force.
 
-    That is a drive, or a sensor that no other equation reads.
+    What only one equation reads, its target, is read as the equation predicts it.
     """
     for place in places_of(layout):
         target = layout.equations[place.home].target
-        if instrumented(target, place.home) not in layout.runs[0].channels:
-            continue
-        if place.name == f"actuator {target}":
-            gain, role = effect("motor.torque_constant"), "source"
-        elif place.name == f"sensor {target}" and len(place.enters) == 1:
-            gain, role = effect("sensor.gain"), "reading"
-        else:
-            continue
-        yield Moved(place, gain, ((role, target),), (), (0,), of_all=True)
+        is_predicted = instrumented(target, place.home) in layout.runs[0].channels
+        of_all = is_predicted and len(place.enters) == 1
+        if place.name == f"actuator {target}" and is_predicted:
+            constant, source = effect("motor.torque_constant"), (("source", target),)
+            yield Moved(place, constant, source, (), (0,), of_all=True)
+        elif place.kind == "torque sensor" and (of_all or len(place.enters) > 1):
+            reading = (("reading", place.roles["reading"][0]),)
+            yield Moved(place, effect("sensor.gain"), reading, (), (0,), of_all=of_all)
 
 
 def moved_terms(joint: Joint) -> list[tuple[Claim, Products]]:
     """Return the declared terms as causes that act in no run yet, with their products by run.
 
-    In all runs they are the base itself, so they compete only for acting in some. So does the gain
-    of what reads the target, by which all terms differ alike.
+    In all runs they are the base itself, so they compete only for acting in some. So do the gain
+    of what reads the target, by which all terms differ alike, and that of a sensor which several
+    equations read.
     """
     usual, weights = joint.left_out([[]]).base[0], joint.weights
     out = []
     for one in (*amplitudes_of(joint.layout), *gains_of(joint.layout)):
+        if one.effect.id == "sensor.gain" and not one.of_all:
+            out.append((Claim(one), _products(joint, one, usual)))
+            continue
         part = one.place.home, "within"
         terms = np.zeros(joint.size + 1)
         if one.column is not None:
@@ -241,3 +245,18 @@ def moved_terms(joint: Joint) -> list[tuple[Claim, Products]]:
         cross = products[:, -1] - np.einsum("b,rbk->rk", usual, base)
         out.append((Claim(one), Products(base, (terms @ products)[..., None], cross)))
     return out
+
+
+def _products(joint: Joint, one: Moved, usual: FloatArray) -> Products:
+    """Return the products by run of what enters several equations; target: the base's residual."""
+    columns = [one.columns(run) or {} for run in joint.runs]
+    base, own = np.zeros((len(columns), joint.size, 1)), np.zeros((len(columns), 1, 1))
+    cross = np.zeros((len(columns), 1))
+    for name in one.place.equations:
+        part = name, "within"
+        inner, table = centred([of_run[name] for of_run in columns])[0], joint.tables[part]
+        across = joint.weights[part] * table.swapaxes(-1, -2) @ inner
+        base[:, [*joint.at[part]]] += across[:, :-1]
+        own += joint.weights[part] * inner.swapaxes(-1, -2) @ inner
+        cross += across[:, -1]
+    return Products(base, own, cross - np.einsum("b,rbk->rk", usual, base))

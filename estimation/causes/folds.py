@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.causes.equations import Layout
+from estimation.causes.equations import EFFORTS, Layout
 
 Folds = Sequence[Sequence[Sequence[int]]]
 """Families of folds; a fold is the runs that are left out together."""
@@ -41,7 +41,7 @@ def _conditions(layout: Layout) -> dict[str, list[float]]:
         if equation.of_angle:
             continue
         for name in (*equation.channels, equation.target):
-            if name.endswith(("_n_m", "_n")):
+            if name.endswith(EFFORTS):
                 out[name] = [float(r.on_grid(name).mean()) for r in layout.runs]
                 break
     speeds = [e.speed for e in layout.equations.values() if e.speed]

@@ -81,6 +81,9 @@ OVER_TIME = ("friction.warmup", "sensor.drift", "change.step", "motor.thermal")
 KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
 """Equations of the reference rig that effects name."""
 
+SENSORS = ("proximal_torque_n_m", "distal_torque_n_m")
+"""Torque sensors of the reference rig: a motor without them is one of another machine."""
+
 OF_FEW = (
     "friction.capstan",
     "inertia.position",
@@ -102,7 +105,7 @@ def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
     repeats = repeats_one_reference(layout)
     for effect in catalogue().values():
         of_run_time = "clock" in effect.roles and effect.id.startswith(OVER_TIME)
-        if not _acts(effect, place) or (repeats and of_run_time):
+        if not _acts(layout, effect, place) or (repeats and of_run_time):
             continue
         options = [[(role, c) for c in place.roles.get(role, ())] for role in effect.roles]
         for channels in itertools.product(*options):
@@ -176,7 +179,7 @@ def repeats_one_reference(layout: Layout) -> bool:
     )
 
 
-def _acts(effect: Effect, place: Place) -> bool:
+def _acts(layout: Layout, effect: Effect, place: Place) -> bool:
     if effect.family in DECLARED_FRICTION or effect.id.startswith(DECLARED_ONLY):
         return False
     if effect.id in SYNONYMS:
@@ -188,7 +191,8 @@ def _acts(effect: Effect, place: Place) -> bool:
     kind = place.home.partition(".")[0]
     if (place.home, place.kind) == ("calibration.encoder", "deflection"):
         return False  # slower than a count a sample, the pattern of the counts passes for a bend
-    if effect.family in OF_FEW and kind in KNOWN and kind not in effect.balances:
+    is_known = kind in KNOWN and any(name in layout.measured for name in SENSORS)
+    if effect.family in OF_FEW and is_known and kind not in effect.balances:
         return False  # a wrapped cable or a linkage, not a shaft in its bearings
     if (place.kind == "lever") != (effect.id == "eccentric.load.pulley"):
         return False

@@ -9,8 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from estimation.causes.angles import angles_of, related, signals_of, unrelated
-from estimation.causes.equations import ANGLES, RATES, Equation, Layout, sensitivity
+from estimation.causes.equations import ANGLES, EFFORTS, RATES, Equation, Layout, sensitivity
 from estimation.derived import CAMPAIGN_TIME, origin_of
 
 CLOCKS: Mapping[str, tuple[str, ...]] = {
@@ -19,6 +21,9 @@ CLOCKS: Mapping[str, tuple[str, ...]] = {
     "campaign_clock": (CAMPAIGN_TIME,),
 }
 """Role of a time to its channel, at every place."""
+
+STATED = 1e-9
+"""Share of its size by which a number that is stated varies within a run: by rounding."""
 
 Kind = Literal["loss", "actuator", "deflection", "lever", "torque sensor", "angle sensor"]
 
@@ -165,12 +170,17 @@ def _own(
     if not angle:  # a curve over a force has the history of that force
         roles |= {"travel": (effort,)}
     if equation.of_angle:
+        bending = "compliance.link"
+        if effort == equation.target:  # nothing but its own inertia loads it
+            bending = "inertia.missing"
+            terms = [t.channels for t in equation.terms if t.effect.id == bending]
+            roles |= {"load": tuple(t["acceleration"] for t in terms) or (effort,)}
         roles |= {"travel": (effort, *roles["travel"])}  # what bends has the history of its load
         roles |= {"other_angle": unrelated(layout, equation, everywhere)}
         if "output_angle" in roles:  # a wave comes from either shaft of a gear
             ends = tuple(a for a in angles if a != roles["output_angle"][0] and _share(equation, a))
             roles |= {"output_angle": (*roles["output_angle"], *ends)}
-        bends = [t.sign for t in equation.terms if t.effect.id == "compliance.link"]
+        bends = [t.sign for t in equation.terms if t.effect.id == bending]
         like = "stretch" if -1 in bends else "gearbox"
         enters = (Entry(equation.name, 1.0),)
         return Place(equation.name, "deflection", equation.name, enters, roles, like)
@@ -181,6 +191,7 @@ def _own(
     known = {c for played in (*roles.values(), *others) for c in played}
     if inputs := _inputs(layout, equation, known | set(everywhere)):
         others = (*others, inputs)
+        roles |= {"load": (effort, *inputs)}  # a seal is pressed on by a pressure
     return Place(equation.name, "loss", equation.name, enters, roles, others=others)
 
 
@@ -194,16 +205,24 @@ def _inputs(layout: Layout, equation: Equation, known: set[str]) -> tuple[str, .
         for term in equation.terms
         if term.effect.id != "motor.torque_constant"
         for c in term.channels.values()
-        if c in layout.measured and c not in known and origin_of(c)[0] not in known
+        if (c in layout.measured or _is_difference(equation, c))
+        and c not in known
+        and origin_of(c)[0] not in known
     ]
     return tuple(dict.fromkeys(found))
+
+
+def _is_difference(equation: Equation, channel: str) -> bool:
+    """Whether a channel is made of readings, as the bend between two angles is; no effort is."""
+    known = equation.model.signals.combination(channel)
+    return known is not None and not channel.endswith(EFFORTS)
 
 
 def _actuator(equation: Equation, angles: Sequence[str]) -> Place | None:
     """Return the place of the actuator that an equation reads as a term or as its target."""
     read = [t.channels["source"] for t in equation.terms if t.effect.id == "motor.torque_constant"]
     current = next(iter(read), equation.target)
-    if not read and (equation.of_angle or current.endswith(("_n_m", "_n"))):
+    if not read and (equation.of_angle or current.endswith(EFFORTS)):
         return None
     roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
         "current": (current,),
@@ -268,12 +287,18 @@ def _share(equation: Equation, angle: str) -> float:
     return sum(entry.gain for entry in _entries(equation, angle) if not entry.order)
 
 
+def _is_stated(layout: Layout, channel: str) -> bool:
+    """Whether a channel is a number of each run, as a weight is: no sensor reads it."""
+    values = [run.on_grid(channel) for run in layout.runs]
+    return all(float(np.ptp(x)) <= STATED * float(np.abs(x).max()) for x in values)
+
+
 def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None:
     enters = [entry for e in layout.equations.values() for entry in _entries(e, channel)]
     if not enters:
         return None
     angle = channel.endswith(ANGLES)
-    if not angle and not channel.endswith(("_n_m", "_n")):
+    if not angle and (not channel.endswith(EFFORTS) or _is_stated(layout, channel)):
         return None  # an error of the current's reading is a change of the actuator's gain
 
     def suits(entry: Entry) -> tuple[bool, bool, bool]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.causes.blocks import Block, Outcome, Products, block_of, evaluate, rising
 from estimation.causes.candidates import Candidate, Group
+from estimation.causes.equations import EFFORTS
 from estimation.causes.folds import Folds
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
@@ -23,7 +24,7 @@ MOST_CHANGE = 2.0
 DIGITS = 4
 """Decimals of a score and of a probability: causes with the same columns tie."""
 
-AMPLIFIED = ("_n_m", "_n", "_a")
+AMPLIFIED = (*EFFORTS, "_a")
 """Endings of readings with an amplifier's noise; that of an encoder is known by its counts."""
 
 

@@ -91,6 +91,6 @@ def effect(name: str) -> Effect:
         raise UnknownEffectError(
             f"There is no effect {name!r}.",
             f"The catalogue has: {', '.join(known)}.",
-            f"Did you mean {near[0]!r}?" if near else "Type `rig effects` for the list.",
+            f"Did you mean {near[0]!r}?" if near else "",
         )
     return known[name]

@@ -116,7 +116,7 @@ def show(
     json: JsonFlag = False,
 ) -> None:
     """Show one record completely."""
-    found = holding(record, store).get(record)
+    found = _holding(record, store).get(record)
     said = [f"{name}: {value}" for name, value in _in_words(found).items()]
     if figure is not None:
         if not found.figure_svg:
@@ -128,7 +128,7 @@ def show(
 
 def diff(first: Hash, second: Hash, store: StoreOption = None, json: JsonFlag = False) -> None:
     """Show what differs between two records."""
-    a, b = (holding(start, store).get(start) for start in (first, second))
+    a, b = (_holding(start, store).get(start) for start in (first, second))
     left, right = _flat(a), _flat(b)
     changes = {
         name: {"first": left.get(name), "second": right.get(name)}
@@ -153,7 +153,7 @@ def use(
     json: JsonFlag = False,
 ) -> None:
     """Make a record the active one of its kind, channel and instrument."""
-    kept = holding(record, store)
+    kept = _holding(record, store)
     before = kept.active()
     chosen = kept.use(record, now_utc(), by)
     old = before.get(chosen.key)
@@ -170,28 +170,16 @@ def diagnose(
     json: JsonFlag = False,
 ) -> None:
     """Run the diagnosis on the raw logs of a calibration."""
-    from estimation.diagnosis.split import SplitError
     from rig.calibrate.declared import declared_by_record
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import of_calibration
     from rig.reports.diagnosis_words import sentences
 
-    declared = declared_by_record(holding(record, store).get(record))
+    asked = of_calibration(declared_by_record(_holding(record, store).get(record)))
     looks = Ledger(ledger or default_ledger())
-    try:
-        with stages() as on_stage:
-            done, look = run_diagnosis(
-                of_calibration(declared), looks, seed=seed, on_stage=on_stage
-            )
-    except SplitError as error:
-        if len(declared.recordings) > 2:
-            raise
-        raise SplitError(
-            f"The calibration has {len(declared.recordings)} runs, too few for a diagnosis.",
-            "A run is one pass, move or press, or one axis in a round of poses.",
-            "Calibrate again with more: --repeats 4 with weights, --repeats 3 with poses.",
-        ) from error
+    with stages() as on_stage:
+        done, look = run_diagnosis(asked, looks, seed=seed, on_stage=on_stage)
     looks.enter(look)
     data = done.diagnosis.to_json() if json else None
     present(json, data, *sentences(done.diagnosis), *done.diagnosis.notes)
@@ -214,7 +202,7 @@ def _stores(folder: Path | None) -> "list[CalibrationStore]":
     return [kept] if folder else [kept, CalibrationStore(simulated_folder(kept.folder))]
 
 
-def holding(start: str, folder: Path | None) -> "CalibrationStore":
+def _holding(start: str, folder: Path | None) -> "CalibrationStore":
     """Return the store that has a record of this hash; the first one where none has."""
     stores = _stores(folder)
     holds = (s for s in stores if any(r.content_hash.startswith(start) for r in s.records()))

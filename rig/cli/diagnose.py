@@ -189,7 +189,7 @@ def loop(
     out: options.OutFolder = None,
     rounds: Annotated[int, Option(help="Maximum number of campaigns.")] = 3,
     minutes: Annotated[float, Option(help="No round starts after this time, min.")] = 20.0,
-    seed: options.LoopSeed = None,
+    seed: options.SimulationSeed = None,
     quick: options.QuickFlag = False,
     workers: options.WorkersOption = 1,
     scheduler: options.SchedulerOption = None,

@@ -230,12 +230,6 @@ def _core(log: Path, config: Path | None, json: bool) -> int:
     from rig.configuration.config import load_config
     from rig.recording.core_replay import replay_core
 
-    if log.is_dir():
-        raise UsageError(
-            f"{log} is a folder.",
-            "--core runs the core again on one log.",
-            "Name a log in it, a .mcap file.",
-        )
     found = replay_core(log, load_config(config) if config else None)
     if not found.is_same_core:
         remarks().print(f"The log is of core {found.core}; the one in use is another build.")

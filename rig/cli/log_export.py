@@ -33,10 +33,7 @@ def export(
     record: Annotated[
         list[str] | None, Option(help="Apply this record of the store, by hash; may be repeated.")
     ] = None,
-    store: Annotated[
-        Path | None,
-        Option(help="Folder of the store of --record; by default as in `rig calibrate use`."),
-    ] = None,
+    store: Annotated[Path | None, Option(help="Folder of the store of --record.")] = None,
     model: Annotated[
         Path | None, Option(help="Add the estimate of this model file as estimated_* columns.")
     ] = None,
@@ -97,8 +94,7 @@ def _other_calibrations(
         return None
     from calibration.linear import load_calibration_set, shipped_calibration_set
     from calibration.rules import judge_range, refuse_errors
-    from calibration.store import compose
-    from rig.cli.calibrate_store import holding
+    from calibration.store import CalibrationStore, compose, default_folder
     from rig.log.reader import read_log
     from rig.log.recalibrate import carried_calibrations
     from rig.log.streams import COUNTS
@@ -110,7 +106,8 @@ def _other_calibrations(
         base = load_calibration_set(Path(calibration))
     else:
         base = shipped_calibration_set(calibration)
-    found = [holding(start, store).get(start) for start in records]
+    kept = CalibrationStore(store or default_folder())
+    found = [kept.get(start) for start in records]
     made = compose(base, found)
     if COUNTS in log.topics:
         rows = log.topics[COUNTS].rows

@@ -157,10 +157,6 @@ WorkersOption = Annotated[
 SchedulerOption = Annotated[str | None, Option(help="Address of a Dask scheduler.")]
 SeedOption = Annotated[int, Option(help="Seed of everything random, such as the folds.")]
 SimulationSeed = Annotated[
-    int | None,
-    Option("--seed", help="Seed of the simulated rig; by default that of its configuration."),
-]
-LoopSeed = Annotated[
     int | None, Option("--seed", help="Seed of the simulated rig; by default by the clock.")
 ]
 TablesFile = Annotated[Path | None, Option("--out", help="File for the tables, in Markdown.")]

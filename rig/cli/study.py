@@ -44,7 +44,7 @@ def oneill(
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Reproduce Tables I to V of O'Neill 2018, and fit better estimators.
+    """Reproduce Tables I to V of O'Neill et al. 2018, and fit better estimators.
 
     By default it fits Table I's linear models, in seconds. --networks trains the paper's networks,
     which takes long; after an interruption it resumes. --states and --kinds take minutes.

@@ -116,8 +116,9 @@ def _of_simulated_arms(name: str) -> Callable[..., None]:
 for _name, _what in {
     "wrench": "Make tables 3.1 to 3.3 of Piqué 2018 again on simulated arms: free space and"
     " contact.",
-    "delsol": "Make tables 1, 2 and 5 of del Sol 2014 again on simulated hydraulic arms.",
-    "zhang": "Make Zhang 2022 again on simulated arms: torque in free space, grasp and wrench.",
+    "delsol": "Make tables 1, 2 and 5 of del Sol et al. 2014 again on simulated hydraulic arms.",
+    "zhang": "Make Zhang et al. 2022 again on simulated arms: torque in free space, grasp and"
+    " wrench.",
 }.items():
     arm_studies.command(_name, help=_what)(_of_simulated_arms(_name))
 

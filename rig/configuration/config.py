@@ -230,7 +230,7 @@ def load_config(path: Path | None = None) -> Config:
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(
             f"The configuration {path} cannot be read.",
-            (error.strerror if isinstance(error, OSError) else None) or str(error),
+            str(error),
             f"Give a TOML file, or a shipped one by name. {nearest(str(path), shipped_configs())}",
         ) from error
     except tomllib.TOMLDecodeError as error:

@@ -84,7 +84,9 @@ def _equation(answer: Answer, name: str, wanted: list[str]) -> EquationTraces:
         # a cause that no model file holds is no term of the equation: its channels are read here
         read = {}
         if wanted:
-            filtered = zero_phase_channels(refit.recordings[run], wanted, refit.model.low_pass)
+            filtered = zero_phase_channels(
+                refit.recordings[run], wanted, refit.model.low_pass, refit.model.signals
+            )
             read = {channel: filtered[channel][places] for channel in wanted}
         time_s = clock[places] - clock[0]
         runs.append(RunTrace(run, time_s, measured, old - old.mean(), new - new.mean(), read))

@@ -5,7 +5,6 @@ combination and repeat. Loads are the currents commanded to the load motor, angl
 closing-positive.
 """
 
-import difflib
 import itertools
 import json
 import tomllib
@@ -289,14 +288,11 @@ def load_protocol(name_or_path: str) -> Protocol:
     if not path.is_file() and path.suffix == "":
         path = SHIPPED / f"{name_or_path}.toml"
     if not path.is_file():
-        shipped = sorted(p.stem for p in SHIPPED.glob("*.toml"))
-        near = difflib.get_close_matches(name_or_path, shipped, n=1)
+        shipped = ", ".join(sorted(p.stem for p in SHIPPED.glob("*.toml")))
         raise UsageError(
             f"There is no protocol {name_or_path!r}.",
-            f"It is neither a file nor a shipped protocol ({', '.join(shipped)}).",
-            f"Did you mean {near[0]!r}?"
-            if near
-            else "Name a TOML file, or one of the shipped protocols.",
+            f"It is neither a file nor a shipped protocol ({shipped}).",
+            "Name a TOML file, or one of the shipped protocols.",
         )
     try:
         text = path.read_text()

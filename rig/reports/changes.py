@@ -20,10 +20,8 @@ def lines(found: Difference) -> Iterator[str]:
 def _sentence(change: Change) -> str:
     sure = f"confidence {100 * change.confidence:.0f} %"
     if change.verdict == "one_of":
-        if not change.alternatives:
-            unsure = "these runs are not enough to be sure of it"
-            return f"Probably changed: {change.name} ({sure}); {unsure}."
-        names = ", ".join((change.name, *change.alternatives))
+        others = ", ".join(change.alternatives)
+        names = f"{change.name}, {others}"
         return f"One of these changed, not distinguishable on these runs: {names} ({sure})."
     how = {"moved": "Moved", "came": "Came", "went": "Went"}[change.verdict]
     sizes = [_size(change, name) for name in change.parameters]

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from estimation.changes.compare import ChangesError, compare
-from estimation.changes.difference import Change, Difference
 from estimation.effects import effect
 from estimation.filters import LowPass
 from estimation.model import Model, Term
@@ -120,29 +119,6 @@ def test_a_ripple_that_came_is_stated_with_its_period():
     assert sentence.startswith("Came: ripple.motor at motor, ")
     period = re.search(r", period (\S+) m \(confidence", sentence)
     assert float(period[1]) == pytest.approx(0.02, rel=0.02)
-
-
-def test_a_change_that_is_not_sure_and_has_no_alternative_is_one_name():
-    size = {"asymmetry": 0.1}
-    change = Change(
-        "one_of",
-        "friction.viscous_asymmetry at motor",
-        "motor",
-        "friction.viscous_asymmetry",
-        (),
-        0.81,
-        size,
-        {"asymmetry": (0.0, 0.2)},
-        {"asymmetry": "N s/m"},
-        {"asymmetry": None},
-    )
-    (sentence,) = lines(Difference((change,), {"a": ("1",), "b": ("2",)}))
-    assert sentence == (
-        "Probably changed: friction.viscous_asymmetry at motor (confidence 81 %); these runs are"
-        " not enough to be sure of it."
-    )
-    (sentence,) = lines(Difference((replace(change, alternatives=("other",)),), {}))
-    assert "friction.viscous_asymmetry at motor, other (confidence 81 %)" in sentence
 
 
 @pytest.mark.long

@@ -131,15 +131,3 @@ def test_a_log_is_exported_with_another_record(rig, added, log, tmp_path):
     np.testing.assert_allclose(torques[1], 2 * torques[0], rtol=1e-12)
     np.testing.assert_array_equal(torques[2], torques[0])
     rig("log export", log, "--record ffff", code=2)
-
-
-def test_a_log_is_exported_with_a_record_of_the_simulated_rig(
-    rig, added, log, tmp_path, monkeypatch
-):
-    """As `rig calibrate use`: what the store lacks is searched in that of the simulated rig."""
-    digest = added("7.9622e-05")
-    (tmp_path / "store").rename(tmp_path / "real-simulated")
-    monkeypatch.setenv("RIG_CALIBRATIONS", str(tmp_path / "real"))
-    target = tmp_path / "sample.npz"
-    words = ("--topic /rig/sample --format npz --record", digest, "--out", target)
-    assert rig("log export", log, *words)["calibrations"]

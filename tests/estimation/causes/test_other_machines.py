@@ -1,0 +1,193 @@
+"""Machines that are no reference rig: cylinders, winches, belts, joints with a torque cell."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from estimation import plant_file
+from estimation.causes.candidates import every_claim
+from estimation.causes.equations import lay_out
+from estimation.causes.verdict import diagnose
+from estimation.diagnosis.result import Finding
+from estimation.diagnosis.split import split
+from estimation.plant_models import declared
+from estimation.recording import FloatArray, Recording
+
+RATE_HZ, SECONDS, RUNS = 100.0, 12.0, 10
+
+CYLINDER = """
+schema = "rig.machine/1"
+machine = { name = "cylinder", cutoff_hz = 20.0, run_offsets = false }
+axis = [{ name = "piston", unit = "m" }]
+sensor = [
+  { name = "piston_position_m", axis = "piston", reads = "position" },
+  { name = "head_pressure_pa", reads = "other" },
+  { name = "rod_pressure_pa", reads = "other" },
+]
+[[equation]]
+name = "cylinder"
+target = "head_pressure_pa"
+effects = [
+  { id = "transmission.ratio", channels = { load = "rod_pressure_pa" } },
+  { id = "friction.coulomb", channels = { speed = "piston_velocity_m_s" } },
+  { id = "friction.viscous", channels = { speed = "piston_velocity_m_s" } },
+  { id = "sensor.offset" },
+]
+"""
+
+WINCH = """
+schema = "rig.machine/1"
+machine = { name = "winch", cutoff_hz = 20.0, run_offsets = false }
+axis = [{ name = "motor", unit = "rad" }]
+actuator = [{ name = "motor_current_a", axis = "motor" }]
+sensor = [
+  { name = "motor_angle_rad", axis = "motor", reads = "position" },
+  { name = "rope_torque_n_m", axis = "motor", reads = "effort" },
+]
+"""
+
+BELT = """
+schema = "rig.machine/1"
+machine = { name = "belt", cutoff_hz = 20.0 }
+axis = [{ name = "pulley", unit = "rad" }, { name = "carriage", unit = "m" }]
+sensor = [
+  { name = "pulley_angle_rad", axis = "pulley", reads = "position" },
+  { name = "carriage_position_m", axis = "carriage", reads = "position" },
+]
+[[equation]]
+name = "scale"
+target = "carriage_position_m"
+samples = "all"
+effects = [
+  { id = "transmission.ratio", channels = { load = "pulley_angle_rad" } },
+  { id = "inertia.missing", sign = -1, channels = { acceleration = "carriage_acceleration_m_s2" } },
+  { id = "sensor.offset" },
+]
+"""
+
+JOINT = """
+schema = "rig.machine/1"
+machine = { name = "joint", cutoff_hz = 20.0 }
+axis = [{ name = "motor", unit = "rad" }, { name = "link", unit = "rad" }]
+transmission = [
+  { name = "gear", input = "motor", output = "link", ratio = 100.0, compliant = true },
+]
+actuator = [{ name = "motor_current_a", axis = "motor" }]
+sensor = [
+  { name = "motor_angle_rad", axis = "motor", reads = "position" },
+  { name = "link_angle_rad", axis = "link", reads = "position" },
+  { name = "link_torque_n_m", axis = "link", reads = "effort" },
+]
+"""
+
+Motion = Callable[..., dict[str, FloatArray]]
+
+
+def recorded(columns_of: Motion) -> list[Recording]:
+    """Return runs of random waves, whose columns follow from the motion and the run's number."""
+    random = np.random.default_rng(4)
+    time = np.arange(0.0, SECONDS, 1.0 / RATE_HZ)
+    out = []
+    for k in range(RUNS):
+        parts = [
+            (random.uniform(0.5, 1.0), random.uniform(0.2, 0.9), random.uniform(0.0, 6.0))
+            for _ in range(4)
+        ]
+        position = sum(a * np.sin(2 * np.pi * f * time + p) for a, f, p in parts)
+        speed = np.gradient(position, time)
+        columns = columns_of(k, random, position, speed, np.gradient(speed, time))
+        out.append(Recording(f"{k:02d}", time, columns, started_at_ns=int(2e10 * k) + 1))
+    return out
+
+
+def found_in(machine: str, recordings: Sequence[Recording]) -> tuple[Finding, ...]:
+    models = declared(plant_file.parse(machine))
+    return diagnose(recordings, models, split(recordings)).findings
+
+
+def test_friction_grows_with_a_pressure():
+    def columns(k, random, position, speed, acceleration):
+        rod = 1e5 * (60.0 + 40.0 * (k % 3)) + 2e5 * position
+        head = 0.6 * rod + (5e4 + 0.02 * rod) * np.tanh(speed / 0.05) + 2e4 * speed
+        return {
+            "piston_position_m": 0.1 * position,
+            "rod_pressure_pa": rod + random.normal(0.0, 3e3, len(rod)),
+            "head_pressure_pa": head + random.normal(0.0, 3e3, len(rod)),
+        }
+
+    (finding,) = found_in(CYLINDER, recorded(columns))
+    assert (finding.verdict, finding.family) == ("identified", "friction.load")
+    assert finding.parameters["friction"].value == pytest.approx(0.02, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("rubs", "grows", "family"),
+    [(0.08, 0.0, "friction.load"), (0.0, 0.02, "motor.gain_by_position")],
+)
+def test_a_load_that_is_held_in_each_run_shows_by_what_it_does(rubs, grows, family):
+    """The drive's constant is known from the runs' means alone: within a run the load is held."""
+
+    def columns(k, random, position, speed, acceleration):
+        load = 20.0 * (k % 5 + 1) + 0.2 * acceleration
+        rub = (3.0 + rubs * load) * np.tanh(speed / 0.1)
+        current = (load + rub) * (1.0 + grows * position) / 2.0
+        return {
+            "motor_angle_rad": 3.0 * position,
+            "motor_current_a": current + random.normal(0.0, 0.05, len(load)),
+            "rope_torque_n_m": load + random.normal(0.0, 0.1, len(load)),
+        }
+
+    findings = found_in(WINCH, recorded(columns))
+    assert findings[0].family == family
+    assert findings[0].confidence > 0.5
+
+
+def test_play_of_a_carriage_follows_the_pull_of_its_own_mass():
+    def columns(k, random, position, speed, acceleration):
+        travel = 0.1 * position
+        pull = 0.1 * acceleration
+        scale = travel - 1e-5 * pull - 4e-5 * np.tanh(pull / 0.02)
+        noise = random.normal(0.0, 5e-6, len(travel))
+        return {"pulley_angle_rad": travel / 0.02, "carriage_position_m": scale + noise}
+
+    (finding,) = found_in(BELT, recorded(columns))
+    assert finding.family == "transmission.backlash"
+    assert finding.parameters["gap"].value == pytest.approx(4e-5, rel=0.2)
+
+
+def test_a_torque_cell_of_another_gain_in_some_runs_is_no_curved_one():
+    def columns(k, random, position, speed, acceleration):
+        torque = 25.0 * np.sin(position) + 2.0 * acceleration
+        rub = 0.05 * np.tanh(speed / 0.05) + 2e-3 * speed
+        noise = random.normal(0.0, [[3e-6], [2e-3], [0.03]], (3, len(torque)))
+        reading = torque * (1.05 if k >= 5 else 1.0)
+        return {
+            "motor_angle_rad": 100.0 * (position + torque / 2e4),
+            "link_angle_rad": position + noise[0],
+            "motor_current_a": (0.01 * torque + rub) / 0.1 + noise[1],
+            "link_torque_n_m": reading + noise[2],
+        }
+
+    (finding,) = found_in(JOINT, recorded(columns))
+    assert finding.family == "sensor.gain"
+    assert set(finding.runs_affected) == {f"{k:02d}" for k in range(5, RUNS)}
+    assert finding.parameters["change"].value == pytest.approx(0.05, rel=0.1)
+
+
+def test_a_weight_that_is_stated_has_no_sensor():
+    machine = CYLINDER.replace("rod_pressure_pa", "weight_n")
+
+    def columns(k, random, position, speed, acceleration):
+        weight = np.full(len(position), 50.0 * k)
+        return {
+            "piston_position_m": 0.1 * position,
+            "weight_n": weight,
+            "head_pressure_pa": 500.0 * weight + random.normal(0.0, 3e3, len(weight)),
+        }
+
+    runs = recorded(columns)
+    laid = lay_out(declared(plant_file.parse(machine)), runs, [run.name for run in runs])
+    places = {claim.cause.place.name for claim in every_claim(laid)}
+    assert "sensor head_pressure_pa" in places
+    assert "sensor weight_n" not in places
