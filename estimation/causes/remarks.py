@@ -11,6 +11,7 @@ from estimation.causes.instruments import noise_share
 from estimation.causes.numbers import DEFAULT
 from estimation.derived import origin_of
 from estimation.diagnosis.audit import audit
+from estimation.diagnosis.result import is_unexplained
 from estimation.diagnosis.split import Sealed
 from estimation.model import AT_BOUND, Model
 from estimation.noise import MOST_ERROR, MOST_NOISE, noise_of, noisy_sentence
@@ -47,24 +48,28 @@ def late(found: Mapping[str, float], signals: Signals) -> Iterator[str]:
         )
 
 
-def left(layout: Layout, errors: Mapping[str, float], explained: Set[str]) -> Iterator[str]:
+def over_noise(layout: Layout, errors: Mapping[str, float]) -> dict[str, float]:
+    """Return each equation's error over the noise of its readings, where they show any."""
+    noise = {n: math.sqrt(sum(layout.equations[n].noises(layout.runs))) for n in errors}
+    return {name: error / noise[name] for name, error in errors.items() if noise[name] > 0.0}
+
+
+def left(
+    layout: Layout, errors: Mapping[str, float], ratios: Mapping[str, float], explained: Set[str]
+) -> Iterator[str]:
     """Yield how large the errors left are next to the noise of the readings, a sentence each.
 
     Of an equation that a finding explains, only where most of its error is not noise.
     """
-    for name, error in errors.items():
-        equation = layout.equations[name]
-        noise = math.sqrt(sum(equation.noises(layout.runs)))
-        if noise == 0.0:
-            continue
-        unexplained = error**2 > 2.0 * noise**2  # more than half of its power
-        if name in explained and not unexplained:
+    for name, ratio in ratios.items():
+        equation, error = layout.equations[name], errors[name]
+        if name in explained and not is_unexplained(ratio):
             continue
         which = "left on" if name in explained else "on"
-        rest = "Most of it has no explanation here." if unexplained else "Most of it is noise."
+        rest = "Most of it has no explanation here."
         yield (
-            f"{name}: the error {which} the test runs is {error / noise:.2g} times the noise that"
-            f" its readings show. {rest}"
+            f"{name}: the error {which} the test runs is {ratio:.2g} times the noise that"
+            f" its readings show. {rest if is_unexplained(ratio) else 'Most of it is noise.'}"
         )
         channel, own = _loudest(equation, layout)
         if own > MOST_ERROR * error:

@@ -112,6 +112,7 @@ def answer(
             f"{changing.equation}: the level of {changing.effect} changes within runs, at times"
             " that no recorded signal predicts."
         )
+    over_noise = remarks.over_noise(layout, left)
     explained = {name for f in findings for name in (f.balance, *f.also_in)}
     read = {name for kept, _ in judged for name in kept.scored.candidate.cause.reads}
     found_in = [(kept.scored.candidate, f.runs_affected) for kept, f in judged]
@@ -120,6 +121,7 @@ def answer(
         errors=errors,
         unit={name: e.model.unit for name, e in layout.equations.items()},
         noise_floor=dict.fromkeys(layout.equations),
+        over_noise=over_noise,
         moved={m.balance: _moved(layout.equations[m.balance].model, m) for m in written},
         sealed=sealed,
         undecided=dict(layout.undecided),
@@ -129,7 +131,7 @@ def answer(
                     *remarks.apart(layout, held_out.apart(found_in)),
                     *filter(None, [claim(sealed)]),
                     *remarks.late(found.noticed, signals_of(layout)),
-                    *remarks.left(layout, left, explained),
+                    *remarks.left(layout, left, over_noise, explained),
                     *remarks.at_bounds(written),
                     *remarks.limits(timed, layout, sealed, read),
                     *notes,

@@ -105,6 +105,11 @@ class Error:
     by_run_after: Mapping[str, float]
 
 
+def is_unexplained(over_noise: float) -> bool:
+    """Whether more than half of an error's power is not noise of the readings."""
+    return over_noise**2 > 2.0
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """The whole answer.
@@ -123,6 +128,7 @@ class Diagnosis:
         next_experiment: The experiment that separates the alternatives best, plain JSON types, or
             None.
         quick: Whether no such experiment was searched for.
+        over_noise: Equation to the error left over the noise of its readings, where they show any.
     """
 
     findings: tuple[Finding, ...]
@@ -137,6 +143,7 @@ class Diagnosis:
     seconds: float = 0.0
     next_experiment: Mapping[str, Any] | None = None
     quick: bool = False
+    over_noise: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def verdict(self) -> str:
@@ -158,6 +165,7 @@ class Diagnosis:
             "rmse_with_means_after": {name: e.with_means_after for name, e in errors},
             "unit": dict(self.unit),
             "noise_floor": dict(self.noise_floor),
+            "over_noise": dict(self.over_noise),
             "runs": {"discover": self.sealed.discover, "confirm": self.sealed.confirm},
             "next_experiment": self.next_experiment,
             "declared_parameters_moved": self.moved,

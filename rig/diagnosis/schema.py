@@ -75,6 +75,7 @@ class DiagnosisSchema(BaseModel):
     rmse_with_means_after: dict[Balance, Number | None]
     unit: dict[Balance, str]
     noise_floor: dict[Balance, Number | None]
+    over_noise: dict[Balance, Number]
     runs: Runs
     next_experiment: dict[str, Any] | None
     declared_parameters_moved: dict[Balance, dict[str, dict[str, Number | None]]]

@@ -5,7 +5,7 @@ import math
 import sys
 from collections.abc import Sequence
 
-from estimation.diagnosis.result import Diagnosis, Finding
+from estimation.diagnosis.result import Diagnosis, Finding, is_unexplained
 from estimation.effects import catalogue
 from estimation.plant_models import WORDS
 from rig.output.table import counted
@@ -21,7 +21,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         lines = [
             f"No unmodelled effect found in {', '.join(diagnosis.errors)}: no candidate"
             f" explained enough of the training runs and was confirmed on the {runs} held-out test"
-            " runs."
+            f" runs.{_incomplete(diagnosis)}"
         ]
     else:
         runs = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)
@@ -30,6 +30,15 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
             for f in diagnosis.findings
         ]
     return lines + [f"{name}: not decided. {why}" for name, why in diagnosis.undecided.items()]
+
+
+def _incomplete(diagnosis: Diagnosis) -> str:
+    """Return that errors are far above the noise although nothing was found; empty if none is."""
+    far = {name: r for name, r in diagnosis.over_noise.items() if is_unexplained(r)}
+    if not far:
+        return ""
+    errors = ", ".join(f"{name} ({ratio:.2g} times)" for name, ratio in far.items())
+    return f" Noise of the readings does not explain the error of {errors}: something is missing."
 
 
 def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:

@@ -102,6 +102,13 @@ def test_a_name_without_alternatives_is_not_said_to_have_one(diagnosed):
     assert "error on 1 held-out test run " in text
 
 
+def test_an_error_far_above_the_noise_is_stated_where_nothing_is_found(diagnosed):
+    whole, _ = diagnosed
+    for ratio, is_far in ((15.2, True), (1.2, False)):
+        (text,) = sentences(replace(whole, findings=(), over_noise={"motor": ratio}))
+        assert ("does not explain the error of motor (15 times)" in text) == is_far
+
+
 def test_the_error_of_a_ratio_has_no_unit(diagnosed):
     (text,) = sentences(replace(diagnosed[0], unit=dict.fromkeys(diagnosed[0].unit, "1")))
     assert re.search(r" -> [\d.e-]+ \(lower in", text)
