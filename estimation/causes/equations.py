@@ -55,7 +55,7 @@ SHAPE_STEP = 0.02
 """Relative step of the derivative of a declared column by its shape."""
 
 ANGLES = ("_angle_rad", "_position_m")
-EFFORTS = ("_n_m", "_n", "_pa")
+EFFORTS = ("_n_m", "_n")
 RATES = {
     "_angle_rad": ("_velocity_rad_s", "_acceleration_rad_s2"),
     "_position_m": ("_velocity_m_s", "_acceleration_m_s2"),

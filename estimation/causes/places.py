@@ -191,7 +191,8 @@ def _own(
     known = {c for played in (*roles.values(), *others) for c in played}
     if inputs := _inputs(layout, equation, known | set(everywhere)):
         others = (*others, inputs)
-        roles |= {"load": (effort, *inputs)}  # a seal is pressed on by a pressure
+        pressed = (c for c in inputs if c.endswith("_pa"))  # a seal is, by a pressure
+        roles |= {"load": (effort, *pressed)}
     return Place(equation.name, "loss", equation.name, enters, roles, others=others)
 
 

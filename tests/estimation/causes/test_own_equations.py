@@ -80,9 +80,8 @@ def _waves(random: np.random.Generator, time: FloatArray, most_hz: float, count:
 
 
 def test_two_terms_of_one_effect_have_a_name_each_in_what_moved() -> None:
-    second = '[[equation.effects]]\nid = "motor.torque_constant"\n'
-    second += 'channels.source = "fan_current_a"\n'
-    before, found, after = DYNO.partition('[[equation.effects]]\nid = "sensor.offset"')
+    second = '{ id = "motor.torque_constant", channels = { source = "fan_current_a" } },\n  '
+    before, found, after = DYNO.partition('{ id = "sensor.offset" }')
     (model,) = declared(plant_file.parse(before + second + found + after))
     random = np.random.default_rng(1)
     runs = []
