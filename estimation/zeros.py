@@ -40,11 +40,13 @@ class MovedZero:
     @property
     def sentence(self) -> str:
         """What happened, for a person."""
-        verb, has = ("has", "its") if len(self.runs) == 1 else ("have", "their")
+        have = f"have their zero at {self.lowest:.3g} to {self.highest:.3g}"
+        if len(self.runs) == 1:
+            have = f"has its zero at {self.lowest:.3g}"
         return (
-            f"{self.condition}: {', '.join(self.runs)} {verb} {has} zero at {self.lowest:.3g}"
-            f" to {self.highest:.3g}, all others at {self.usual[0]:.3g} to {self.usual[1]:.3g}; did"
-            " a gear, a coupling or a cable slip, or was the zero set again?"
+            f"{self.condition}: {', '.join(self.runs)} {have}, all others at {self.usual[0]:.3g} to"
+            f" {self.usual[1]:.3g}; did a gear, a coupling or a cable slip, or was the zero set"
+            " again?"
         )
 
 

@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 
 from estimation.causes.angles import angles_of, related, signals_of, unrelated
-from estimation.causes.equations import ANGLES, EFFORTS, RATES, Equation, Layout, sensitivity
-from estimation.derived import CAMPAIGN_TIME, origin_of
+from estimation.causes.equations import ANGLES, EFFORTS, Equation, Layout, sensitivity
+from estimation.derived import CAMPAIGN_TIME, origin_of, rates_of
 
 CLOCKS: Mapping[str, tuple[str, ...]] = {
     "clock": ("time_s",),
@@ -115,14 +115,8 @@ def _motion(angle: str) -> dict[str, tuple[str, ...]]:
     """Return the channels of an angle's motion; none where no angle is read."""
     if not angle:
         return {}
-    base = next(a for a in ANGLES if angle.endswith(a))
-    speed, acceleration = RATES[base]
-    stem = angle.removesuffix(base)
-    return {
-        "speed": (stem + speed,),
-        "acceleration": (stem + acceleration,),
-        "travel": (angle,),
-    }
+    speed, acceleration = rates_of(angle)
+    return {"speed": (speed,), "acceleration": (acceleration,), "travel": (angle,)}
 
 
 def _shared(layout_angles: Sequence[str], position: str) -> dict[str, tuple[str, ...]]:
@@ -165,7 +159,7 @@ def _own(
     """Return the place of an equation, by the angles of its shafts and those of all."""
     angle = _own_angle(equation, angles)
     roles = _motion(angle) | _shared(angles, _position(angles, angle))
-    effort = next((n for n in equation.channels if n.endswith(("_n_m", "_n"))), equation.target)
+    effort = next((n for n in equation.channels if n.endswith(EFFORTS)), equation.target)
     roles |= {"load": (effort,)}
     if not angle:  # a curve over a force has the history of that force
         roles |= {"travel": (effort,)}
@@ -214,7 +208,7 @@ def _inputs(layout: Layout, equation: Equation, known: set[str]) -> tuple[str, .
 
 
 def _is_difference(equation: Equation, channel: str) -> bool:
-    """Whether a channel is made of readings, as the bend between two angles is; no effort is."""
+    """Whether a channel combines readings that are not efforts, as the bend of two angles does."""
     known = equation.model.signals.combination(channel)
     return known is not None and not channel.endswith(EFFORTS)
 

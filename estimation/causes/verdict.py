@@ -116,6 +116,15 @@ def answer(
     explained = {name for f in findings for name in (f.balance, *f.also_in)}
     read = {name for kept, _ in judged for name in kept.scored.candidate.cause.reads}
     found_in = [(kept.scored.candidate, f.runs_affected) for kept, f in judged]
+    said = [
+        *remarks.apart(layout, held_out.apart(found_in)),
+        *filter(None, [claim(sealed)]),
+        *remarks.late(found.noticed, signals_of(layout)),
+        *remarks.left(layout, left, over_noise, explained),
+        *remarks.at_bounds(written),
+        *remarks.limits(timed, layout, sealed, read),
+        *notes,
+    ]
     diagnosis = Diagnosis(
         findings=tuple(findings),
         errors=errors,
@@ -125,19 +134,7 @@ def answer(
         moved={m.balance: _moved(layout.equations[m.balance].model, m) for m in written},
         sealed=sealed,
         undecided=dict(layout.undecided),
-        notes=tuple(
-            dict.fromkeys(  # two findings of one family may have the same note
-                [
-                    *remarks.apart(layout, held_out.apart(found_in)),
-                    *filter(None, [claim(sealed)]),
-                    *remarks.late(found.noticed, signals_of(layout)),
-                    *remarks.left(layout, left, over_noise, explained),
-                    *remarks.at_bounds(written),
-                    *remarks.limits(timed, layout, sealed, read),
-                    *notes,
-                ]
-            )
-        ),
+        notes=tuple(dict.fromkeys(said)),  # two findings of one family may have the same note
         seconds=time.perf_counter() - began,
     )
     kept = tuple(one for one, _ in judged)

@@ -21,7 +21,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         lines = [
             f"No unmodelled effect found in {', '.join(diagnosis.errors)}: no candidate"
             f" explained enough of the training runs and was confirmed on the {runs} held-out test"
-            f" runs.{_incomplete(diagnosis)}"
+            f" runs.{_above_noise(diagnosis)}"
         ]
     else:
         runs = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)
@@ -32,13 +32,16 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     return lines + [f"{name}: not decided. {why}" for name, why in diagnosis.undecided.items()]
 
 
-def _incomplete(diagnosis: Diagnosis) -> str:
-    """Return that errors are far above the noise although nothing was found; empty if none is."""
-    far = {name: r for name, r in diagnosis.over_noise.items() if is_unexplained(r)}
-    if not far:
+def _above_noise(diagnosis: Diagnosis) -> str:
+    """Return which errors are above the noise of the readings, and by what; empty if none is."""
+    above = {name: r for name, r in diagnosis.over_noise.items() if is_unexplained(r)}
+    if not above:
         return ""
-    errors = ", ".join(f"{name} ({ratio:.2g} times)" for name, ratio in far.items())
-    return f" Noise of the readings does not explain the error of {errors}: something is missing."
+    errors = ", ".join(f"{name} ({ratio:.2g} times)" for name, ratio in above.items())
+    return (
+        f" Noise of the readings does not explain the error of {errors}; in brackets the error over"
+        " that noise."
+    )
 
 
 def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:

@@ -1,4 +1,4 @@
-"""Machines that are no reference rig: cylinders, winches, belts, joints with a torque cell."""
+"""Machines other than the reference rig: cylinders, winches, belts, joints with a torque cell."""
 
 from collections.abc import Callable, Sequence
 
@@ -123,7 +123,7 @@ def test_play_of_a_carriage_follows_the_pull_of_its_own_mass():
     assert finding.parameters["gap"].value == pytest.approx(4e-5, rel=0.2)
 
 
-def test_a_torque_cell_of_another_gain_in_some_runs_is_no_curved_one():
+def test_a_torque_cell_of_another_gain_in_some_runs_is_named_by_that_gain():
     def columns(k, random, position, speed, acceleration):
         torque = 25.0 * np.sin(position) + 2.0 * acceleration
         rub = 0.05 * np.tanh(speed / 0.05) + 2e-3 * speed
@@ -157,3 +157,30 @@ def test_a_weight_that_is_stated_has_no_sensor():
     laid = lay_out(declared(plant_file.parse(machine)), runs, [run.name for run in runs])
     places = {claim.cause.place.name for claim in every_claim(laid)}
     assert "sensor weight_n" not in places
+
+
+def test_a_drive_of_another_machine_may_change_its_gain_along_the_travel_whatever_its_name():
+    machine = """
+schema = "rig.machine/1"
+machine = { name = "winch", cutoff_hz = 20.0 }
+axis = [{ name = "motor", unit = "rad" }]
+actuator = [{ name = "motor_current_a", axis = "motor" }]
+sensor = [
+  { name = "motor_angle_rad", axis = "motor", reads = "position" },
+  { name = "rope_torque_n_m", axis = "motor", reads = "effort" },
+]
+"""
+
+    def columns(k, random, position, speed, acceleration):
+        torque = 2.0 * position + 0.2 * acceleration + random.normal(0.0, 0.1, len(position))
+        current = torque + 0.3 * np.tanh(speed / 0.1)
+        return {
+            "motor_angle_rad": position,
+            "motor_current_a": current,
+            "rope_torque_n_m": torque,
+        }
+
+    runs = recorded(columns)
+    laid = lay_out(declared(plant_file.parse(machine)), runs, [run.name for run in runs])
+    assert [*laid.equations] == ["motor"]
+    assert "motor.gain_by_position" in {claim.cause.family for claim in every_claim(laid)}
