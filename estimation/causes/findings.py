@@ -92,6 +92,7 @@ def named(one: Kept, may_name: bool) -> Finding:
         family="unknown",
         verdict="something_missing",
         depends_on=variables_of(lead.best.candidate),
+        error_of=place.home,
     )
     if not may_name:
         return finding
@@ -125,6 +126,7 @@ def unpredicted(found: Unsteady, refits: Refits) -> Finding:
         family="unknown",
         verdict="depends_on",
         depends_on=("velocity" if found.effect.endswith("viscous") else "velocity_sign",),
+        error_of=found.equation,
         rmse_before=before.rmse,
         rmse_after=found.fall * before.rmse,
         runs_improved=sum(found.by_run[name] > 0.0 for name in before.by_run),

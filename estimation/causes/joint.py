@@ -167,6 +167,10 @@ class Joint:
                 value = float(np.einsum("i,rij,j->", vector, self.gram[p], vector))
                 spare = count / max(1, count - 3) if p[1] == "between" else 1.0
                 error[p] = max(spare * value / self.samples[p].sum(), TINY)
+            for name, equation in self.layout.equations.items():
+                if not equation.model.run_offsets:  # a mean is no less certain than one sample
+                    part = name, "between"
+                    error[part] = min(error[part], error[name, "within"])
             self.error = error
             self._prepare()
 

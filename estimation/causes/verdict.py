@@ -214,13 +214,17 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
     before = {name: refits.test_errors(name) for name in place.equations}
     added = refits.add(candidate, acts_in)
     after = {name: refits.test_errors(name) for name in place.equations}
-    fall = max(_fall(before[name], after[name]) for name in place.equations)
-    if fall < -0.5 * math.log1p(-refits.numbers.form_floor):
+    falls = {name: _fall(before[name], after[name]) for name in place.equations}
+    stated, least = place.home, -0.5 * math.log1p(-refits.numbers.form_floor)
+    if falls[stated] < least:
+        stated = max(falls, key=falls.__getitem__)
+    if falls[stated] < least:
         refits.parts, refits.open = parts, uncounted
         return None
-    old, new = before[place.home], after[place.home]
+    old, new = before[stated], after[stated]
     finding = replace(
         named(one, sealed.may_name),
+        error_of=stated,
         rmse_before=old.rmse,
         rmse_after=new.rmse,
         runs_improved=sum(new.by_run[name] < x for name, x in old.by_run.items()),
@@ -229,7 +233,7 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
     )
     if place.home in added and not added[place.home].is_written:
         notes.append(_unwritten(candidate))
-    return _Opened(one, finding, added, fall, notes)
+    return _Opened(one, finding, added, max(falls.values()), notes)
 
 
 def _shown(one: _Opened, refits: Refits) -> float:

@@ -27,7 +27,7 @@ from estimation.causes.scoring import Scored, assessed, best_of_each
 from estimation.causes.search import Rank, Ranking, hypothesis
 from estimation.changes.candidates import claims
 from estimation.changes.difference import Difference, Predicted
-from estimation.changes.stated import prior_of_moved, shares, stated
+from estimation.changes.stated import likeliest_first, prior_of_moved, shares, stated
 from estimation.diagnosis.split import SplitError, periods
 from estimation.errors import EstimationError
 from estimation.model import Model
@@ -91,13 +91,14 @@ def compare(
     late = skews(plain)
     joint = with_skews(plain, late)
     pool = pool_of(joint, claims(fitted, is_b))
+    prior = prior_of_moved(pool, numbers)
     with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
-        ranking = Ranking(joint, pool, _folds_of_one_campaign(fitted, is_b), _in_one_alone(joint))
+        rank = _in_one_alone(joint, prior)
+        ranking = Ranking(joint, pool, _folds_of_one_campaign(fitted, is_b), rank)
         best = ranking.next_to([])
         causes, ranked = list[Scored](), list[Sequence[Scored]]()
         if best and best[0].score > 0.0:
             causes, ranked = hypothesis(ranking, best[:1])
-    prior = prior_of_moved(pool, numbers)
     random = np.random.default_rng(seed)
     found = [
         stated(one, shares(names, prior, numbers), joint, causes, random)
@@ -166,10 +167,11 @@ def _folds_of_one_campaign(layout: Layout, is_b: Sequence[bool]) -> list[list[li
     ]
 
 
-def _in_one_alone(plain: Joint, reach: float = 7.0) -> Rank:
+def _in_one_alone(plain: Joint, prior: float, reach: float = 7.0) -> Rank:
     """Return the ranking of changes that the campaigns do not share, next to others found.
 
-    Another change is not tried from log odds of `reach` below the best one.
+    The likeliest is first, a moved parameter by `prior` more likely than its score. Another change
+    is not tried from log odds of `reach` below the best one.
     """
 
     def ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
@@ -181,7 +183,7 @@ def _in_one_alone(plain: Joint, reach: float = 7.0) -> Rank:
                 break
             if one.gain > least and _differs(one, joint, folds):
                 found.append(one)
-        return found
+        return likeliest_first(found, prior)
 
     return ranked
 

@@ -13,6 +13,7 @@ class Change:
     Attributes:
         verdict: `moved` for a parameter, `came` or `went` for an effect, `one_of` where the runs do
             not distinguish some of them.
+        how: `moved`, `came` or `went`, of the likeliest where the verdict is `one_of`.
         name: What changed.
         equation: Equation it is reported under.
         family: The effect.
@@ -27,6 +28,7 @@ class Change:
     """
 
     verdict: str
+    how: str
     name: str
     equation: str
     family: str

@@ -29,10 +29,14 @@ def prior_of_moved(pool: Sequence[Group], numbers: Numbers) -> float:
     return float(np.log(max(1, len(names[False])) / max(1, len(names[True]))) / numbers.sharpness)
 
 
+def likeliest_first(ranked: Sequence[Scored], prior: float) -> list[Scored]:
+    """Return changes in the order of their scores, a moved parameter's more by `prior`."""
+    return sorted(ranked, key=lambda one: -_score(one, prior))
+
+
 def shares(ranked: Sequence[Scored], prior: float, numbers: Numbers) -> dict[str, float]:
     """Return the probability of each name, the likeliest first."""
-    more = [prior if isinstance(_source(one), Changed) else 0.0 for one in ranked]
-    scores, gains = np.array([(s.score + m, s.gain) for s, m in zip(ranked, more, strict=True)]).T
+    scores, gains = np.array([(_score(one, prior), one.gain) for one in ranked]).T
     each = probabilities(scores, gains, numbers.sharpness)
     found = {_name(_source(one)): float(p) for one, p in zip(ranked, each, strict=True)}
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
@@ -54,7 +58,7 @@ def stated(
     assert acts is not None  # noqa: S101 - every candidate acts in the runs of one campaign
     name = _name(source)
     sure = probability[name] >= SURE
-    verdict = "moved" if isinstance(source, Changed) else ("came" if acts[-1] else "went")
+    how = "moved" if isinstance(source, Changed) else ("came" if acts[-1] else "went")
     term = Term(source.effect, channels=dict(source.channels))
     chosen = [source.effect.amplitudes[k] for k in source.parts]
     labels = [p.name for p in chosen]
@@ -70,7 +74,8 @@ def stated(
     low, high = np.percentile(spread, [2.5, 97.5], axis=0)
     ends = zip(low, high, values, strict=True)
     return Change(
-        verdict=verdict if sure else "one_of",
+        verdict=how if sure else "one_of",
+        how=how,
         name=name,
         equation=source.place.home,
         family=source.effect.id if isinstance(source, Changed) else source.family,
@@ -116,6 +121,10 @@ def _spread(
             np.add.at(counts, random.choice(side, len(side)), 1.0)
         spread.append(grown.fitted_on(counts)[-len(size) :] / size)
     return np.array(spread)
+
+
+def _score(one: Scored, prior: float) -> float:
+    return one.score + (prior if isinstance(_source(one), Changed) else 0.0)
 
 
 def _source(one: Scored) -> Source:

@@ -56,7 +56,9 @@ class Finding:
         depends_on: Variables it depends on.
         confidence: Probability that the name is right, or None without a name.
         parameters: Name to value.
-        rmse_before: Error on the test runs before this finding, after those found earlier.
+        error_of: Equation whose error is stated: its own, or another one whose error falls most
+            where its own does not fall.
+        rmse_before: That error on the test runs before this finding, after those found earlier.
         rmse_after: The same after it.
         runs_improved: Test runs whose error it lowers.
         runs_total: Test runs.
@@ -75,6 +77,7 @@ class Finding:
     depends_on: tuple[str, ...] = ()
     confidence: float | None = None
     parameters: Mapping[str, Value] = field(default_factory=dict)
+    error_of: str
     rmse_before: float = math.nan
     rmse_after: float = math.nan
     runs_improved: int = 0

@@ -88,9 +88,7 @@ def effect(name: str) -> Effect:
     known = catalogue()
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
-        raise UnknownEffectError(
-            f"There is no effect {name!r}.",
-            f"The catalogue has: {', '.join(known)}.",
-            f"Did you mean {near[0]!r}?" if near else "",
-        )
+        meant = f"Did you mean {near[0]!r}? " if near else ""
+        fix = f"{meant}`rig effects` lists them."
+        raise UnknownEffectError(f"There is no effect {name!r}.", fix=fix)
     return known[name]

@@ -8,7 +8,7 @@ from typer import Argument, Option
 
 from rig.cli import options
 from rig.errors import UsageError
-from rig.output.console import JsonFlag, present, remarks, results
+from rig.output.console import JsonLinesFlag, present, remarks, results
 
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
@@ -58,7 +58,7 @@ def live(
     web_port: Annotated[
         int, Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")
     ] = 8766,
-    json_: JsonFlag = False,
+    json_: JsonLinesFlag = False,
 ) -> int:
     """Show grip torque, or a grasper's forces, estimate against sensor, as the rig measures it.
 
@@ -165,7 +165,7 @@ def replay(
         float, Option(help="Speed relative to real time; 0 is as fast as possible.")
     ] = 1.0,
     plain: options.PlainFlag = False,
-    json_: JsonFlag = False,
+    json_: JsonLinesFlag = False,
     lever_mm: Annotated[float, Option(help="Lever arm from the jaw's axis to its tip, mm.")] = 12.0,
     any_instrument: Annotated[
         bool, Option("--any-instrument", help="Allow a model of another instrument.")

@@ -49,6 +49,8 @@ class Finding(_Strict):
     depends_on: list[Variable]
     confidence: Annotated[float, Field(ge=0, le=1)] | None
     parameters: dict[str, Parameter]
+    error_of: Balance
+    """Equation of the errors: its own, or another one where its own does not fall."""
     rmse_before: Number | None
     rmse_after: Number | None
     runs_improved: int

@@ -146,8 +146,8 @@ def _importer(path: Path, format_name: str | None) -> Importer:
     raise DataError(
         f"{path} holds no recording that rig reads by itself.",
         f"{_content(path)} Tried: {', '.join(known)}.".lstrip(),
-        "A table of another layout: --machine FILE with its [data], or rig import. One of these"
-        " formats: name it with --format.",
+        "A table of another layout: state its columns under [data] of the machine file, and name"
+        " that by --machine FILE; or rig import. One of these formats: name it with --format.",
     )
 
 

@@ -136,7 +136,8 @@ def scan(buffer: memoryview, path: Path, *, checksums: bool = True) -> Skeleton:
         raise NotALogError(
             f"{path} is not an MCAP file.",
             "No record of that format was found in it.",
-            "Restore the file, or omit it (fit, diagnose, view: --skip-bad).",
+            "Restore a log, or omit it (fit, diagnose, view: --skip-bad). A table is read by"
+            f" rig import {path} --machine FILE.",
         )
     _check_end(skeleton, buffer, position)
     return skeleton

@@ -28,6 +28,7 @@ IN_MINUTES_S = 90.0
 """From here on a time is stated in minutes."""
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
+JsonLinesFlag = Annotated[bool, typer.Option("--json", help="JSON objects on stdout, one a line.")]
 """The `--json` option every verb has."""
 
 

@@ -18,17 +18,16 @@ def lines(found: Difference) -> Iterator[str]:
 
 
 def _sentence(change: Change) -> str:
-    sure = f"confidence {100 * change.confidence:.0f} %"
+    sure, how, set_of = f"confidence {100 * change.confidence:.0f} %", change.how, ""
     if change.verdict == "one_of":
-        others = ", ".join(change.alternatives)
-        names = f"{change.name}, {others}"
-        return f"One of these changed, not distinguishable on these runs: {names} ({sure})."
-    how = {"moved": "Moved", "came": "Came", "went": "Went"}[change.verdict]
+        names = ", ".join([change.name, *change.alternatives])
+        set_of = f"One of these changed, not distinguishable on these runs: {names}. "
+        how = f"most likely {how}"
     sizes = [_size(change, name) for name in change.parameters]
     if "order" in change.shape:
         repeats = wave(change.shape["order"], change.depends_on)
         sizes += [f"{name} {text}".strip() for name, text in repeats.items()]
-    return f"{how}: {change.name}, {', '.join(sizes)} ({sure})."
+    return f"{set_of}{how.capitalize()}: {change.name}, {', '.join(sizes)} ({sure})."
 
 
 def _size(change: Change, name: str) -> str:

@@ -109,7 +109,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
         alternatives), what to check at the rig, and the command that describes the effect, empty
         without a name.
     """
-    scale, unit = words.display(diagnosis.unit[finding.balance], finding.rmse_before)
+    scale, unit = words.display(diagnosis.unit[finding.error_of], finding.rmse_before)
     named = finding.verdict in ("identified", "one_of")
     variables = " and ".join(v.replace("_", " ") for v in finding.depends_on)
     facts = []
@@ -121,7 +121,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
     after = words.in_unit(scale * finding.rmse_after, unit)
     fall = f"{scale * finding.rmse_before:.3g} to {after}"
     runs = f"lower in {finding.runs_improved} of {finding.runs_total} held-out test runs"
-    facts.append(("Error", f"{fall}, {runs}"))
+    facts.append((f"Error{words.of_another(finding)}", f"{fall}, {runs}"))
     if variables:
         facts.append(("Depends on", variables))
     facts.append(("Equation", " and ".join([finding.balance, *finding.also_in])))

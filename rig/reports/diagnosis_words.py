@@ -26,7 +26,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     else:
         runs = len(diagnosis.sealed.discover) + len(diagnosis.sealed.confirm)
         lines = [
-            _sentence(f, diagnosis.unit[f.balance], diagnosis.exploratory) + _where(f, runs)
+            _sentence(f, diagnosis.unit[f.error_of], diagnosis.exploratory) + _where(f, runs)
             for f in diagnosis.findings
         ]
     return lines + [f"{name}: not decided. {why}" for name, why in diagnosis.undecided.items()]
@@ -48,12 +48,17 @@ def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:
     scale, shown = display(unit, finding.rmse_before)
     tested = counted(finding.runs_total, "test run" if exploratory else "held-out test run")
     fall = (
-        f"error on {tested}{' (exploratory)' * exploratory}"
+        f"error{of_another(finding)} on {tested}{' (exploratory)' * exploratory}"
         f" {scale * finding.rmse_before:.3g} -> {in_unit(scale * finding.rmse_after, shown)}"
         f" (lower in {finding.runs_improved} of {counted(finding.runs_total, 'run')})"
     )
     also = f" It also enters {', '.join(finding.also_in)}." if finding.also_in else ""
     return f"{finding.balance}: {_claim(finding)}; {fall}.{also}"
+
+
+def of_another(finding: Finding) -> str:
+    """Return which equation the errors are of, where that is not the finding's own."""
+    return f" of {finding.error_of}" if finding.error_of != finding.balance else ""
 
 
 def _where(finding: Finding, runs: int) -> str:

@@ -199,7 +199,9 @@ def motor() -> Model:
 
 
 def test_a_torque_constant_that_moved_is_named_where_friction_could_stand_in_for_the_current():
-    (found,) = compare(held_loads(1, 0.02), held_loads(2, 0.011), [motor()]).changes
+    difference = compare(held_loads(1, 0.02), held_loads(2, 0.011), [motor()])
+    (found,) = difference.changes
     assert found.name == "motor.torque_constant gain of motor"
+    assert "oved: motor.torque_constant gain of motor, gain -0.00" in next(lines(difference))
     assert found.parameters["gain"] == pytest.approx(-0.009, rel=0.2)
     assert not compare(held_loads(1, 0.02), held_loads(2, 0.02), [motor()]).changes

@@ -34,6 +34,7 @@ VALUES = st.builds(Value, NUMBERS, st.sampled_from(["N m", "1"]), PAIRS)
 FINDINGS = st.builds(
     Finding,
     balance=BALANCES,
+    error_of=BALANCES,
     family=FAMILIES,
     verdict=st.sampled_from(VERDICTS[:-1]),
     rmse_before=NUMBERS,

@@ -25,7 +25,7 @@ NEXT = {
 
 
 def answer(verdict: str, proposed=None) -> Diagnosis:
-    finding = Finding(balance="motor", family="friction.load", verdict=verdict)
+    finding = Finding(balance="motor", error_of="motor", family="friction.load", verdict=verdict)
     return Diagnosis(
         (finding,), {}, {}, {}, {}, Sealed((), (), 0, "", ""), next_experiment=proposed
     )

@@ -3,13 +3,15 @@
 import json
 import re
 import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 from io import StringIO
 
 import numpy as np
 import pytest
 
-from estimation.diagnosis.result import Finding, Value
+from estimation.diagnosis.result import Diagnosis, Finding, Value
+from estimation.diagnosis.split import Sealed
 from estimation.effects import catalogue
 from estimation.model import Estimate, Term
 from estimation.recording import Flag, Mark, Recording
@@ -17,7 +19,7 @@ from rig.log.convert import write_recording
 from rig.output import figures
 from rig.output.provenance import Provenance, commit
 from rig.output.table import TextTable, to_markdown, to_rich
-from rig.reports.diagnosis_words import meaning, meaning_of, sizes_of
+from rig.reports.diagnosis_words import meaning, meaning_of, sentences, sizes_of
 from tests.rig.browser import Opened, chromium
 
 pytestmark = pytest.mark.integration
@@ -85,7 +87,9 @@ def test_the_form_that_was_found_is_described_and_not_the_head_of_its_family():
     }
     for form, words in forms.items():
         family = catalogue()[form].family
-        found = Finding(balance="pan", family=family, form=form, verdict="identified")
+        found = Finding(
+            balance="pan", error_of="pan", family=family, form=form, verdict="identified"
+        )
         assert words in meaning_of(found)
     assert meaning("spring.end_stop") == "a contact spring beyond a limit angle"  # of both forms
 
@@ -112,6 +116,7 @@ def test_sizes_are_those_of_the_wave_and_in_readable_units(along, repeats):
     }
     finding = Finding(
         balance="motor",
+        error_of="motor",
         place="motor",
         family="ripple.motor",
         verdict="identified",
@@ -119,6 +124,29 @@ def test_sizes_are_those_of_the_wave_and_in_readable_units(along, repeats):
         parameters=wave,
     )
     assert sizes_of(finding) == {"amplitude": "5 mN m", "time": "0.25 s"} | repeats
+
+
+def test_a_finding_whose_own_equation_gains_nothing_states_the_error_of_another():
+    finding = Finding(
+        balance="motor",
+        also_in=("cable",),
+        family="sensor.delay",
+        verdict="identified",
+        error_of="cable",
+        rmse_before=0.004,
+        rmse_after=0.001,
+        runs_improved=2,
+        runs_total=2,
+    )
+    units = {"motor": "N", "cable": "N m"}
+    (sentence,) = sentences(
+        Diagnosis((finding,), {}, units, {}, {}, Sealed((), ("a", "b"), 0, "", ""))
+    )
+    assert sentence.startswith("motor: ")
+    assert "error of cable on 2 held-out test runs 4 -> 1 mN m" in sentence
+    own = replace(finding, error_of="motor")
+    (sentence,) = sentences(Diagnosis((own,), {}, units, {}, {}, Sealed((), ("a", "b"), 0, "", "")))
+    assert "; error on 2 held-out test runs 0.004 -> 0.001 N" in sentence
 
 
 def test_a_table_is_the_same_in_every_medium():

@@ -36,6 +36,17 @@ effects = [
 ]
 """
 
+WINCH = """
+schema = "rig.machine/1"
+machine = { name = "winch", cutoff_hz = 20.0, run_offsets = false }
+axis = [{ name = "motor", unit = "rad" }]
+actuator = [{ name = "motor_current_a", axis = "motor" }]
+sensor = [
+  { name = "motor_angle_rad", axis = "motor", reads = "position" },
+  { name = "rope_torque_n_m", axis = "motor", reads = "effort" },
+]
+"""
+
 BELT = """
 schema = "rig.machine/1"
 machine = { name = "belt", cutoff_hz = 20.0 }
@@ -108,6 +119,28 @@ def test_friction_grows_with_a_pressure():
     (finding,) = found_in(CYLINDER, recorded(columns))
     assert (finding.verdict, finding.family) == ("identified", "friction.load")
     assert finding.parameters["friction"].value == pytest.approx(0.02, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("rubs", "grows", "family"),
+    [(0.08, 0.0, "friction.load"), (0.0, 0.02, "motor.gain_by_position")],
+)
+def test_a_load_that_is_held_in_each_run_shows_by_what_it_does(rubs, grows, family):
+    """The drive's constant is known from the runs' means alone: within a run the load is held."""
+
+    def columns(k, random, position, speed, acceleration):
+        load = 20.0 * (k % 5 + 1) + 0.2 * acceleration
+        rub = (3.0 + rubs * load) * np.tanh(speed / 0.1)
+        current = (load + rub) * (1.0 + grows * position) / 2.0
+        return {
+            "motor_angle_rad": 3.0 * position,
+            "motor_current_a": current + random.normal(0.0, 0.05, len(load)),
+            "rope_torque_n_m": load + random.normal(0.0, 0.1, len(load)),
+        }
+
+    findings = found_in(WINCH, recorded(columns))
+    assert findings[0].family == family
+    assert findings[0].confidence > 0.5
 
 
 def test_play_of_a_carriage_follows_the_pull_of_its_own_mass():
