@@ -21,6 +21,7 @@ A file of several equations contains each under `[[models]]`, with `[models.proc
 
 import difflib
 import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
@@ -132,6 +133,13 @@ def parse_all(text: str, where: str = "model") -> list[Model]:
         top.finish()
         if not models:
             raise ModelFileError(f"{where} holds no model.")
+        twice = [name for name, n in Counter(m.balance for m in models).items() if n > 1]
+        if twice:
+            raise ModelFileError(
+                f"{where} holds several models of the equation {twice[0]!r}.",
+                "A diagnosis has one model of an equation.",
+                "Give each its own name: balance = ...",
+            )
     except tomllib.TOMLDecodeError as error:
         raise ModelFileError(f"{where} is not TOML.", str(error)) from error
     except ModelFileError:

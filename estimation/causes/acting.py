@@ -106,7 +106,9 @@ def _acting(inverse: FloatArray, products: Products) -> Iterator[NDArray[np.bool
 
 def _over(acts: NDArray[np.bool_], products: FloatArray) -> FloatArray:
     """Return the sum over the runs in which each candidate acts."""
-    return np.asarray(np.einsum("cr,cr...->c...", acts, products))
+    flat = products.reshape(*acts.shape, -1)
+    summed = acts[:, None].astype(np.float64) @ flat
+    return np.asarray(summed.reshape(len(acts), *products.shape[2:]))
 
 
 def _sizes(cross: FloatArray, own: FloatArray) -> FloatArray:

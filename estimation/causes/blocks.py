@@ -4,7 +4,7 @@ Candidates of one place with as many columns each share every step, so a search 
 them costs a few large products.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from estimation.causes.folds import Folds
 from estimation.causes.joint import Joint, Next
-from estimation.causes.laid import Laid, Part, products
+from estimation.causes.laid import Followed, Laid, Part, products
 from estimation.recording import FloatArray
 
 
@@ -36,24 +36,24 @@ class Block:
     """Cross-products of causes with a regression's base.
 
     Attributes:
-        laid: The causes.
+        followed: The noise that the causes follow.
         of: Part to its products.
         taken: How much of each declared column was taken off them, (causes, declared, k).
+        within: Weighted sum of the products of the parts within runs.
+        whole: The same of all parts.
     """
 
-    laid: Laid
+    followed: Followed
     of: Mapping[Part, Products]
     taken: FloatArray
+    within: Products
+    whole: Products
 
     def only(self, chosen: NDArray[np.bool_]) -> "Block":
         """Return some of the causes."""
-        of = {p: Products(*(x[:, chosen] for x in known)) for p, known in self.of.items()}
-        return Block(self.laid.only(chosen), of, self.taken[chosen])
-
-    def summed(self, weights: Mapping[Part, float], parts: Iterable[Part]) -> Products:
-        """Return the weighted sum of the products of some parts."""
-        weighted = [[weights[p] * x for x in self.of[p]] for p in parts]
-        return Products(*(np.asarray(sum(kind)) for kind in zip(*weighted, strict=True)))
+        of = {p: _some(known, chosen) for p, known in self.of.items()}
+        sums = (_some(self.within, chosen), _some(self.whole, chosen))
+        return Block(self.followed.only(chosen), of, self.taken[chosen], *sums)
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,20 @@ def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
             added = products(table[:, None, :, new], columns)
             base[:, :, [places[i] for i in new]] = added
         of[p] = known.of[p]._replace(base=base)
-    return Block(laid, of, joint.taken_off(laid) if known is None else known.taken)
+    within, whole = (
+        _summed([[joint.weights[p] * x for x in of[p]] for p in of if p[1] in kinds])
+        for kinds in (("within",), ("within", "between"))
+    )
+    taken = joint.taken_off(laid) if known is None else known.taken
+    return Block(laid.followed, of, taken, within, whole)
+
+
+def _some(products: Products, chosen: NDArray[np.bool_]) -> Products:
+    return Products(*(x[:, chosen] for x in products))
+
+
+def _summed(weighted: Sequence[Sequence[FloatArray]]) -> Products:
+    return Products(*(np.asarray(sum(kind)) for kind in zip(*weighted, strict=True)))
 
 
 def evaluate(
@@ -120,9 +133,8 @@ def evaluate(
     errors = []
     if promising.any():
         errors = _errors(joint, block.only(promising), folds, precision[promising])
-    inside = [p for p in block.of if p[1] == "within"]
     weights = joint.weights
-    cross, own, right = block.summed(weights, inside)
+    cross, own, right = block.within
     declared = _declared(joint, block, base, amplitudes)
     changes, slopes = {}, {}
     for name in {name for name, _ in block.of}:
@@ -135,7 +147,7 @@ def evaluate(
             largest = at.index(joint.largest_linear[name][0])
             changes[name] = declared[:, at[largest]] / factor[largest]
     # the columns as they were before declared ones were taken off: in some runs these differ
-    gram = np.asarray(sum(weights[p] * joint.gram[p] for p in inside))
+    gram = np.asarray(sum(weights[p] * joint.gram[p] for p in block.of if p[1] == "within"))
     count = block.taken.shape[1]
     mixed = block.taken.swapaxes(1, 2) @ cross[:, :, :count]
     own = own + mixed + mixed.swapaxes(2, 3)
@@ -190,7 +202,7 @@ class _Fitting:
 
     def __init__(self, joint: Joint, block: Block, precision: FloatArray) -> None:
         self.joint, self.precision = joint, precision
-        self._sums = block.summed(joint.weights, block.of)
+        self._sums = block.whole
         self._of_prior = joint.prior_products(block.taken)
         declared = self._of_prior[:, : block.taken.shape[1]]
         self._own_prior = -block.taken.swapaxes(1, 2) @ declared
@@ -247,7 +259,7 @@ def _squared(
     """Return squared errors of runs, (n, causes), of parameters (n, causes, .)."""
     products = Products(*(x[runs] for x in block.of[p])) if p in block.of else None
     error = _residual(joint.gram[p][runs], products, base, amplitudes)
-    next_to = Next(block.laid, amplitudes, (block.taken @ amplitudes[..., None])[..., 0])
+    next_to = Next(block.followed, amplitudes, (block.taken @ amplitudes[..., None])[..., 0])
     return np.asarray(error + joint.avoided(p, runs, base, next_to))
 
 

@@ -180,7 +180,7 @@ def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
             noisy = _is_noisy(joint.layout, one)
             shaken = _columns(one, joint.layout.shaken) if noisy else None
             width = next(iter(columns[0].values())).shape[1]
-            key = (width, _unit(one.cause), one.has_means, shaken is None)
+            key = (tuple(columns[0]), width, _unit(one.cause), one.has_means, shaken is None)
             held = waiting.setdefault(key, [])
             held.append((one, columns, shaken))
             if len(held) * width**2 >= AT_ONCE:
@@ -243,21 +243,15 @@ def without_declared(
     has_means: bool = True,
 ) -> Laid:
     """Return causes' columns, with those of the shaken runs or none, less the declared ones."""
-    pairs = zip(shaken, columns, strict=False)
-    followed = _stacked(joint, [_apart(one, own) for one, own in pairs])
+    followed = _stacked(joint, shaken, columns)
     noise = {name: inner for name, (inner, _) in followed.items()}
     return joint.projection.laid(_stacked(joint, columns), noise, unit, has_means)
 
 
-def _apart(shaken: OfRuns, columns: OfRuns) -> OfRuns:
-    return [
-        {name: x - own[name] for name, x in one.items()}
-        for one, own in zip(shaken, columns, strict=True)
-    ]
-
-
-def _stacked(joint: Joint, columns: Sequence[OfRuns]) -> dict[str, tuple[Columns, FloatArray]]:
-    """Return equation to the columns of causes less each run's mean, and the means.
+def _stacked(
+    joint: Joint, columns: Sequence[OfRuns], less: Sequence[OfRuns] = ()
+) -> dict[str, tuple[Columns, FloatArray]]:
+    """Return equation to the columns of causes less others and each run's mean, and the means.
 
     Shapes (runs, causes, samples, k) and (runs, causes, k).
     """
@@ -266,10 +260,12 @@ def _stacked(joint: Joint, columns: Sequence[OfRuns]) -> dict[str, tuple[Columns
         most, k = int(joint.samples[name, "within"].max()), columns[0][0][name].shape[1]
         inner = np.zeros((len(joint.runs), len(columns), most, k), dtype=np.float32)
         means = np.zeros((len(joint.runs), len(columns), k))
-        for c, runs in enumerate(columns):
-            for r, own in enumerate(runs):
-                means[r, c] = own[name].mean(axis=0)
-                inner[r, c, : len(own[name])] = own[name] - means[r, c]
+        for r in range(len(joint.runs)):
+            own = np.stack([runs[r][name] for runs in columns])
+            if less:
+                own -= [runs[r][name] for runs in less]
+            means[r] = own.mean(axis=1)
+            inner[r, :, : own.shape[1]] = own - means[r][:, None]
         out[name] = inner, means
     return out
 

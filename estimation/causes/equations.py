@@ -25,7 +25,7 @@ from estimation.derived import (
 )
 from estimation.effects import Proportional
 from estimation.errors import EstimationError
-from estimation.filters import LowPass
+from estimation.filters import FilterError, LowPass
 from estimation.fit_problem import OFFSET
 from estimation.fitting import fit
 from estimation.model import Model, Term, balance_channels
@@ -282,7 +282,12 @@ def lay_out(
     """
     timed = on_one_clock(recordings)
     campaign = Campaign.of([r for r in timed if r.name in set(train)])
-    measured = tuple(n for n in shared_columns(timed) if n != CAMPAIGN_TIME)
+    read = {c for m in models for c in measured_channels([*m.channels, m.target], m.signals)}
+    measured = tuple(
+        n
+        for n in shared_columns(timed)
+        if n != CAMPAIGN_TIME and (n in read or all(_is_whole(r, n) for r in timed))
+    )
     equations: dict[str, Equation] = {}
     undecided: dict[str, EstimationError] = {}
     for model in models:
@@ -318,6 +323,12 @@ def lay_out(
     return Layout(equations, runs, measured, undecided=reasons, left_out=lost)
 
 
+def _is_whole(recording: Recording, channel: str) -> bool:
+    """Whether a channel has values, and each that is not finite has a flag."""
+    finite = np.isfinite(recording[channel])
+    return bool(finite.any() and finite[recording.valid].all())
+
+
 def laid_out_like(layout: Layout, recordings: Sequence[Recording]) -> Layout:
     """Return other runs with the equations of a layout, for what a cause would do there.
 
@@ -335,11 +346,11 @@ def _laid_out(
 ) -> tuple[list[RunSignals], dict[str, str]]:
     """Return the runs, and those without enough samples of some equation with the reason."""
     runs: list[RunSignals] = []
-    lost: dict[str, LayoutError] = {}
+    lost: dict[str, EstimationError] = {}
     for recording in recordings:
         try:
             runs.append(_signals(recording, equations, measured))
-        except LayoutError as error:
+        except (LayoutError, FilterError) as error:
             lost[recording.name] = error
     if lost and not runs:
         raise next(iter(lost.values()))

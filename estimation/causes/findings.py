@@ -148,7 +148,10 @@ def parameters_of(
     cause = kept.scored.candidate.cause
     if isinstance(cause, Moved | Function) or cause.effect.id not in LATE:
         return found
-    (gain, late) = (found[p.name] for p in (*cause.effect.amplitudes, *cause.effect.shape))
+    names = [p.name for p in (*cause.effect.amplitudes, *cause.effect.shape)]
+    if not found.keys() >= {*names}:  # a declared term has that amplitude too
+        return found
+    gain, late = (found[name] for name in names)
     whole = 1.0
     if kept.part is not None and kept.part.term is not None:  # in the unit of the equation
         own = (e for e in cause.place.enters if e.equation == finding.balance and not e.order)

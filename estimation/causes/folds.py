@@ -30,8 +30,8 @@ def folds_of(layout: Layout) -> list[list[list[int]]]:
 
 
 def unvaried(layout: Layout) -> list[str]:
-    """Return the channels of the conditions that have too few levels for folds by level."""
-    return [name for name, values in _conditions(layout).items() if not _levels(values)]
+    """Return the channels of the conditions that are alike in all runs."""
+    return [name for name, values in _conditions(layout).items() if not _varies(values)]
 
 
 def _conditions(layout: Layout) -> dict[str, list[float]]:
@@ -53,11 +53,11 @@ def _conditions(layout: Layout) -> dict[str, list[float]]:
 
 
 def _levels(values: Sequence[float], count: int = 3) -> list[list[int]]:
-    """Return runs by the level of a condition; empty where it does not vary."""
+    """Return runs by the level of a condition; empty of few runs, or where it does not vary."""
     array = np.asarray(values)
-    spread = float(np.ptp(array))
-    if len(array) < 2 * count or spread <= 0.1 * float(np.abs(array).mean()):
+    if len(array) < 2 * count or not _varies(values):
         return []
+    spread = float(np.ptp(array))
     order = np.argsort(array, kind="stable")
     gaps = np.sort(np.argsort(-np.diff(array[order]), kind="stable")[: count - 1]) + 1
     if array[order][gaps].size and np.diff(array[order])[gaps - 1].min() > 0.15 * spread:
@@ -67,3 +67,8 @@ def _levels(values: Sequence[float], count: int = 3) -> list[list[int]]:
     if max(map(len, groups)) > 0.6 * len(array):
         groups = np.array_split(order, count)
     return [sorted(int(i) for i in g) for g in groups]
+
+
+def _varies(values: Sequence[float]) -> bool:
+    array = np.asarray(values)
+    return float(np.ptp(array)) > 0.1 * float(np.abs(array).mean())

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from estimation.causes.equations import SHAPE_STEP, Layout
 from estimation.causes.folds import Folds
 from estimation.causes.instruments import declared_of
-from estimation.causes.laid import TINY, Laid, Part, Projection, centred, inverse
+from estimation.causes.laid import TINY, Followed, Laid, Part, Projection, centred, inverse
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.recording import FloatArray
 
@@ -49,12 +49,12 @@ class Next(NamedTuple):
     """Causes next to a base, with parameters.
 
     Attributes:
-        laid: The causes.
+        followed: The noise that they follow.
         amplitudes: Theirs in each run, shape (n, causes, k).
         taken: What their columns take off the declared parameters, shape (n, causes, declared).
     """
 
-    laid: Laid
+    followed: Followed
     amplitudes: FloatArray
     taken: FloatArray
 
@@ -321,11 +321,12 @@ class Joint:
         kept = [*range(self.size), self.size + k]
         out = np.zeros((len(old), self.size + k + 1, self.size + k + 1))
         out[:, np.array(kept)[:, None], kept] = old
-        if name in laid.noise:
+        if name in laid.followed.across:
             there = [*self._equations_at[name], -1]
-            out[:, np.array(there)[:, None], new] = laid.noise[name][:, 0]
-            out[:, np.array(new)[:, None], there] = laid.noise[name][:, 0].transpose(0, 2, 1)
-            out[:, np.array(new)[:, None], new] = laid.own_noise[name][:, 0]
+            across = laid.followed.across[name][:, 0]
+            out[:, np.array(there)[:, None], new] = across
+            out[:, np.array(new)[:, None], there] = across.transpose(0, 2, 1)
+            out[:, np.array(new)[:, None], new] = laid.followed.own[name][:, 0]
         return out
 
     # ---- noise of what is read
@@ -368,11 +369,11 @@ class Joint:
         now = np.concatenate([whole, base[..., self._declared_size :], target], axis=-1)
         usual = np.concatenate([self.declared, np.zeros(len(self._added)), [-1.0]])
         left = ((now @ noise) * now).sum(axis=-1)
-        if next_to is not None and name in next_to.laid.noise:
-            laid, amplitudes = next_to.laid, next_to.amplitudes
+        if next_to is not None and name in next_to.followed.across:
+            followed, amplitudes = next_to.followed, next_to.amplitudes
             there = now[..., [*self._equations_at[name], -1]]
-            follows = (there[:, :, None] @ laid.noise[name][runs])[:, :, 0]
-            itself = (amplitudes[:, :, None] @ laid.own_noise[name][runs])[:, :, 0]
+            follows = (there[:, :, None] @ followed.across[name][runs])[:, :, 0]
+            itself = (amplitudes[:, :, None] @ followed.own[name][runs])[:, :, 0]
             left = left + ((2.0 * follows + itself) * amplitudes).sum(axis=-1)
         return np.asarray(np.maximum(((noise @ usual) @ usual)[:, None] - left, 0.0))
 

@@ -24,6 +24,28 @@ NOTHING = 1e-12
 """Norm of a column, in declared errors of its equations for one unit, below which it is zero."""
 
 
+Chosen = slice | NDArray[np.intp] | NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Products of the noise of readings that causes follow.
+
+    Attributes:
+        across: Equation to those with the noise of the declared columns and, last, of the target:
+            shape (runs, causes, declared + 1, k).
+        own: Equation to those with itself, shape (runs, causes, k, k).
+    """
+
+    across: Mapping[str, FloatArray]
+    own: Mapping[str, FloatArray]
+
+    def only(self, chosen: Chosen) -> "Followed":
+        """Return those of some of the causes."""
+        parts = (self.across, self.own)
+        return Followed(*({name: x[:, chosen] for name, x in part.items()} for part in parts))
+
+
 @dataclass(frozen=True)
 class Laid:
     """Causes that enter the same equations, with as many columns each.
@@ -34,17 +56,14 @@ class Laid:
         means: Equation to the runs' means, shape (runs, causes, k).
         taken: Equation to how much of each declared column was taken off, (causes, declared, k).
         size: What the columns were divided by, shape (causes, k).
-        noise: Equation to the products of the noise that the columns follow with that of the
-            declared columns and, last, of the target: shape (runs, causes, declared + 1, k).
-        own_noise: Equation to the products of that noise with itself, (runs, causes, k, k).
+        followed: The noise that the columns follow.
     """
 
     inner: Mapping[str, Columns]
     means: Mapping[str, FloatArray]
     taken: Mapping[str, FloatArray]
     size: FloatArray
-    noise: Mapping[str, FloatArray]
-    own_noise: Mapping[str, FloatArray]
+    followed: Followed
 
     def __len__(self) -> int:
         return len(self.size)
@@ -56,24 +75,23 @@ class Laid:
             return None
         return self.inner[name] if kind == "within" else self.means[name][:, :, None]
 
-    def only(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> "Laid":
+    def only(self, chosen: Chosen) -> "Laid":
         """Return some of the causes."""
         return Laid(
             {name: x[:, chosen] for name, x in self.inner.items()},
             {name: x[:, chosen] for name, x in self.means.items()},
             {name: x[chosen] for name, x in self.taken.items()},
             self.size[chosen],
-            {name: x[:, chosen] for name, x in self.noise.items()},
-            {name: x[:, chosen] for name, x in self.own_noise.items()},
+            self.followed.only(chosen),
         )
 
     def within(self, equations: Container[str]) -> "Laid":
         """Return the same causes as if they entered some of the equations only."""
         inner = {name: x for name, x in self.inner.items() if name in equations}
-        parts = (self.means, self.taken, self.noise, self.own_noise)
+        parts = (self.means, self.taken, self.followed.across, self.followed.own)
         kept = [{name: x for name, x in part.items() if name in equations} for part in parts]
-        means, taken, noise, own_noise = kept
-        return Laid(inner, means, taken, self.size, noise, own_noise)
+        means, taken, across, own = kept
+        return Laid(inner, means, taken, self.size, Followed(across, own))
 
 
 def centred(columns: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -169,7 +187,7 @@ class Projection:
             noise /= np.maximum(size, NOTHING)[:, None]
         across = {n: products(self._noise[n][:, None], x) for n, x in followed.items()}
         own = {n: products(x, x) for n, x in followed.items()}
-        return Laid(inners, middles, taken, size, across, own)
+        return Laid(inners, middles, taken, size, Followed(across, own))
 
 
 def products(one: Columns, other: Columns) -> FloatArray:

@@ -14,6 +14,9 @@ from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
 from estimation.causes.scoring import assessed
 from estimation.causes.sources import Source
+from estimation.effects import effect
+
+DELAY = effect("sensor.delay")
 
 SKEW_S = 1e-3
 MOST_SKEW = 2.0
@@ -36,9 +39,7 @@ def skews(joint: Joint) -> list[Claim]:
         Claim(replace(source, shape=(SKEW_S,)))
         for place in plain
         if place.enters
-        for source in itertools.islice(
-            (s for s in sources_at(joint.layout, place) if s.effect.id == "sensor.delay"), 1
-        )
+        for source in itertools.islice(sources_at(joint.layout, place, [DELAY]), 1)
     ]
     every = sum(claim.cause.place.kind == "angle sensor" for claim in late)
     while True:

@@ -2,12 +2,12 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from scipy.signal import detrend
 
-from estimation.causes.angles import travel_of
+from estimation.causes.angles import angles_of, travel_of
 from estimation.causes.equations import ANGLES, Layout
 from estimation.causes.grids import axis, last_order, least_order, turns
 from estimation.causes.orders import largest_orders, orders_elsewhere
@@ -100,10 +100,12 @@ SERIES = ("inertia.position.harmonics",)
 """Effects of several harmonics of one turn: over less than a turn these are nearly the same."""
 
 
-def sources_at(layout: Layout, place: Place) -> Iterator[Source]:
-    """Yield every candidate at a place."""
+def sources_at(
+    layout: Layout, place: Place, effects: Iterable[Effect] | None = None
+) -> Iterator[Source]:
+    """Yield every candidate at a place, of the whole catalogue or of some effects."""
     repeats = repeats_one_reference(layout)
-    for effect in catalogue().values():
+    for effect in catalogue().values() if effects is None else effects:
         of_run_time = "clock" in effect.roles and effect.id.startswith(OVER_TIME)
         if not _acts(layout, effect, place) or (repeats and of_run_time):
             continue
@@ -167,7 +169,7 @@ def _follows_noise(
 
 def repeats_one_reference(layout: Layout) -> bool:
     """Whether all runs repeat one motion, so that time within a run is the motion's phase."""
-    angle = next((n for n in layout.measured if n.endswith(("_angle_rad", "_position_m"))), "")
+    angle = next(iter(angles_of(layout)), "")
     if not angle or len(layout.runs) < 2:
         return False
     size = min(len(r.channels[angle]) for r in layout.runs)

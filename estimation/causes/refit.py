@@ -133,7 +133,8 @@ class Refit:
         self.train_names, self.test_names = tuple(train), tuple(test)
         self.numbers = numbers
         self._runs: dict[frozenset[str], dict[str, tuple[FitRun, NDArray[np.intp]] | None]] = {}
-        self._solved: dict[tuple[int, ...], Solved] = {}
+        # with the causes themselves: the identity of one that is gone may be another's
+        self._solved: dict[tuple[int, ...], tuple[Sequence[Part], Solved]] = {}
 
     @cached_property
     def _declared(self) -> list[Term]:
@@ -144,8 +145,8 @@ class Refit:
         """Return the amplitudes of the declared terms and of some causes on the training runs."""
         key = tuple(map(id, parts))
         if key not in self._solved:
-            self._solved[key] = self._fitted(tuple(parts))
-        return self._solved[key]
+            self._solved[key] = tuple(parts), self._fitted(tuple(parts))
+        return self._solved[key][1]
 
     def amplitudes(self, part: Part, parts: Sequence[Part]) -> FloatArray:
         """Return the amplitudes of one of some causes."""
@@ -211,7 +212,7 @@ class Refit:
     def settled(self, parts: Sequence[Part]) -> list[Part]:
         """Return causes with the shapes that they were fitted with next to one another."""
         solved = self.solve(parts)
-        self._solved[tuple(map(id, solved.parts))] = solved
+        self._solved[tuple(map(id, solved.parts))] = solved.parts, solved
         return list(solved.parts)
 
     def predict_next_to(self, parts: Sequence[Part]) -> None:

@@ -95,11 +95,11 @@ def answer(
     on_stage("searching the training runs for what they lack")
     with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
         found = search(layout.select(sealed.discover), numbers)
-    on_stage("opening the held-out test runs")
-    refits = Refits(layout, timed, sealed, numbers)
-    held_out = HeldOut(layout, sealed, numbers, found.late)
-    judged, notes = _judged(found, held_out, refits)
-    written, errors = refits.models(), refits.errors()
+        on_stage("opening the held-out test runs")
+        refits = Refits(layout, timed, sealed, numbers)
+        held_out = HeldOut(layout, sealed, numbers, found.late)
+        judged, notes = _judged(found, held_out, refits)
+        written, errors = refits.models(), refits.errors()
     left = {name: error.after for name, error in errors.items()}
     findings = [
         replace(f, parameters=parameters_of(kept, f, written, refits)) for kept, f in judged

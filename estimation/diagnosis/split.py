@@ -94,7 +94,7 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
         raise SplitError(
             f"{len(recordings)} runs are too few to diagnose.",
             "Some runs must find an effect, and others, held out, confirm it.",
-            f"Record {share} runs at least; to name an effect, eight.",
+            f"Record {share} runs at least; to name an effect, seven.",
         )
     new = [recording for recording in recordings if recording.name not in seen]
     levels = _levels(recordings)
@@ -154,7 +154,12 @@ def _split_paths(
 
 def path_of(name: str) -> str:
     """Return the name of the recording a piece was cut from; of a run its own name."""
-    return name.rpartition(PERIOD)[0] or name.rpartition(PART)[0] or name
+    return period_of(name) or name.rpartition(PART)[0] or name
+
+
+def period_of(name: str) -> str:
+    """Return the name of the path that a piece is a period of; empty of no period."""
+    return name.rpartition(PERIOD)[0]
 
 
 def claim(sealed: Sealed) -> str | None:

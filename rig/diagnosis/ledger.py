@@ -14,7 +14,7 @@ from typing import Any
 
 from estimation.diagnosis.split import Sealed, samples_hash
 from estimation.file_kinds import LEDGER
-from estimation.files import OutputError, check_output, write_text_atomic
+from estimation.files import OutputError, check_output
 from estimation.recording import Recording
 from rig.configuration.folders import state_folder
 from rig.errors import DataError
@@ -90,8 +90,10 @@ class Ledger:
             LedgerError: The ledger cannot be read or written.
         """
         try:
-            write_text_atomic(self.path, self._text() + json.dumps(look) + "\n")
-        except (OSError, OutputError) as error:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.path.open("a", encoding="utf-8") as file:  # two diagnoses may end at once
+                file.write(json.dumps(look) + "\n")
+        except OSError as error:
             raise self._unwritable(error) from error
 
     def _text(self) -> str:

@@ -17,7 +17,7 @@ from estimation.causes.equations import on_one_clock
 from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.audit import steady
-from estimation.diagnosis.split import cut_and_split, path_of
+from estimation.diagnosis.split import cut_and_split, path_of, period_of
 from estimation.plant_check import offsets_note
 from estimation.recording import FloatArray, Recording
 from rig.diagnosis.ledger import Ledger, Look, look_at
@@ -120,7 +120,7 @@ def repeats(recordings: Sequence[Recording]) -> list[tuple[str, str]]:
         (one.name, other.name)
         for one, other in itertools.combinations(recordings, 2)
         if len(one) == len(other)
-        and (one.name != path_of(one.name) == path_of(other.name) or _asked_alike(one, other))
+        and (period_of(one.name) == period_of(other.name) != "" or _asked_alike(one, other))
     ]
 
 

@@ -12,8 +12,7 @@ FILE = "docs/schemas/rig.diagnosis-1.json"
 
 Balance = Annotated[str, Field(pattern=r"^\S+$")]
 Family = Annotated[str, Field(json_schema_extra={"enum": list(families())})]
-ANGLE = r"\w+_(angle|position)"
-Variable = Annotated[str, Field(pattern=rf"^({'|'.join(VARIABLES)}|joint_\d+|{ANGLE})$")]
+Variable = Annotated[str, Field(pattern=r"^\w+$", json_schema_extra={"examples": VARIABLES})]
 Name = Literal["identified", "one_of", "depends_on", "something_missing"]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 

@@ -50,7 +50,7 @@ def models(draw: st.DrawFn) -> Model:
 
 
 @settings(max_examples=40)
-@given(several=st.lists(models(), min_size=1, max_size=4))
+@given(several=st.lists(models(), min_size=1, max_size=4, unique_by=lambda one: one.balance))
 def test_what_is_written_is_read_back(several):
     text = to_toml(*several)
     assert parse_all(text) == several
@@ -104,6 +104,8 @@ def test_what_is_wrong_is_named(old, new, message):
 def test_a_missing_file_names_the_shipped_ones_and_one_without_a_model_is_refused(tmp_path):
     with pytest.raises(ModelFileError, match="holds no model"):
         parse_all('schema = "rig.models/1"\nmodels = []\n')
+    with pytest.raises(ModelFileError, match="several models of the equation 'motor'"):
+        parse_all(to_toml(read(Path("motor")), read(Path("motor"))))
     with pytest.raises(ModelFileError, match="grip, linear, motor, stretch"):
         read(tmp_path / "none.toml")
 

@@ -66,3 +66,11 @@ def test_whole_periods_of_one_path_are_repeats():
     assert all(lengths[one] == lengths[other] for one, other in pairs)
     assert len(pairs) == 6 + 3  # four whole periods and three; a rest of a period repeats nothing
     assert repeats(paths) == []
+
+
+def test_parts_of_one_recording_repeat_nothing():
+    walk = np.cumsum(np.random.default_rng(0).normal(size=3000))
+    recording = Recording("a", np.arange(3000) / 100, {"joint_1_angle_rad": walk})
+    pieces, _ = cut_and_split([recording])
+    assert len(pieces) > 5
+    assert repeats(pieces) == []

@@ -23,7 +23,7 @@ from estimation.effects import families
 from rig.diagnosis.schema import FILE, DiagnosisSchema, json_schema
 
 BALANCES = st.sampled_from(["motor", "stretch", "joint.3", "calibration.force", "table"])
-ALL_VARIABLES = [*VARIABLES, "joint_4", "link_angle"]
+ALL_VARIABLES = [*VARIABLES, "joint_4", "link_angle", "joint_2_velocity", "flow_m3_s"]
 NUMBERS = st.floats() | st.sampled_from([float("nan"), float("inf")])
 PAIRS = st.none() | st.tuples(NUMBERS, NUMBERS)
 RUNS = st.lists(st.text(min_size=1), max_size=3).map(tuple)

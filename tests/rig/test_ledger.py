@@ -41,6 +41,14 @@ def test_next_to_used_runs_only_new_ones_confirm(ledger):
     assert {*split(few, 0, ledger.known(few)).confirm} & ledger.known(few)
 
 
+def test_an_entry_that_another_diagnosis_made_meanwhile_is_kept(ledger, monkeypatch):
+    second = runs(count=6, seconds=1.0, first_seed=50)
+    before = ledger.path.read_text()
+    monkeypatch.setattr(Ledger, "_text", lambda _: "")  # read before the other one was entered
+    ledger.enter(look_at(second, split(second)))
+    assert ledger.path.read_text().startswith(before)
+
+
 def test_a_damaged_ledger_is_reported(ledger):
     ledger.path.write_text("nonsense\n")
     with pytest.raises(LedgerError, match="cannot be read"):

@@ -1,13 +1,18 @@
 """Machines other than the reference rig: cylinders, winches, belts, joints with a torque cell."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimation import plant_file
-from estimation.causes.candidates import every_claim
+from estimation.causes.candidates import candidates, every_claim
 from estimation.causes.equations import lay_out
+from estimation.causes.folds import folds_of, unvaried
+from estimation.causes.instruments import add_instruments
+from estimation.causes.joint import Joint
+from estimation.causes.search import competing
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.result import Finding
 from estimation.diagnosis.split import split
@@ -217,3 +222,51 @@ sensor = [
     laid = lay_out(declared(plant_file.parse(machine)), runs, [run.name for run in runs])
     assert [*laid.equations] == ["motor"]
     assert "motor.gain_by_position" in {claim.cause.family for claim in every_claim(laid)}
+
+
+def winches(loads: Sequence[float], **more: FloatArray) -> list[Recording]:
+    """Return runs of a winch, each at one load."""
+
+    def columns(k, random, position, speed, acceleration):
+        load = loads[k % len(loads)] + 0.2 * acceleration + random.normal(0.0, 0.1, len(position))
+        current = (load + 3.0 * np.tanh(speed / 0.1)) / 2.0
+        return {
+            "motor_angle_rad": 3.0 * position,
+            "motor_current_a": current + random.normal(0.0, 0.05, len(load)),
+            "rope_torque_n_m": load,
+            **more,
+        }
+
+    return recorded(columns)
+
+
+def test_a_channel_that_no_equation_reads_may_have_values_that_are_not_numbers():
+    size = round(SECONDS * RATE_HZ)
+    spoilt = {"oil_temperature_k": np.full(size, np.nan), "pan_angle_rad": np.full(size, np.nan)}
+    spoilt["pan_angle_rad"][5:] = 1.0
+    models = declared(plant_file.parse(WINCH))
+    runs = winches((20.0, 60.0), **spoilt)
+    layout = lay_out(models, runs, [run.name for run in runs])
+    assert [run.name for run in layout.runs] == [run.name for run in runs]
+    assert "rope_torque_n_m" in layout.measured
+    assert not {*spoilt} & {*layout.measured}
+
+
+@pytest.mark.parametrize(
+    ("loads", "alike"), [((20.0, 100.0, 180.0), []), ((20.0,), ["rope_torque_n_m"])]
+)
+def test_a_condition_that_varies_over_few_runs_is_not_called_alike(loads, alike):
+    models = declared(plant_file.parse(WINCH))
+    runs = winches(loads)[:5]
+    layout = lay_out(models, runs, [run.name for run in runs])
+    assert [name for name in unvaried(layout) if name.endswith("_n_m")] == alike
+
+
+def test_two_equations_may_read_the_same_current():
+    (one,) = declared(plant_file.parse(WINCH))
+    runs = winches((20.0, 60.0, 100.0))
+    layout = lay_out([one, replace(one, balance="again")], runs, [run.name for run in runs])
+    add_instruments(layout, [run.name for run in runs])
+    joint = Joint(layout)
+    ranked = competing(joint, candidates(joint), folds_of(layout))
+    assert ranked
