@@ -4,8 +4,9 @@ Candidates of one place with as many columns each share every step, so a search 
 them costs a few large products.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -39,21 +40,32 @@ class Block:
         followed: The noise that the causes follow.
         of: Part to its products.
         taken: How much of each declared column was taken off them, (causes, declared, k).
-        within: Weighted sum of the products of the parts within runs.
-        whole: The same of all parts.
+        weights: Part to the weight of one squared residual.
     """
 
     followed: Followed
     of: Mapping[Part, Products]
     taken: FloatArray
-    within: Products
-    whole: Products
+    weights: Mapping[Part, float]
+
+    @cached_property
+    def within(self) -> Products:
+        """Weighted sum of the products of the parts within runs."""
+        return self._summed([p for p in self.of if p[1] == "within"])
+
+    @cached_property
+    def whole(self) -> Products:
+        """Weighted sum of the products of all parts."""
+        return self._summed(self.of)
 
     def only(self, chosen: NDArray[np.bool_]) -> "Block":
         """Return some of the causes."""
-        of = {p: _some(known, chosen) for p, known in self.of.items()}
-        sums = (_some(self.within, chosen), _some(self.whole, chosen))
-        return Block(self.followed.only(chosen), of, self.taken[chosen], *sums)
+        of = {p: Products(*(x[:, chosen] for x in known)) for p, known in self.of.items()}
+        return Block(self.followed.only(chosen), of, self.taken[chosen], self.weights)
+
+    def _summed(self, parts: Iterable[Part]) -> Products:
+        weighted = [[self.weights[p] * x for x in self.of[p]] for p in parts]
+        return Products(*(np.asarray(sum(kind)) for kind in zip(*weighted, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -100,20 +112,8 @@ def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
             added = products(table[:, None, :, new], columns)
             base[:, :, [places[i] for i in new]] = added
         of[p] = known.of[p]._replace(base=base)
-    within, whole = (
-        _summed([[joint.weights[p] * x for x in of[p]] for p in of if p[1] in kinds])
-        for kinds in (("within",), ("within", "between"))
-    )
     taken = joint.taken_off(laid) if known is None else known.taken
-    return Block(laid.followed, of, taken, within, whole)
-
-
-def _some(products: Products, chosen: NDArray[np.bool_]) -> Products:
-    return Products(*(x[:, chosen] for x in products))
-
-
-def _summed(weighted: Sequence[Sequence[FloatArray]]) -> Products:
-    return Products(*(np.asarray(sum(kind)) for kind in zip(*weighted, strict=True)))
+    return Block(laid.followed, of, taken, joint.weights)
 
 
 def evaluate(

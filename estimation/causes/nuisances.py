@@ -16,8 +16,6 @@ from estimation.causes.scoring import assessed
 from estimation.causes.sources import Source
 from estimation.effects import effect
 
-DELAY = effect("sensor.delay")
-
 SKEW_S = 1e-3
 MOST_SKEW = 2.0
 """Usual delay of a reading against the others, a sample at 1 kHz, and the most, over it."""
@@ -39,7 +37,7 @@ def skews(joint: Joint) -> list[Claim]:
         Claim(replace(source, shape=(SKEW_S,)))
         for place in plain
         if place.enters
-        for source in itertools.islice(sources_at(joint.layout, place, [DELAY]), 1)
+        for source in itertools.islice(sources_at(joint.layout, place, [effect("sensor.delay")]), 1)
     ]
     every = sum(claim.cause.place.kind == "angle sensor" for claim in late)
     while True:

@@ -28,8 +28,10 @@ IN_MINUTES_S = 90.0
 """From here on a time is stated in minutes."""
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
-JsonLinesFlag = Annotated[bool, typer.Option("--json", help="JSON objects on stdout, one a line.")]
 """The `--json` option every verb has."""
+
+JsonLinesFlag = Annotated[bool, typer.Option("--json", help="JSON objects on stdout, one a line.")]
+"""The same of a verb that writes as long as it runs."""
 
 
 def results(json: bool) -> "Console":

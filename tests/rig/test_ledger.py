@@ -1,5 +1,6 @@
 """What earlier diagnoses leave: the runs that they used, and how long they took."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,12 +42,11 @@ def test_next_to_used_runs_only_new_ones_confirm(ledger):
     assert {*split(few, 0, ledger.known(few)).confirm} & ledger.known(few)
 
 
-def test_an_entry_that_another_diagnosis_made_meanwhile_is_kept(ledger, monkeypatch):
-    second = runs(count=6, seconds=1.0, first_seed=50)
-    before = ledger.path.read_text()
-    monkeypatch.setattr(Ledger, "_text", lambda _: "")  # read before the other one was entered
-    ledger.enter(look_at(second, split(second)))
-    assert ledger.path.read_text().startswith(before)
+def test_entries_of_diagnoses_that_end_at_once_are_all_kept(ledger):
+    look, count = look_at(FIRST, split(FIRST)), 200
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(ledger.enter, [look] * count))
+    assert len(ledger.path.read_text().splitlines()) == 1 + count
 
 
 def test_a_damaged_ledger_is_reported(ledger):

@@ -198,17 +198,6 @@ def test_a_weight_that_is_stated_has_no_sensor():
 
 
 def test_a_drive_of_another_machine_may_change_its_gain_along_the_travel_whatever_its_name():
-    machine = """
-schema = "rig.machine/1"
-machine = { name = "winch", cutoff_hz = 20.0 }
-axis = [{ name = "motor", unit = "rad" }]
-actuator = [{ name = "motor_current_a", axis = "motor" }]
-sensor = [
-  { name = "motor_angle_rad", axis = "motor", reads = "position" },
-  { name = "rope_torque_n_m", axis = "motor", reads = "effort" },
-]
-"""
-
     def columns(k, random, position, speed, acceleration):
         torque = 2.0 * position + 0.2 * acceleration + random.normal(0.0, 0.1, len(position))
         current = torque + 0.3 * np.tanh(speed / 0.1)
@@ -219,7 +208,7 @@ sensor = [
         }
 
     runs = recorded(columns)
-    laid = lay_out(declared(plant_file.parse(machine)), runs, [run.name for run in runs])
+    laid = lay_out(declared(plant_file.parse(WINCH)), runs, [run.name for run in runs])
     assert [*laid.equations] == ["motor"]
     assert "motor.gain_by_position" in {claim.cause.family for claim in every_claim(laid)}
 
