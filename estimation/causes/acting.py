@@ -213,7 +213,7 @@ def gains_of(layout: Layout) -> Iterator[Moved]:
         target = layout.equations[place.home].target
         is_predicted = instrumented(target, place.home) in layout.runs[0].channels
         of_all = is_predicted and len(place.enters) == 1
-        if place.name == f"actuator {target}" and is_predicted:
+        if place.name == f"actuator {target}" and of_all:
             constant, source = effect("motor.torque_constant"), (("source", target),)
             yield Moved(place, constant, source, (), (0,), of_all=True)
         elif place.kind == "torque sensor" and (of_all or len(place.enters) > 1):

@@ -17,7 +17,7 @@ from estimation.causes.equations import Layout, LayoutError, laid_out_like
 from estimation.causes.findings import IN_SET, Kept
 from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
-from estimation.causes.joint import Joint
+from estimation.causes.numbers import Numbers
 from estimation.causes.scoring import Scored, posterior
 from estimation.causes.sources import Source
 from estimation.causes.verdict import Answer
@@ -61,7 +61,7 @@ def question(answer: Answer, place: int) -> Question | None:
     for k, other in enumerate(answer.kept):
         if k != place:
             joint = joint.with_cause(other.scored.candidate.laid, other.scored.candidate.precision)
-    likely = _likely(answer.kept[place], joint)
+    likely = _likely(answer.kept[place], joint.numbers)
     if len(likely) < 2:
         return None
     leading = likely[0][1].candidate
@@ -105,15 +105,21 @@ def separation(asked: Question, recordings: Sequence[Recording]) -> float | None
     return total / weight
 
 
-def _likely(kept: Kept, joint: Joint) -> list[tuple[float, Scored]]:
-    """Return the likeliest hypotheses in a finding's place with their probabilities, best first."""
+def _likely(kept: Kept, numbers: Numbers) -> list[tuple[float, Scored]]:
+    """Return the likeliest hypotheses in a finding's place with their probabilities, best first.
+
+    A family has the probability that the finding states, from all runs. That of an unknown form is
+    shared by its sets of variables as the training runs share it.
+    """
     shares: dict[str, float] = {}
     best: dict[str, Scored] = {}
-    weights = posterior(kept.ranked, joint.numbers)
-    for scored, weight in zip(kept.ranked, weights, strict=True):
-        label = _label(scored)
-        shares[label] = shares.get(label, 0.0) + float(weight)
-        best.setdefault(label, scored)
+    for family in kept.likely:
+        forms = [s for s in kept.ranked if s.candidate.cause.family == family.family]
+        weights = posterior(forms, numbers)
+        for scored, weight in zip(forms, weights / weights.sum(), strict=True):
+            label = _label(scored)
+            shares[label] = shares.get(label, 0.0) + family.share * float(weight)
+            best.setdefault(label, scored)
     ordered = sorted((x for x in shares if shares[x] > 0.0), key=lambda label: -shares[label])
     covered, out = 0.0, []
     for label in ordered[:MOST]:

@@ -7,8 +7,10 @@ both (invariant prediction: Peters, Buehlmann and Meinshausen 2016).
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.causes.equations import EFFORTS, Layout
+from estimation.recording import FloatArray
 
 Folds = Sequence[Sequence[Sequence[int]]]
 """Families of folds; a fold is the runs that are left out together."""
@@ -52,21 +54,39 @@ def _conditions(layout: Layout) -> dict[str, list[float]]:
     return out
 
 
-def _levels(values: Sequence[float], count: int = 3) -> list[list[int]]:
-    """Return runs by the level of a condition; empty of few runs, or where it does not vary."""
+def _levels(values: Sequence[float], most: int = 3) -> list[list[int]]:
+    """Return runs by the level of a condition; empty of few runs, or where it does not vary.
+
+    Levels that were set stay whole; more than can be left out are grouped with their neighbours.
+    """
     array = np.asarray(values)
-    if len(array) < 2 * count or not _varies(values):
+    if len(array) < 2 * most or not _varies(values):
         return []
-    spread = float(np.ptp(array))
     order = np.argsort(array, kind="stable")
-    gaps = np.sort(np.argsort(-np.diff(array[order]), kind="stable")[: count - 1]) + 1
-    if array[order][gaps].size and np.diff(array[order])[gaps - 1].min() > 0.15 * spread:
-        groups = np.split(order, gaps)  # levels that were set
-    else:
-        groups = np.array_split(order, count)
-    if max(map(len, groups)) > 0.6 * len(array):
-        groups = np.array_split(order, count)
-    return [sorted(int(i) for i in g) for g in groups]
+    levels = _set_levels(array[order])
+    if len(levels) > most:
+        of_parts = np.array_split(np.arange(len(levels)), most)
+        levels = [np.concatenate([levels[k] for k in part]) for part in of_parts]
+    if not levels or max(map(len, levels)) > 0.6 * len(array):
+        levels = np.array_split(np.arange(len(array)), most)
+    return [sorted(int(i) for i in order[level]) for level in levels]
+
+
+def _set_levels(ordered: FloatArray) -> list[NDArray[np.intp]]:
+    """Return the places of the runs of each level that was set; empty where none were.
+
+    Levels have two runs at least and are further apart than the values at any of them; of several
+    ways the clearest.
+    """
+    steps, best, clearest = np.diff(ordered), list[NDArray[np.intp]](), 1.0
+    widest = np.argsort(-steps, kind="stable") + 1
+    for count in range(2, len(ordered) // 2 + 1):
+        parts = np.split(np.arange(len(ordered)), np.sort(widest[: count - 1]))
+        within = max(float(np.ptp(ordered[part])) for part in parts)
+        apart = float(steps[widest[count - 2] - 1])
+        if min(map(len, parts)) > 1 and apart > clearest * within:
+            best, clearest = parts, apart / within if within else np.inf
+    return best
 
 
 def _varies(values: Sequence[float]) -> bool:

@@ -82,8 +82,8 @@ def places_of(layout: Layout) -> list[Place]:
     for equation in layout.equations.values():
         own = related(layout, equation, angles)
         found.append(_own(layout, equation, own, angles))
-        if (actuator := _actuator(equation, own)) is not None:
-            found.append(actuator)
+        found += _actuators(equation, own)
+    found = _one_of_each(found)
     sensors = [n for n in layout.measured if n not in _computed(layout)]
     for sensor in sensors:
         if (both := _both(layout, sensor)) is not None:
@@ -213,20 +213,31 @@ def _is_difference(equation: Equation, channel: str) -> bool:
     return known is not None and not channel.endswith(EFFORTS)
 
 
-def _actuator(equation: Equation, angles: Sequence[str]) -> Place | None:
-    """Return the place of the actuator that an equation reads as a term or as its target."""
+def _actuators(equation: Equation, angles: Sequence[str]) -> Iterator[Place]:
+    """Yield the places of the actuators that an equation reads as terms or as its target."""
     read = [t.channels["source"] for t in equation.terms if t.effect.id == "motor.torque_constant"]
-    current = next(iter(read), equation.target)
-    if not read and (equation.of_angle or current.endswith(EFFORTS)):
-        return None
-    roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
-        "current": (current,),
-        "drive": (current,),
-        "reading": (current,),
-    }
-    share = abs(equation.channels.get(current, 0.0)) or 1.0  # amplitudes are of the constant's
-    enters = (Entry(equation.name, share if read else -1.0),)
-    return Place(f"actuator {current}", "actuator", equation.name, enters, roles)
+    if not read and (equation.of_angle or equation.target.endswith(EFFORTS)):
+        return
+    for current in read or [equation.target]:
+        roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
+            "current": (current,),
+            "drive": (current,),
+            "reading": (current,),
+        }
+        share = abs(equation.channels.get(current, 0.0)) or 1.0  # amplitudes are of the constant's
+        enters = (Entry(equation.name, share if read else -1.0),)
+        yield Place(f"actuator {current}", "actuator", equation.name, enters, roles)
+
+
+def _one_of_each(places: Sequence[Place]) -> list[Place]:
+    """Return each place once: one actuator enters every equation that reads its current."""
+    found: dict[str, Place] = {}
+    for place in places:
+        known = found.get(place.name)
+        found[place.name] = (
+            replace(known, enters=(*known.enters, *place.enters)) if known else place
+        )
+    return [*found.values()]
 
 
 def _both(layout: Layout, sensor: str) -> tuple[Equation, Equation] | None:

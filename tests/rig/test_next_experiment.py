@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from estimation.causes.equations import on_one_clock
+from estimation.causes.experiment import question
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
@@ -72,9 +73,20 @@ def test_a_sure_name_needs_no_experiment(answered, rippled):
 
 def test_a_name_without_a_likely_alternative_needs_no_experiment(doubtful, rippled):
     kept = doubtful.kept[0]
-    alone = [kept.ranked[0], *(replace(other, score=-1e9) for other in kept.ranked[1:])]
-    single = replace(doubtful, kept=(replace(kept, ranked=alone), *doubtful.kept[1:]))
+    single = replace(doubtful, kept=(replace(kept, likely=kept.likely[:1]), *doubtful.kept[1:]))
     assert propose(single, rippled) is None
+
+
+def test_hypotheses_have_the_probabilities_of_the_finding(doubtful):
+    """Test runs may turn the order of two families that the training runs cannot tell apart."""
+    kept = doubtful.kept[0]
+    families = list(dict.fromkeys(s.candidate.cause.family for s in kept.ranked))[:2]
+    likely = [next(p for p in kept.likely if p.family == family) for family in reversed(families)]
+    turned = [replace(p, share=share) for p, share in zip(likely, (0.7, 0.2), strict=True)]
+    asked = question(replace(doubtful, kept=(replace(kept, likely=turned), *doubtful.kept[1:])), 0)
+    assert asked is not None
+    assert [h.label for h in asked.hypotheses] == [families[1], families[0]]
+    assert [h.probability for h in asked.hypotheses] == pytest.approx([7 / 9, 2 / 9])
 
 
 def test_repeats_are_found_by_what_was_asked(rippled):

@@ -130,6 +130,55 @@ def test_a_late_reading_is_late_as_a_whole() -> None:
     assert time.value == pytest.approx(0.02, rel=0.1)
 
 
+TWIN = """
+schema = "rig.machine/1"
+machine = { name = "twin", cutoff_hz = 8.0 }
+axis = [{ name = "roller", unit = "rad" }]
+sensor = [
+  { name = "roller_angle_rad", axis = "roller", reads = "position" },
+  { name = "left_torque_n_m" },
+  { name = "right_torque_n_m" },
+  { name = "drive_current_a" },
+]
+[[equation]]
+name = "left"
+target = "left_torque_n_m"
+effects = [
+  { id = "motor.torque_constant", channels = { source = "drive_current_a" } },
+  { id = "inertia.missing", channels = { acceleration = "roller_acceleration_rad_s2" } },
+  { id = "sensor.offset" },
+]
+[[equation]]
+name = "right"
+target = "right_torque_n_m"
+effects = [
+  { id = "motor.torque_constant", channels = { source = "drive_current_a" } },
+  { id = "friction.viscous", channels = { speed = "roller_velocity_rad_s" } },
+  { id = "sensor.offset" },
+]
+"""
+
+
+def test_a_fault_of_one_drive_enters_both_equations_that_read_its_current() -> None:
+    random, runs = np.random.default_rng(2), []
+    for run in driven():
+        time, current = run.time_s, run["brake_current_a"]
+        speed = np.gradient(run["roller_angle_rad"], time)
+        force = current - 0.08 * current * np.abs(current)
+        noise = random.normal(0, 0.01, (2, len(time)))
+        columns = {
+            "roller_angle_rad": run["roller_angle_rad"],
+            "drive_current_a": current,
+            "left_torque_n_m": 4.0 * force + 0.1 * np.gradient(speed, time) + noise[0],
+            "right_torque_n_m": 2.0 * force + 0.3 * speed + noise[1],
+        }
+        runs.append(Recording(run.name, time, columns, started_at_ns=run.started_at_ns))
+    (finding,) = diagnose(runs, declared(plant_file.parse(TWIN)), split(runs)).findings
+    assert finding.place == "actuator drive_current_a"
+    assert {finding.balance, *finding.also_in} == {"left", "right"}
+    assert "motor.saturation" in (finding.family, *finding.alternatives)
+
+
 PUMP = """
 schema = "rig.machine/1"
 machine = { name = "pump", cutoff_hz = 5.0 }

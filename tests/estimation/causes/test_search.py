@@ -774,6 +774,19 @@ def test_each_family_of_folds_leaves_every_run_out_once() -> None:
         assert sorted(k for fold in family for k in fold) == list(range(9))
 
 
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+def test_runs_at_a_level_of_the_load_are_left_out_together(count: int) -> None:
+    made = recordings(runs=4 * count)
+    levels = {r.name: 0.1 + 0.2 * (k % count) for k, r in enumerate(made)}
+    layout = _laid(made, motor())
+    for run in layout.runs:
+        load = run.channels["proximal_torque_n_m"]
+        run.channels["proximal_torque_n_m"] = load - load.mean() + levels[run.name]
+    by_load = folds_of(layout)[1]
+    at = [{levels[layout.runs[k].name] for k in fold} for fold in by_load]
+    assert sum(map(len, at)) == count  # no level is in two folds
+
+
 def test_probabilities_of_families_and_of_no_cause_sum_to_one(found: Found) -> None:
     for ranked in found.conditional:
         assert 0.9 < sum(p.share for p in family_probabilities(ranked, DEFAULT)) <= 1.0
