@@ -1,5 +1,6 @@
 """Causes of some of the runs: in which of them, and declared terms with another factor there."""
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,6 +15,7 @@ from estimation.causes.instruments import instrumented, signal
 from estimation.causes.joint import Joint
 from estimation.causes.laid import centred
 from estimation.causes.places import places_of
+from estimation.causes.scoring import is_possible
 from estimation.causes.sources import Source
 from estimation.effects import effect
 from estimation.fit_problem import OFFSET
@@ -40,10 +42,13 @@ def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, Products]]) -> 
     for group in named.values():
         products = Products(*map(np.stack, zip(*(by_run for _, by_run in group), strict=True)))
         for acts in _acting(inverse, products):
-            gains = _removed(inverse, *(_over(acts, x) for x in products))
+            gains, amplitudes = _removed(inverse, *(_over(acts, x) for x in products))
             acting = acts.sum(axis=1)
-            some = np.flatnonzero((acting > 1) & (acting < count))
-            promise += [(float(gains[k]), group[k][0], acts[k]) for k in some]
+            for k in np.flatnonzero((acting > 1) & (acting < count)):
+                claim = group[k][0]
+                size = claim.size if isinstance(claim, Candidate) else 1.0
+                if is_possible(claim.cause, amplitudes[k] / size):
+                    promise.append((float(gains[k]), claim, acts[k]))
     promise.sort(key=lambda p: -p[0])
     tried, seen = [], dict[object, set[tuple[bool, ...]]]()
     for _, claim, runs in promise:
@@ -67,13 +72,14 @@ def _whole(cause: Source | Function) -> Source | Function:
     return cause
 
 
-def one_run_changed(candidate: Candidate) -> Iterator[Claim]:
-    """Yield a cause of some runs with one of them more, or less."""
+def in_other_runs(candidate: Candidate) -> Iterator[Claim]:
+    """Yield a cause of some runs with one run more or less, or a row of runs that are alike."""
     acts = candidate.acts or ()
-    for k, acting in enumerate(acts):
-        changed = (*acts[:k], not acting, *acts[k + 1 :])
-        if 1 < sum(changed) < len(acts):
-            yield Claim(candidate.cause, changed, candidate.choices)
+    rows = [[*row] for _, row in itertools.groupby(range(len(acts)), key=acts.__getitem__)]
+    for some in (*([k] for k in range(len(acts))), *(row for row in rows if len(row) > 1)):
+        other = tuple(acting != (k in some) for k, acting in enumerate(acts))
+        if 1 < sum(other) < len(acts):
+            yield Claim(candidate.cause, other, candidate.choices)
 
 
 def _acting(inverse: FloatArray, products: Products) -> Iterator[NDArray[np.bool_]]:
@@ -89,7 +95,7 @@ def _acting(inverse: FloatArray, products: Products) -> Iterator[NDArray[np.bool
     every = np.arange(candidates)[:, None]
     for runs in (order, order[:, ::-1], sizes, sizes[:, ::-1]):
         sums = [np.cumsum(x[every, runs], axis=1)[:, 1:-1] for x in products]
-        cut = np.argmax(_removed(inverse, *sums), axis=1)
+        cut = np.argmax(_removed(inverse, *sums)[0], axis=1)
         acts = np.zeros((candidates, count), dtype=np.bool_)
         acts[every, runs] = np.arange(count) < cut[:, None] + 2
         yield acts
@@ -124,10 +130,13 @@ def _sizes(cross: FloatArray, own: FloatArray) -> FloatArray:
 
 def _removed(
     inverse: FloatArray, base: FloatArray, own: FloatArray, cross: FloatArray
-) -> FloatArray:
-    """Return the error that amplitudes remove, fitted together with the base, shape (...,)."""
-    beyond = own - base.swapaxes(-1, -2) @ inverse @ base
-    return np.asarray((cross * solved(cross, beyond)).sum(axis=-1))
+) -> tuple[FloatArray, FloatArray]:
+    """Return the error that amplitudes remove next to the base, shape (...,), and these amplitudes.
+
+    The amplitudes have the shape (..., k).
+    """
+    amplitudes = solved(cross, own - base.swapaxes(-1, -2) @ inverse @ base)
+    return (cross * amplitudes).sum(axis=-1), amplitudes
 
 
 def solved(cross: FloatArray, own: FloatArray) -> FloatArray:

@@ -1,5 +1,7 @@
 """The score of a cause next to others, its price, and the probability of each."""
 
+import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,6 +17,7 @@ from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.laid import Part
 from estimation.causes.numbers import Numbers
+from estimation.causes.sources import Source
 from estimation.derived import origin_of
 from estimation.recording import FloatArray
 
@@ -73,9 +76,19 @@ class Scored:
     amplitudes: FloatArray
     by_run: Products
 
+    @property
+    def is_possible(self) -> bool:
+        """Whether its amplitudes are within their bounds."""
+        return is_possible(self.candidate.cause, self.amplitudes / self.candidate.size)
+
 
 def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
-    """Return the score of each candidate given the base; impossible amplitudes are left out.
+    """Return the score of each candidate given the base; impossible amplitudes are left out."""
+    return [one for one in tried(joint, pool, folds) if one.is_possible]
+
+
+def tried(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
+    """Return the score of each candidate given the base, whatever its amplitudes.
 
     A declared amplitude that the base holds at its bound may rise from it next to a candidate.
     """
@@ -91,9 +104,9 @@ def assessed(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
             further = _judged(regressions[held.tobytes()], some, block.only(chosen), usual)
             judged = judged.or_better(further, chosen, joint.held & ~held)
         for k, candidate in enumerate(group.candidates):
-            amplitudes = judged.amplitudes[k]
-            if judged.replaces[k] or _is_impossible(candidate, amplitudes):
+            if judged.replaces[k]:
                 continue
+            amplitudes = judged.amplitudes[k]
             gain, price = round(float(judged.gains[k]), DIGITS), _price(candidate, joint)
             score = gain - price.score(joint.numbers)
             by_run = Products(*(x[:, k] for x in judged.by_run))
@@ -232,14 +245,12 @@ def _reads_effort(joint: Joint, equation: str, candidate: Candidate) -> bool:
     return any(c == target or c.endswith(AMPLIFIED) for c in candidate.cause.reads)
 
 
-def _is_impossible(candidate: Candidate, amplitudes: FloatArray) -> bool:
-    cause = candidate.cause
+def is_possible(cause: Source | Function, amplitudes: FloatArray) -> bool:
+    """Whether amplitudes of a cause, shape (k,), are within the bounds of their sum."""
     if isinstance(cause, Function):
-        return False
-    count = len(cause.parts)  # a bend comes after them
-    total = float(np.sum(amplitudes[:count] / candidate.size[:count]))
-    is_beyond = not cause.least <= abs(total) <= cause.most
-    return is_beyond or (cause.is_bounded and total < 0.0)
+        return True
+    total = float(np.sum(amplitudes[: len(cause.parts)]))  # a bend comes after them
+    return cause.least <= abs(total) <= cause.most and not (cause.is_bounded and total < 0.0)
 
 
 def _price(candidate: Candidate, joint: Joint) -> Price:
@@ -247,8 +258,8 @@ def _price(candidate: Candidate, joint: Joint) -> Price:
 
     The prior probability of a cause is shared by all forms at all places, that of a form by the
     points of its grid, that of an unknown form by the sets of variables, and that of acting in some
-    of the runs by all choices of them. Each amplitude but the first costs what a parameter costs in
-    the Bayesian information criterion (Schwarz 1978).
+    of the runs by how often it comes or goes and by all choices of when. Each amplitude but the
+    first costs what a parameter costs in the Bayesian information criterion (Schwarz 1978).
     """
     choices, cause = float(np.log(candidate.choices)), candidate.cause
     samples = joint.numbers.samples_a_run * len(joint.runs)
@@ -256,9 +267,8 @@ def _price(candidate: Candidate, joint: Joint) -> Price:
     changes = isinstance(cause, Function) and "time" in cause.variables
     chosen = candidate.acts is not None and not candidate.given
     if candidate.acts is not None and chosen:
-        count, acting = len(candidate.acts), sum(candidate.acts)
-        choices += float(np.log(count + 1.0)) + sum(
-            float(np.log((count - k) / (k + 1.0))) for k in range(min(acting, count - acting))
-        )
+        turns = len(candidate.acts) - 1
+        changes_at = sum(a != b for a, b in itertools.pairwise(candidate.acts))
+        choices += math.log(2 * (turns + 1) * math.comb(turns, changes_at))
     rare = int(candidate.is_function) + int(changes or chosen)
     return Price(choices, rare, more * float(np.log(samples)) / samples)

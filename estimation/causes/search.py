@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.causes.acting import TURNS, moved_terms, on_some_runs, one_run_changed
+from estimation.causes.acting import TURNS, in_other_runs, moved_terms, on_some_runs
 from estimation.causes.angles import groups_apart
 from estimation.causes.blocks import Products
 from estimation.causes.candidates import (
@@ -23,7 +23,7 @@ from estimation.causes.grids import RELATIVE, least_order
 from estimation.causes.joint import Joint
 from estimation.causes.nuisances import noticed, skews, with_skews
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.scoring import Scored, assessed, best_of_each
+from estimation.causes.scoring import Scored, assessed, best_of_each, tried
 from estimation.causes.sources import LATE, Bend, Source
 from estimation.causes.weights import reweighted
 from estimation.effects import Parameter
@@ -147,12 +147,16 @@ def _settled(
 
     A cause that is not worth its price next to the others goes, the least first.
     """
-    settled, conditional = list(causes), list[Sequence[Scored]]()
-    for k, cause in enumerate(causes):
-        # next to the others every candidate may be dropped: the cause then stands as it was found
-        ranked = ranking.next_to([c for c in settled if c is not settled[k]]) or [cause]
-        conditional.append(ranked)
-        settled[k] = ranked[0]
+    settled, before = list(causes), list[Scored]()
+    conditional: list[Sequence[Scored]] = [[] for _ in causes]
+    for _ in range(MOST_CAUSES):
+        if [id(c) for c in before] == [id(c) for c in settled]:
+            break
+        before = list(settled)
+        for k, cause in enumerate(before):
+            # next to the others every candidate may be dropped: the cause then stands as it was
+            conditional[k] = ranking.next_to([c for c in settled if c is not settled[k]]) or [cause]
+            settled[k] = conditional[k][0]
     least = min(settled, key=lambda c: c.score)
     if least.score < 0.0 and len(settled) > 1:
         return _settled(ranking, [c for c in settled if c is not least])
@@ -161,14 +165,15 @@ def _settled(
 
 def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
     """Return the best of each name: on the grid, on some of the runs, refined, and relaxed."""
-    everything = assessed(joint, pool, folds)
-    known: list[tuple[Claim, Products]] = [(s.candidate, s.by_run) for s in everything]
+    all_runs = tried(joint, pool, folds)
+    everything = [s for s in all_runs if s.is_possible]
+    known: list[tuple[Claim, Products]] = [(s.candidate, s.by_run) for s in all_runs]
     forms = min((claim.choices for claim, _ in known), default=1)
     known += [(replace(claim, choices=forms), by_run) for claim, by_run in moved_terms(joint)]
     some = best_of_each(assessed(joint, groups_of(joint, on_some_runs(joint, known)), folds))
     climbing = some[:REFINED]
     for _ in range(TURNS):
-        flipped = [c for s in climbing for c in one_run_changed(s.candidate)]
+        flipped = [c for s in climbing for c in in_other_runs(s.candidate)]
         found = best_of_each(assessed(joint, groups_of(joint, flipped), folds))
         before = {s.candidate.name: s.score for s in some}
         climbing = [s for s in found if s.score > before[s.candidate.name]]

@@ -214,7 +214,7 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
     before = {name: refits.test_errors(name) for name in place.equations}
     added = refits.add(candidate, acts_in)
     after = {name: refits.test_errors(name) for name in place.equations}
-    falls = {name: _fall(before[name], after[name]) for name in place.equations}
+    falls = {name: _fall(before[name], after[name], refits, name) for name in place.equations}
     stated, least = place.home, -0.5 * math.log1p(-refits.numbers.form_floor)
     if falls[stated] < least:
         stated = max(falls, key=falls.__getitem__)
@@ -244,7 +244,7 @@ def _shown(one: _Opened, refits: Refits) -> float:
     measured error shows.
     """
     falls = [
-        _fall(refits.test_errors(name, without=part), refits.test_errors(name))
+        _fall(refits.test_errors(name, without=part), refits.test_errors(name), refits, name)
         for name, part in one.parts.items()
     ]
     return max(one.fall, *falls) / max(one.kept.likely[0].gain, np.finfo(float).tiny)
@@ -299,15 +299,17 @@ def _tested(one: Kept, others: Sequence[Candidate], held_out: HeldOut) -> tuple[
     return replace(one, scored=found[0].best, likely=found), total
 
 
-def _fall(before: Errors, after: Errors) -> float:
-    """Return by how much the logarithm of an error on the test runs falls.
+def _fall(before: Errors, after: Errors, refits: Refits, equation: str) -> float:
+    """Return by how much the logarithm of an equation's error on the test runs falls.
 
     With each run's mean removed or left in: the larger fall; zero where the other one rises by
-    more.
+    more. Where runs have offsets of their own, that with the means counts less, as in the search.
     """
     pairs = ((before.rmse, after.rmse), (before.rmse_with_means, after.rmse_with_means))
     falls = [math.log(old / new) if new else (math.inf if old else 0.0) for old, new in pairs]
-    return max(falls) if sum(falls) > 0.0 else min(0.0, *falls)
+    own_offsets = refits.layout.equations[equation].model.run_offsets
+    of_means = refits.numbers.between if own_offsets else 1.0
+    return max(falls) if falls[0] + of_means * falls[1] > 0.0 else min(0.0, *falls)
 
 
 def _unidentified(

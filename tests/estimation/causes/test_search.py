@@ -23,7 +23,7 @@ from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
-from estimation.causes.scoring import assessed, best_of_each
+from estimation.causes.scoring import assessed, best_of_each, tried
 from estimation.causes.search import Found, search
 from estimation.causes.verdict import answer, diagnose
 from estimation.derived import CAMPAIGN_TIME
@@ -603,6 +603,33 @@ def test_runs_without_a_cause_show_nothing_of_its_size() -> None:
     found = assessed(joint, groups_of(joint, claims), [[[0, 1, 2]]])
     assert max(abs(one.gain) for one in found) < 0.05
     assert max(one.gain for one in assessed(joint, groups_of(joint, claims), folds_of(layout))) > 1
+
+
+def test_a_cause_that_comes_once_costs_less_than_one_that_comes_and_goes() -> None:
+    layout = _laid(recordings(runs=9), motor())
+    joint = Joint(layout)
+    place = next(p for p in places_of(layout) if p.name == "motor")
+    (source, *_) = [s for s in sources_at(layout, place) if s.family == "friction.drag"]
+    once = (False,) * 6 + (True,) * 3
+    comes_and_goes = (False, True, False) * 3
+    claims = [Claim(source, acts) for acts in (once, comes_and_goes)]
+    found = {
+        one.candidate.acts: one.price.score(DEFAULT)
+        for one in tried(joint, groups_of(joint, claims), folds_of(layout))
+    }
+    assert found[once] < found[comes_and_goes]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("seed", "family"), [(1_175_013, "friction.load"), (1_176_005, "sensor.crosstalk")]
+)
+def test_a_cause_of_some_runs_is_found(seed: int, family: str) -> None:
+    """The first one has an impossible sign in all runs; the second moves their means, too."""
+    runs = list(draw(seed, "some_runs", gear_ratio=35.0).recordings)
+    models = [model_file.read(Path(name)) for name in ("motor", "gearbox", "cable", "stretch")]
+    (finding,) = diagnose(runs, models, split(runs)).findings
+    assert finding.family == family
 
 
 @pytest.mark.long
