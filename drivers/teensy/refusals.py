@@ -21,7 +21,7 @@ _REASONS: dict[int, tuple[str, str]] = {
         "Read samples, then queue on.",
     ),
     Result.NOT_REFERENCED: (
-        "Its counts have no zeros: it was restarted, or an encoder was doubted.",
+        "Its counts have no zeros: it was restarted, or a check of an encoder failed.",
         "Run: rig reference",
     ),
     Result.NOT_AT_REST: (

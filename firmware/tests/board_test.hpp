@@ -52,7 +52,7 @@ TEST_CASE("samples are numbered from each start on, and a stopped board sends no
     }
 }
 
-TEST_CASE("the place of the index gives the reference once, and not after a trip that doubts an encoder") {
+TEST_CASE("the place of the index gives the reference once, and not after a failed check of an encoder") {
     rig::ReferenceFields limits = widest();
     limits.max_spindle_jump = 50;
     Desk desk(limits);

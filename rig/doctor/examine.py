@@ -45,7 +45,9 @@ def _board_findings(config: Config) -> Iterator[Finding]:
     except DriverError:
         return  # reported with the device
     if not identity.referenced:
-        what = "The encoders have no zeros: the board was restarted, or an encoder was doubted."
+        what = (
+            "The encoders have no zeros: the board was restarted, or a check of an encoder failed."
+        )
         yield Finding("logger", "referenced", Level.WARNING, what, "Run: rig reference")
     if trip is not Trip.NONE:
         what, fix = WORDS[trip]

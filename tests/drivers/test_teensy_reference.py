@@ -83,7 +83,7 @@ def test_a_shaft_that_turns_is_not_referenced(library):
             logger.reference([0, 0, 0])
 
 
-def test_a_trip_that_doubts_an_encoder_takes_its_reference(library):
+def test_a_failed_check_of_an_encoder_takes_its_reference(library):
     jumps = STANDS.copy()
     jumps[600:, 1] += 500
     with logger_of(library, jumps) as logger:
