@@ -25,9 +25,9 @@ from estimation.files import write_text_atomic
 from estimation.model_file import read, to_toml
 from rig.campaigns.drift import changes
 from rig.campaigns.index import campaigns
+from rig.campaigns.refit import refit_all
 from rig.campaigns.search import search
-from rig.diagnosis.refit import refit_all
-from rig.diagnosis.work import engine
+from rig.campaigns.work import engine
 from rig.log.convert import write_recording
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable, to_page

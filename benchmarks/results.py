@@ -100,8 +100,7 @@ PAGES = (
     Page(
         "archive",
         "python -m benchmarks.archive --out docs/results/archive.md",
-        "benchmarks/archive.py rig/campaigns rig/diagnosis/work.py rig/diagnosis/refit.py"
-        " rig/reports/diagnosed.py",
+        "benchmarks/archive.py rig/campaigns rig/reports/diagnosed.py",
         30,
     ),
     Page(

@@ -1,1 +1,1 @@
-"""Finding recordings again: an index of all campaigns under a folder, and a search in it."""
+"""All campaigns under a folder: an index, a search in it, and work on each of them."""

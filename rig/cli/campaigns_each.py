@@ -8,9 +8,9 @@ from typing import Any
 from estimation.model_file import read, to_toml
 from rig.campaigns.drift import changes
 from rig.campaigns.index import IndexedCampaign
+from rig.campaigns.refit import Refit, refit_all
+from rig.campaigns.work import engine
 from rig.diagnosis.ledger import default_ledger
-from rig.diagnosis.refit import Refit, refit_all
-from rig.diagnosis.work import engine
 from rig.output.console import counting, present
 from rig.output.table import TextTable
 from rig.reports.diagnosed import FolderDiagnosis, diagnose_all

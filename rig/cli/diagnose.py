@@ -57,12 +57,12 @@ def diagnose(
         return
 
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
+    from rig.campaigns.work import engine
     from rig.diagnosis.durations import timed_stages
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.propose import write_protocol
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import subject
-    from rig.diagnosis.work import engine
     from rig.reports.diagnosis import write
     from rig.reports.diagnosis_words import sentences
 
@@ -199,10 +199,10 @@ def loop(
 
     Ends when every effect is unique, when the model is complete, or at the limit of rounds or time.
     """
+    from rig.campaigns.work import engine
     from rig.configuration.config import load_config
     from rig.diagnosis.loop import Budget, Round, run_loop
     from rig.diagnosis.subject import declared_models
-    from rig.diagnosis.work import engine
     from rig.protocols.protocol import load_protocol
     from rig.simulation.hidden import chosen
 

@@ -14,10 +14,10 @@ from typing import Any
 from estimation.errors import EstimationError
 from estimation.files import write_text_atomic
 from rig.campaigns.index import DIAGNOSIS, ENDINGS
+from rig.campaigns.work import Start, for_each
 from rig.diagnosis.ledger import Ledger, Look
 from rig.diagnosis.run import run_diagnosis
 from rig.diagnosis.subject import subject
-from rig.diagnosis.work import Start, for_each
 from rig.errors import RigError
 from rig.reports.diagnosis import page_of
 from rig.reports.diagnosis_words import sentences

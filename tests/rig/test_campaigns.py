@@ -13,7 +13,7 @@ import pytest
 from estimation.model_file import read, to_toml
 from rig.campaigns.drift import changes
 from rig.campaigns.index import campaigns
-from rig.diagnosis.refit import refit_all
+from rig.campaigns.refit import refit_all
 from rig.log.convert import write_recording
 from tests.estimation.synthetic import TRUE
 from tests.estimation.synthetic import run as synthetic_run

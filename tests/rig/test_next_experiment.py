@@ -17,10 +17,10 @@ from estimation.causes.experiment import question
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
+from rig.campaigns.work import engine
 from rig.configuration.config import load_config
 from rig.diagnosis.propose import menu, propose, simulated_rig, within, write_protocol
 from rig.diagnosis.run import noise_floors, repeats
-from rig.diagnosis.work import engine
 from rig.errors import UsageError
 from rig.protocols.protocol import load_protocol, protocol_toml
 from rig.simulation.hidden import HiddenEffect

@@ -16,7 +16,7 @@ from estimation.files import write_text_atomic
 from estimation.fitting import fit
 from estimation.model_file import parse
 from rig.campaigns.index import ENDINGS
-from rig.diagnosis.work import Start, for_each
+from rig.campaigns.work import Start, for_each
 from rig.errors import RigError
 from rig.importers.registry import open_campaign
 
