@@ -8,7 +8,7 @@ from estimation.causes.candidates import Candidate
 from estimation.causes.equations import sensitivity
 from estimation.causes.functions import Function, name_of_channel, names
 from estimation.causes.numbers import Numbers
-from estimation.causes.refit import Part
+from estimation.causes.refit import Addition
 from estimation.causes.refits import Refits
 from estimation.causes.scoring import Scored, posterior
 from estimation.causes.sources import LATE, Source
@@ -67,7 +67,7 @@ class Kept:
     scored: Scored
     likely: Sequence[Probability]
     ranked: Sequence[Scored]
-    part: Part | None = None
+    part: Addition | None = None
 
 
 def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:

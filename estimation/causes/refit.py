@@ -36,7 +36,7 @@ Unwritten = Callable[[str, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
-class Part:
+class Addition:
     """What one cause adds to an equation: a term of its model, or columns that no file can hold.
 
     Attributes:
@@ -71,7 +71,7 @@ class Solved:
         squared: Sum of squared residuals.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[Addition, ...]
     declared: tuple[Term, ...]
     weights: FloatArray
     level: float
@@ -134,21 +134,21 @@ class Refit:
         self.numbers = numbers
         self._runs: dict[frozenset[str], dict[str, tuple[FitRun, NDArray[np.intp]] | None]] = {}
         # with the causes themselves: the identity of one that is gone may be another's
-        self._solved: dict[tuple[int, ...], tuple[Sequence[Part], Solved]] = {}
+        self._solved: dict[tuple[int, ...], tuple[Sequence[Addition], Solved]] = {}
 
     @cached_property
     def _declared(self) -> list[Term]:
         own = self.model.terms
         return [t for t in own if not (self.model.run_offsets and t.effect.id == OFFSET)]
 
-    def solve(self, parts: Sequence[Part]) -> Solved:
+    def solve(self, parts: Sequence[Addition]) -> Solved:
         """Return the amplitudes of the declared terms and of some causes on the training runs."""
         key = tuple(map(id, parts))
         if key not in self._solved:
             self._solved[key] = tuple(parts), self._fitted(tuple(parts))
         return self._solved[key][1]
 
-    def amplitudes(self, part: Part, parts: Sequence[Part]) -> FloatArray:
+    def amplitudes(self, part: Addition, parts: Sequence[Addition]) -> FloatArray:
         """Return the amplitudes of one of some causes."""
         in_order = sorted(parts, key=lambda p: p.term is None)  # that of their columns
         widths = [self._width(p) for p in in_order]
@@ -182,7 +182,7 @@ class Refit:
             {name: len(e) for name, e in left.items()},
         )
 
-    def written(self, parts: Sequence[Part]) -> Model:
+    def written(self, parts: Sequence[Addition]) -> Model:
         """Return the model with the causes that a file can hold.
 
         Values are those of `solve` with these causes. Spreads and intervals are of a bootstrap over
@@ -209,13 +209,13 @@ class Refit:
                     raise
                 terms.pop()
 
-    def settled(self, parts: Sequence[Part]) -> list[Part]:
+    def settled(self, parts: Sequence[Addition]) -> list[Addition]:
         """Return causes with the shapes that they were fitted with next to one another."""
         solved = self.solve(parts)
         self._solved[tuple(map(id, solved.parts))] = solved.parts, solved
         return list(solved.parts)
 
-    def predict_next_to(self, parts: Sequence[Part]) -> None:
+    def predict_next_to(self, parts: Sequence[Addition]) -> None:
         """Predict the target by the declared terms as they are fitted next to some causes.
 
         Without the causes these terms stand in for them, and what reads their prediction would be
@@ -234,7 +234,7 @@ class Refit:
                 self.model, self._runs, self._solved = known, runs, {}
                 return
 
-    def _fitted(self, parts: tuple[Part, ...]) -> Solved:
+    def _fitted(self, parts: tuple[Addition, ...]) -> Solved:
         solved, share = self._amplitudes(parts, tuple(self._declared)), 1.0
         for _ in range(MOVES if parts and any(moving for _, moving in _terms(solved)) else 0):
             further = self._amplitudes(*self._moved(solved, share))
@@ -244,7 +244,7 @@ class Refit:
                 share *= 0.5
         return solved
 
-    def _amplitudes(self, parts: tuple[Part, ...], declared: tuple[Term, ...]) -> Solved:
+    def _amplitudes(self, parts: tuple[Addition, ...], declared: tuple[Term, ...]) -> Solved:
         grams, means, samples = [], [], 0
         for run in self._train_runs(parts):
             table = _table(parts, declared, run, run.places)
@@ -262,7 +262,7 @@ class Refit:
         left = np.append(-weights, 1.0)
         return Solved(parts, declared, weights, level, float(left @ gram @ left))
 
-    def _moved(self, solved: Solved, share: float) -> tuple[tuple[Part, ...], tuple[Term, ...]]:
+    def _moved(self, solved: Solved, share: float) -> tuple[tuple[Addition, ...], tuple[Term, ...]]:
         """Return causes and declared terms, their shapes a share of a Gauss-Newton step further."""
         terms = _terms(solved)
         widths = [len(term.effect.amplitudes) for term, _ in terms]
@@ -286,7 +286,7 @@ class Refit:
         parts = [p if p.term is None else replace(p, term=next(found)) for p in solved.parts]
         return tuple(parts), declared
 
-    def _train_runs(self, parts: Sequence[Part]) -> Iterator[FitRun]:
+    def _train_runs(self, parts: Sequence[Addition]) -> Iterator[FitRun]:
         """Yield the training runs that have a sample of the equation."""
         for name in self.train_names:
             if (known := self._run(parts, name)) is not None:
@@ -297,7 +297,7 @@ class Refit:
         centred = whole - whole.mean(axis=0) if self.model.run_offsets else whole
         return np.asarray(centred.T @ centred)
 
-    def _limits(self, parts: Sequence[Part]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _limits(self, parts: Sequence[Addition]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the penalty and the bounds of every amplitude, shape (k,) each."""
         of_terms = [(term, False) for term in self._declared]
         of_terms += [(part.term, part.is_change) for part in parts if part.term is not None]
@@ -312,13 +312,13 @@ class Refit:
         penalty, low, high = np.array(rows).T
         return penalty, low, high
 
-    def _width(self, part: Part) -> int:
+    def _width(self, part: Addition) -> int:
         """Return the number of a cause's amplitudes."""
         if part.unwritten is not None:
             return int(part.unwritten(self.train_names[0], np.zeros(1)).shape[1])
         return len(part.term.effect.amplitudes) if part.term is not None else 0
 
-    def _run(self, parts: Sequence[Part], name: str) -> tuple[FitRun, NDArray[np.intp]] | None:
+    def _run(self, parts: Sequence[Addition], name: str) -> tuple[FitRun, NDArray[np.intp]] | None:
         """Return a run and the samples that its error counts; None without a sample to fit."""
         terms = [p.term for p in parts if p.term is not None]
         key = frozenset(c for t in terms for c in t.channels.values()) - {*self.model.channels}
@@ -365,7 +365,7 @@ def _terms(solved: Solved) -> list[tuple[Term, shapes.Moving]]:
 
 
 def _table(
-    parts: Sequence[Part], declared: Sequence[Term], run: FitRun, places: NDArray[np.intp]
+    parts: Sequence[Addition], declared: Sequence[Term], run: FitRun, places: NDArray[np.intp]
 ) -> FloatArray:
     """Return the signed columns of a run: declared, found, and those without a term, (n, k)."""
     name, blocks = run.whole.name, [_columns(term, run, places) for term in declared]

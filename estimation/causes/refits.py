@@ -11,7 +11,7 @@ from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Equation, Layout, RunSignals
 from estimation.causes.instruments import CLEAN, noise_share
 from estimation.causes.numbers import Numbers
-from estimation.causes.refit import MOVES, Errors, Part, Refit, Solved
+from estimation.causes.refit import MOVES, Addition, Errors, Refit, Solved
 from estimation.causes.sources import LATE, Source
 from estimation.derived import origin_of
 from estimation.diagnosis.result import Error
@@ -43,10 +43,10 @@ class Refits:
             )
             for name, e in layout.equations.items()
         }
-        self.parts: dict[str, list[Part]] = {name: [] for name in layout.equations}
+        self.parts: dict[str, list[Addition]] = {name: [] for name in layout.equations}
         self.open: set[str] = set()
 
-    def add(self, candidate: Candidate, acts_in: Mapping[str, bool]) -> dict[str, Part]:
+    def add(self, candidate: Candidate, acts_in: Mapping[str, bool]) -> dict[str, Addition]:
         """Add a cause to every equation it enters, in the runs in which it acts.
 
         Returns what it added, by equation.
@@ -59,17 +59,17 @@ class Refits:
                 added[name] = part
         return added
 
-    def remove(self, parts: Mapping[str, Part]) -> None:
+    def remove(self, parts: Mapping[str, Addition]) -> None:
         """Remove what a cause added."""
         for name, part in parts.items():
             self.parts[name] = [p for p in self.parts[name] if p is not part]
 
-    def settle(self) -> dict[int, Part]:
+    def settle(self) -> dict[int, Addition]:
         """Give every cause the shape that it was fitted with next to the others.
 
         Returns the identity of each part to the part with that shape.
         """
-        settled: dict[int, Part] = {}
+        settled: dict[int, Addition] = {}
         for name, refit in self.of.items():
             before, self.parts[name] = self.parts[name], refit.settled(self.parts[name])
             settled.update(zip(map(id, before), self.parts[name], strict=True))
@@ -83,7 +83,7 @@ class Refits:
         """Return the equation with the causes added so far."""
         return self.of[name].solve(self.parts[name])
 
-    def test_errors(self, name: str, without: Part | None = None) -> Errors:
+    def test_errors(self, name: str, without: Addition | None = None) -> Errors:
         """Return an equation's errors on the test runs with the causes so far, or all but one."""
         parts = [p for p in self.parts[name] if p is not without]
         return self.of[name].errors(self.of[name].solve(parts), self.open)
@@ -109,14 +109,14 @@ class Refits:
             )
         return out
 
-    def _part(self, candidate: Candidate, name: str, runs: Collection[str]) -> Part | None:
+    def _part(self, candidate: Candidate, name: str, runs: Collection[str]) -> Addition | None:
         cause, equation = candidate.cause, self.layout.equations[name]
         acts = None if candidate.acts is None else frozenset(runs)
         if not isinstance(cause, Source):
             return self._columns(candidate, name, acts)
         if (term := _term(cause, replace(equation, model=self.of[name].model))) is None:
             return self._columns(candidate, name, acts) if name == cause.place.home else None
-        part = Part(term, acts, is_change=isinstance(cause, Moved))
+        part = Addition(term, acts, is_change=isinstance(cause, Moved))
         refit, before = self.of[name], self.parts[name]
         if set(term.channels.values()) - {channel for _, channel in cause.channels}:
             refit.predict_next_to([*before, part])
@@ -131,7 +131,7 @@ class Refits:
                 return whole
         return part
 
-    def _whole(self, part: Part, candidate: Candidate, name: str) -> Part:
+    def _whole(self, part: Addition, candidate: Candidate, name: str) -> Addition:
         """Return a delay or a lag with the time by which the whole reading is late.
 
         Slow motion shows the product of that time and of the share of the reading alone. The time
@@ -154,7 +154,7 @@ class Refits:
             return found
         return part
 
-    def _columns(self, candidate: Candidate, name: str, acts: frozenset[str] | None) -> Part:
+    def _columns(self, candidate: Candidate, name: str, acts: frozenset[str] | None) -> Addition:
         """Return the columns of a cause in an equation, as a part that no model file holds."""
         cause = candidate.cause
         gain = sum(abs(e.gain) for e in cause.place.enters if e.equation == name)
@@ -166,7 +166,7 @@ class Refits:
             acting = float(acts is None or run in acts)
             return acting * np.column_stack([np.interp(since_s, time_s, c) for c in values.T])
 
-        return Part(unwritten=columns, precision=precision)
+        return Addition(unwritten=columns, precision=precision)
 
 
 def _noisy(layout: Layout, equation: Equation) -> set[str]:

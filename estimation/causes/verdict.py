@@ -29,7 +29,7 @@ from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.refit import Errors, Part
+from estimation.causes.refit import Addition, Errors
 from estimation.causes.refits import Refits
 from estimation.causes.scoring import DIGITS, probabilities
 from estimation.causes.search import Found, search
@@ -147,7 +147,7 @@ class _Opened:
 
     kept: Kept
     finding: Finding
-    parts: Mapping[str, Part]
+    parts: Mapping[str, Addition]
     fall: float
     notes: Sequence[str]
 
