@@ -388,6 +388,7 @@ def geared(tmp_path_factory):
     return file, runs
 
 
+@pytest.mark.long
 def test_another_gear_ratio_is_fitted_with_its_file_and_contradicted_without(geared, said):
     file, runs = geared
     own = said("machine check --json", file, runs)

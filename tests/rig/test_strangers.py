@@ -63,6 +63,7 @@ def test_a_noise_that_the_recordings_contradict_is_named(run, tmp_path):
     assert "states a noise of 0.1 N m for cell_torque_n_m" in printed
 
 
+@pytest.mark.long
 def test_an_axis_driven_by_pwm_is_diagnosed_in_units_of_its_drive(run, diagnosed, tmp_path):
     (tmp_path / "axis.toml").write_text(AXIS)
     axis_table(tmp_path / "axis.csv", asymmetry=0.03)
@@ -108,6 +109,7 @@ def test_friction_follows_a_temperature_that_the_machine_states(
     assert "rail_temperature_k" in (tmp_path / "model.toml").read_text()
 
 
+@pytest.mark.long
 def test_joints_under_gravity_depend_on_their_angles_and_those_of_other_joints(diagnosed, tmp_path):
     """Slow motion under gravity fits an inertia of the wrong sign, which a cause may change."""
     (tmp_path / "arm.toml").write_text(ARM)

@@ -160,6 +160,7 @@ def test_the_error_of_an_encoder_has_its_size_where_the_equation_is_of_torques()
     assert np.hypot(*(p.value for p in first)) == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.mark.long
 def test_the_weight_of_a_chain_is_no_function_of_the_sine_of_a_position() -> None:
     text = AXIS.replace('"rad"', '"m"').replace("crank_angle_rad", "crank_position_m")
     (model,) = declared(plant_file.parse(text.replace("DRIVE", "crank_force_n")))

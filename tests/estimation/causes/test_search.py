@@ -159,6 +159,7 @@ def test_an_inertia_over_a_small_angle_is_constant() -> None:
     assert "inertia.position" not in families
 
 
+@pytest.mark.long
 def test_three_causes_of_two_variables_keep_their_names() -> None:
     """One function of the angle explains more than each of the two causes that act over it."""
     random, runs = np.random.default_rng(6), []
@@ -255,6 +256,7 @@ def test_a_tight_spot_in_every_turn_depends_on_the_angle_and_the_direction() -> 
     assert {*finding.depends_on} == {"velocity_sign", "crank_angle"}
 
 
+@pytest.mark.long
 def test_coloured_noise_of_a_torque_is_no_other_compliance_in_some_of_the_runs() -> None:
     """Within runs a noisy torque is better left out; the means of the runs hold its factor."""
     runs = list(draw(22_067, "clean", gear_ratio=35.0).recordings)
@@ -262,6 +264,7 @@ def test_coloured_noise_of_a_torque_is_no_other_compliance_in_some_of_the_runs()
     assert diagnose(runs, rig, split(runs)).findings == ()
 
 
+@pytest.mark.long
 def test_a_part_of_a_period_is_named_by_its_variables() -> None:
     """Over fewer than two periods a wave is any smooth function of the position."""
     runs = list(draw(1_120_002, "outside", gear_ratio=35.0).recordings)
@@ -488,6 +491,7 @@ def _three_encoders(late_s: float) -> list[Recording]:
     return runs
 
 
+@pytest.mark.long
 def test_the_middle_one_of_three_encoders_is_late_and_not_the_others_early() -> None:
     finding = _only(_three_encoders(0.004), gearbox(), *cable())
     assert {finding.family, *finding.alternatives} == {"sensor.delay", "sensor.lag"}
@@ -495,6 +499,7 @@ def test_the_middle_one_of_three_encoders_is_late_and_not_the_others_early() -> 
     assert finding.parameters["lateness"].value == pytest.approx(0.004, rel=0.02)
 
 
+@pytest.mark.long
 def test_an_encoder_that_is_late_by_a_millisecond_is_remarked_on() -> None:
     runs = _three_encoders(0.001)
     diagnosis = diagnose(runs, [gearbox(), *cable()], split(runs))

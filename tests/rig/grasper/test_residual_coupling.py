@@ -18,6 +18,7 @@ def diagnosed(tmp_path, said, answered):
     return run
 
 
+@pytest.mark.long
 def test_a_wrong_pulley_ratio_is_found_from_a_folder_of_recordings(diagnosed):
     told = diagnosed("1.1")
     assert set(told["rmse_before"]) == {"grasp", "pitch", "yaw"}
