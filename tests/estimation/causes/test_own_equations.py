@@ -96,6 +96,20 @@ def test_two_terms_of_one_effect_have_a_name_each_in_what_moved() -> None:
     assert "inertia.missing.inertia" in sizes
 
 
+def test_a_second_current_of_an_equation_has_a_drive_of_its_own() -> None:
+    second = '{ id = "motor.torque_constant", channels = { source = "fan_current_a" } },\n  '
+    before, found, after = DYNO.partition('{ id = "sensor.offset" }')
+    models = declared(plant_file.parse(before + second + found + after))
+    random, runs = np.random.default_rng(1), []
+    for run in driven():
+        fan = _waves(random, run.time_s, 0.8, 5)
+        torque = run["hub_torque_n_m"] + 3.0 * (fan - 0.06 * fan * np.abs(fan))
+        runs.append(run.with_columns(fan_current_a=fan, hub_torque_n_m=torque))
+    (finding,) = diagnose(runs, models, split(runs)).findings
+    assert finding.place == "actuator fan_current_a"
+    assert "motor.saturation" in (finding.family, *finding.alternatives)
+
+
 @pytest.mark.parametrize(
     ("fault", "channel", "family"),
     [
