@@ -152,19 +152,20 @@ def _notes(first: Sequence[Recording], second: Sequence[Recording]) -> tuple[str
 
 
 def _folds_of_one_campaign(layout: Layout, is_b: Sequence[bool]) -> list[list[list[int]]]:
-    """Return families of folds that omit runs of one campaign at a time.
+    """Return families of folds that omit runs of one campaign at a time, never all of it.
 
-    What the declared model lacks at a level is learnt from the other campaign's runs there.
+    What the declared model lacks at a level is learnt from the other campaign's runs there. A level
+    that is all of a campaign shows nothing: its change cannot be fitted without it.
     """
-    return [
-        [
-            of_one
-            for fold in family
-            for side in (True, False)
-            if (of_one := [run for run in fold if is_b[run] == side])
+    whole = {side: list(is_b).count(side) for side in (True, False)}
+    found = []
+    for family in folds_of(layout):
+        sided = [
+            (side, [run for run in fold if is_b[run] == side]) for fold in family for side in whole
         ]
-        for family in folds_of(layout)
-    ]
+        if all(len(runs) < whole[side] for side, runs in sided):
+            found.append([runs for _, runs in sided if runs])
+    return found
 
 
 def _in_one_alone(plain: Joint, prior: float, reach: float = 7.0) -> Rank:

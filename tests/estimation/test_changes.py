@@ -1,6 +1,7 @@
 """What changed between two campaigns: a planted change is named, and chance is not."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -41,12 +42,14 @@ def axis() -> Model:
     return equation("drive_force_n", inertia, 1, "axis_velocity_m_s")
 
 
-def record(seed: int, only: int | None = None, **changed: float) -> list[Recording]:
+def record(
+    seed: int, only: int | None = None, speeds: Sequence[float] = SPEEDS, **changed: float
+) -> list[Recording]:
     """Return a campaign of an axis that moves at six speeds."""
     machine = {**MACHINE, **changed}
     random = np.random.default_rng(seed)
     runs = []
-    for k, scale in enumerate(SPEEDS):
+    for k, scale in enumerate(speeds):
         if only is not None and k != only:
             continue
         phase = random.uniform(0, 2 * np.pi, 2)
@@ -84,6 +87,20 @@ def test_a_parameter_that_moved_is_named_with_its_size(changed, name, parameter,
     assert found.parameters[parameter] == pytest.approx(change, rel=0.15)
     known = DECLARED[next(iter(changed))]
     assert found.before[parameter] == pytest.approx(known, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("changed", "name"),
+    [
+        ({"mass": 2.2}, "inertia.missing inertia of motor"),
+        ({"friction": 1.2}, "friction.coulomb friction of motor"),
+    ],
+)
+def test_a_parameter_that_moved_is_named_where_each_campaign_has_a_speed_of_its_own(changed, name):
+    """To leave out a level of the speed is then to leave out a campaign, and its change with it."""
+    slow, fast = np.linspace(0.8, 0.82, 6), np.linspace(1.3, 1.32, 6)
+    (found,) = compare(record(1, speeds=slow), record(2, speeds=fast, **changed), [axis()]).changes
+    assert found.name == name
 
 
 def test_a_drive_that_gives_another_torque_an_ampere_is_named_where_it_is_the_target():
