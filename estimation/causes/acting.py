@@ -38,21 +38,21 @@ def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, Products]]) -> 
     for claim, by_run in everything:
         if not claim.is_function:
             named.setdefault(by_run.target.shape[1], []).append((claim, by_run))
-    promise: list[tuple[float, Claim, NDArray[np.bool_]]] = []
+    promise: list[tuple[float, Claim, NDArray[np.bool_], FloatArray]] = []
     for group in named.values():
         products = Products(*map(np.stack, zip(*(by_run for _, by_run in group), strict=True)))
         for acts in _acting(inverse, products):
             gains, amplitudes = _removed(inverse, *(_over(acts, x) for x in products))
             acting = acts.sum(axis=1)
-            for k in np.flatnonzero((acting > 1) & (acting < count)):
-                claim = group[k][0]
-                size = claim.size if isinstance(claim, Candidate) else 1.0
-                if is_possible(claim.cause, amplitudes[k] / size):
-                    promise.append((float(gains[k]), claim, acts[k]))
+            some = np.flatnonzero((acting > 1) & (acting < count))
+            promise += [(float(gains[k]), group[k][0], acts[k], amplitudes[k]) for k in some]
     promise.sort(key=lambda p: -p[0])
     tried, seen = [], dict[object, set[tuple[bool, ...]]]()
-    for _, claim, runs in promise:
+    for _, claim, runs, scaled in promise:
         if claim.name not in seen and len(seen) == PARTIAL:
+            continue
+        size = claim.size if isinstance(claim, Candidate) else 1.0
+        if not is_possible(claim.cause, scaled / size):
             continue
         known = seen.setdefault(claim.name, set())
         chosen = tuple(runs.tolist())

@@ -218,7 +218,7 @@ def _actuators(equation: Equation, angles: Sequence[str]) -> Iterator[Place]:
     read = [t.channels["source"] for t in equation.terms if t.effect.id == "motor.torque_constant"]
     if not read and (equation.of_angle or equation.target.endswith(EFFORTS)):
         return
-    for current in read or [equation.target]:
+    for current in dict.fromkeys(read) or [equation.target]:
         roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
             "current": (current,),
             "drive": (current,),

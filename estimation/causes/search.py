@@ -147,16 +147,15 @@ def _settled(
 
     A cause that is not worth its price next to the others goes, the least first.
     """
-    settled, before = list(causes), list[Scored]()
-    conditional: list[Sequence[Scored]] = [[] for _ in causes]
+    settled, conditional = list(causes), list[Sequence[Scored]]([[] for _ in causes])
     for _ in range(MOST_CAUSES):
-        if [id(c) for c in before] == [id(c) for c in settled]:
-            break
         before = list(settled)
         for k, cause in enumerate(before):
             # next to the others every candidate may be dropped: the cause then stands as it was
             conditional[k] = ranking.next_to([c for c in settled if c is not settled[k]]) or [cause]
             settled[k] = conditional[k][0]
+        if all(one is other for one, other in zip(before, settled, strict=True)):
+            break
     least = min(settled, key=lambda c: c.score)
     if least.score < 0.0 and len(settled) > 1:
         return _settled(ranking, [c for c in settled if c is not least])
