@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.ratio import Ratio, best_of
-from drivers.teensy.logic import Drive
+from drivers.teensy.control import Controllers
 from rig.simulation.bench import SimulatedBench
 from rig.simulation.fitted import DECLARED_PLANT
 from rig.simulation.hidden import HiddenEffect
@@ -23,7 +23,7 @@ def measure() -> list[Ratio]:
 
     def seconds(effects: list[HiddenEffect], plant: PlantParameters | None = None) -> float:
         bench = SimulatedBench(plant, effects=effects)
-        drive = Drive.armed(REFERENCE_GAINS)
+        drive = Controllers.fresh(REFERENCE_GAINS)
         bench.advance(ticks, target, load_ma, drive)  # compiles
         return best_of(lambda: bench.advance(ticks, target, load_ma, drive), 5)
 

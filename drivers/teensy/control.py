@@ -5,6 +5,9 @@ count rises. Both implementations do the same float64 operations in the same ord
 fake and the firmware answer with the same bytes.
 """
 
+from dataclasses import dataclass
+from typing import Any
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -42,3 +45,39 @@ def control_tick(
     state[INTEGRAL] = min(max(state[INTEGRAL] + gains[KI] * error, -limit), limit)
     command = gains[KP] * error + state[INTEGRAL] + gains[KD] * state[MOTOR_VELOCITY]
     return int(np.floor(min(max(command, -limit), limit) + 0.5))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Controllers:
+    """The position controllers of a board's motors.
+
+    Attributes:
+        state: State of each, shape (motors, 4); changed in place.
+        gains: Gains of each, shape (motors, 5).
+    """
+
+    state: NDArray[np.float64]
+    gains: NDArray[np.float64]
+
+    @classmethod
+    def fresh(cls, gains: Any) -> "Controllers":
+        """Return controllers at their start, given their gains, (5,) or (motors, 5)."""
+        rows = np.atleast_2d(np.array(gains, np.float64))
+        return cls(np.zeros((len(rows), 4)), rows)
+
+    @classmethod
+    def idle(cls, motors: int = 1) -> "Controllers":
+        """Return controllers whose command is always 0."""
+        return cls.fresh(np.zeros((motors, 5)))
+
+    def commands(
+        self,
+        targets: NDArray[np.int32],
+        positions: NDArray[np.int32],
+        motors: NDArray[np.int32],
+    ) -> NDArray[np.int32]:
+        """Return the commands along some ticks; all arrays are of shape (n, motors)."""
+        found = np.empty_like(targets)
+        for tick, counts in enumerate(zip(targets, positions, motors, strict=True)):
+            found[tick] = list(map(control_tick, self.state, self.gains, *counts))
+        return found

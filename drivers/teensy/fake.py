@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from drivers.errors import FrameError
 from drivers.framing import FrameStream, encode_frame, encode_frames
 from drivers.teensy import protocol
-from drivers.teensy.logic import ENGAGED, STATE, Bench, BoardLogic, Drive
+from drivers.teensy.control import Controllers
+from drivers.teensy.logic import REFERENCE_LOGIC, Bench, BoardLogic
 from drivers.teensy.protocol import GAIN_NAMES, STATUS_ARMED, Ack, Identity, Kind, Result, Trip
-from drivers.teensy.reference_board import REFERENCE_LOGIC
 from drivers.transport.simulated import Outbox
 
 TRANSMIT_CAPACITY = 65536
@@ -62,7 +62,8 @@ class PythonBoard(Outbox):
         self._last_host_us = 0
         self._watchdog_us = protocol.WATCHDOG_US
         self._now_us = 0
-        self._drive = Drive.idle(self._profile.motors)
+        self._state = 0
+        self._controllers = self._idle = Controllers.idle(self._profile.motors)
         self._trip_us = 0
         self._silent_us = 0
         self._queued = np.empty((0, len(self._profile.setpoint_names)), np.int32)
@@ -84,7 +85,7 @@ class PythonBoard(Outbox):
                 self._trip_us = self._next_tick_us
                 self._silent_us = (self._next_tick_us - self._last_host_us) % 2**32
                 self._release()
-                self._drive.state[STATE] = _SILENT
+                self._state = _SILENT
                 block = ticks
             self._run_block(block)
             ticks -= block
@@ -166,7 +167,8 @@ class PythonBoard(Outbox):
         self._release()
         self._watchdog_us = patience_us
         self._session = session
-        self._drive = Drive.armed(gains, engaged=False)
+        self._state = STATUS_ARMED
+        self._controllers = Controllers.fresh(gains)
         self._hear(int(fields["sequence"]))
         return Result.OK
 
@@ -192,7 +194,7 @@ class PythonBoard(Outbox):
         if code != self._trip:
             return Result.WRONG_TRIP
         self._release()
-        self._drive.state[STATE] = 0
+        self._state = 0
         return Result.OK
 
     @property
@@ -227,10 +229,6 @@ class PythonBoard(Outbox):
     # time
 
     @property
-    def _state(self) -> int:
-        return int(self._drive.state[STATE])
-
-    @property
     def _status(self) -> int:
         """The state as the host gets it: a simulated rig's counters are absolute."""
         return self._state | protocol.STATUS_REFERENCED
@@ -252,8 +250,7 @@ class PythonBoard(Outbox):
 
     def _release(self) -> None:
         """Take the motors out of force and forget what was to be done; a trip stays."""
-        self._drive.state[STATE] &= ~STATUS_ARMED
-        self._drive.state[ENGAGED] = 0
+        self._state &= ~STATUS_ARMED
         self._session = None
         self._queued = self._queued[:0]
         self._held = None
@@ -261,13 +258,13 @@ class PythonBoard(Outbox):
     def _run_block(self, ticks: int) -> None:
         """Run ticks in which no command comes and the watchdog does not trip."""
         engaged = self._armed and (self._held is not None or len(self._queued) > 0)
-        self._drive.state[ENGAGED] = engaged
         setpoints, fed = self._play(ticks, engaged)
-        counts = self._bench.advance(ticks, *np.ascontiguousarray(setpoints.T), self._drive)
-        status = counts[:, self._logic.status_column].astype(np.uint16)
-        dry = (status[fed:] & STATUS_ARMED) != 0
-        status[fed:][dry] |= protocol.STATUS_QUEUE_DRY
-        self._log(counts, status)
+        controllers = self._controllers if engaged else self._idle
+        counts = self._bench.advance(ticks, *np.ascontiguousarray(setpoints.T), controllers)
+        status = np.full(ticks, self._status, np.uint16)
+        if self._armed:
+            status[fed:] |= protocol.STATUS_QUEUE_DRY
+        self._log(counts, setpoints if engaged else None, status)
 
     def _play(self, ticks: int, engaged: bool) -> tuple[NDArray[np.int32], int]:
         """Take the next setpoints from the queue, the last one held where it runs dry."""
@@ -282,7 +279,12 @@ class PythonBoard(Outbox):
 
     # samples
 
-    def _log(self, counts: NDArray[np.int32], status: NDArray[np.uint16]) -> None:
+    def _log(
+        self,
+        counts: NDArray[np.int32],
+        setpoints: NDArray[np.int32] | None,
+        status: NDArray[np.uint16],
+    ) -> None:
         ticks = len(counts)
         tick_us = self._profile.tick_us
         ticks_us = (self._next_tick_us + tick_us * np.arange(ticks, dtype=np.int64)) % 2**32
@@ -292,11 +294,12 @@ class PythonBoard(Outbox):
             return
         on_wire = self._profile.sample.itemsize + FRAME_OVERHEAD
         fitting = min(ticks, (TRANSMIT_CAPACITY - len(self._out)) // on_wire)
-        samples = self._logic.samples(counts[:fitting])
+        asked = None if setpoints is None else setpoints[:fitting]
+        samples = self._logic.samples(counts[:fitting], asked)
         saturated = self._logic.saturated(counts[:fitting])
         samples["version"] = protocol.VERSION
         samples["kind"] = Kind.SAMPLE
-        samples["status"] = status[:fitting] | np.uint16(protocol.STATUS_REFERENCED)
+        samples["status"] = status[:fitting]
         samples["status"][saturated] |= np.uint16(protocol.STATUS_SATURATED)
         samples["sequence"] = (self._sequence + np.arange(fitting, dtype=np.int64)) % 2**32
         samples["tick_us"] = ticks_us[:fitting]

@@ -4,38 +4,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.device import Device
-from drivers.teensy import reference_board as at
+from drivers.teensy.control import Controllers
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import PythonBoard
-from drivers.teensy.logic import Drive
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 
 
 class HandMovedBench:
-    """Implements `drivers.teensy.fake.Bench`; what the controller commands moves nothing."""
+    """Implements `drivers.teensy.logic.Bench`; what the controller commands moves nothing."""
 
     def __init__(self) -> None:
         self._ticks = 0
 
     def advance(
-        self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
+        self,
+        ticks: int,
+        target: NDArray[np.int32],
+        load_ma: NDArray[np.int32],
+        controllers: Controllers,
     ) -> NDArray[np.int32]:
-        """Turn the shaft to and fro once a second; see `drivers.teensy.fake.Bench.advance`."""
+        """Turn the shaft to and fro once a second; see `drivers.teensy.logic.Bench.advance`."""
         time_s = (self._ticks + np.arange(ticks)) * 1e-3
         self._ticks += ticks
         turn = np.sin(2 * np.pi * time_s)
-        counts = np.zeros((ticks, at.COLUMNS), np.int32)
-        counts[:, at.MOTOR] = 3500 * turn
-        counts[:, at.SPINDLE] = -200 * turn
-        counts[:, at.JAW] = 80 * turn
-        counts[:, at.PROXIMAL] = 900 * turn
-        counts[:, at.DISTAL] = -700 * turn
-        counts[:, at.CURRENT] = 3 * np.cos(2 * np.pi * 50 * time_s)
-        counts[:, at.FSR] = 300 * np.maximum(turn, 0.0)
-        for row, *setpoint in zip(counts, target, load_ma, strict=True):
-            at.drive_tick(row, *setpoint, *drive.arrays)
-        return counts
+        current = 3 * np.cos(2 * np.pi * 50 * time_s)
+        fsr = 300 * np.maximum(turn, 0.0)
+        motor, spindle, *others = (size * turn for size in (3500, -200, 80, 900, -700))
+        inputs = np.stack([motor, spindle, *others, current, fsr], axis=1).astype(np.int32)
+        commands = controllers.commands(target[:, None], inputs[:, [1]], inputs[:, [0]])
+        return np.hstack([inputs, commands])
 
 
 def open_fake(faults: Faults) -> Device:

@@ -1,98 +1,93 @@
-"""What the plain simulated board does a tick, by profile."""
+"""What the plain simulated board makes of a bench's counts, by profile."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.teensy.grasper import GRASPER, MOTORS
 from drivers.teensy.profile import Profile
-from drivers.teensy.protocol import STATUS_ARMED
+from drivers.teensy.reference import REFERENCE
 
-STATE, ENGAGED = range(2)
-"""Places in a drive's state, int64: the board's status, and whether a setpoint has come."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Drive:
-    """All that a tick of the plain board needs and changes, besides its inputs.
-
-    Attributes:
-        state: See the places above; changed in place.
-        control_state: State of each controller, shape (motors, 4); changed in place.
-        gains: Gains of each controller, shape (motors, 5).
-    """
-
-    state: NDArray[np.int64]
-    control_state: NDArray[np.float64]
-    gains: NDArray[np.float64]
-
-    @classmethod
-    def armed(cls, gains: Any, engaged: bool = True) -> "Drive":
-        """Return a drive just armed, gains (5,) or (motors, 5); engaged by a setpoint or not."""
-        rows = np.atleast_2d(np.array(gains, np.float64))
-        return cls(np.array((STATUS_ARMED, engaged), np.int64), np.zeros((len(rows), 4)), rows)
-
-    @classmethod
-    def idle(cls, motors: int = 1) -> "Drive":
-        """Return a drive that was never armed."""
-        drive = cls.armed(np.zeros((motors, 5)), engaged=False)
-        drive.state[STATE] = 0
-        return drive
-
-    @property
-    def arrays(self) -> tuple[NDArray[Any], ...]:
-        """Return state, controllers and gains, as a profile's tick takes them."""
-        return self.state, self.control_state, self.gains
+INT16 = (-(2**15), 2**15 - 1)
+FORCE_MAX = 4095
+TWELVE_BITS = (-(2**32), FORCE_MAX)
+"""Ends of a converter; one of 12 bits has no lower end at which it is saturated."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoardLogic:
-    """One profile's logic.
+    """How the samples of one profile are made.
 
     Attributes:
         profile: The profile.
-        columns: Field of a sample to the column of a tick's row.
-        status_column: Column of the board's state.
-        converted: Column of each converter to the counts from which down and up it is saturated.
+        counted: Fields of a sample in the order of a bench's columns: inputs, then commands.
+        converted: Field of each converter to the counts from which down and up it is saturated.
+        stands: Setpoint that follows a count to that count, which it is while nothing is asked.
     """
 
     profile: Profile
-    columns: Mapping[str, int]
-    status_column: int
-    converted: Mapping[int, tuple[int, int]]
+    counted: tuple[str, ...]
+    converted: Mapping[str, tuple[int, int]]
+    stands: Mapping[str, str]
 
-    def samples(self, counts: NDArray[np.int32]) -> NDArray[Any]:
-        """Return samples with the counts of some rows, cut to the range of their fields."""
+    def samples(
+        self, counts: NDArray[np.int32], setpoints: NDArray[np.int32] | None
+    ) -> NDArray[np.void]:
+        """Return samples of some ticks, cut to the range of their fields.
+
+        Args:
+            counts: A row a tick, as in `counted`.
+            setpoints: What is asked for in each, None while nothing is.
+        """
+        given = dict(zip(self.counted, counts.T, strict=True))
+        for place, name in enumerate(self.profile.setpoint_names):
+            rest = given.get(self.stands.get(name, ""), np.zeros(len(counts), np.int32))
+            given[name] = rest if setpoints is None else setpoints[:, place]
         samples = np.empty(len(counts), self.profile.sample)
-        for name, column in self.columns.items():
+        for name, values in given.items():
             bounds = np.iinfo(self.profile.sample[name])
-            samples[name] = np.clip(counts[:, column], bounds.min, bounds.max)
+            samples[name] = np.clip(values, bounds.min, bounds.max)
         return samples
 
     def saturated(self, counts: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Return in which rows any converter is at its limit."""
         found = np.zeros(len(counts), np.bool_)
-        for column, (low, high) in self.converted.items():
-            found |= (counts[:, column] <= low) | (counts[:, column] >= high)
+        for name, (low, high) in self.converted.items():
+            column = counts[:, self.counted.index(name)]
+            found |= (column <= low) | (column >= high)
         return found
 
 
+REFERENCE_LOGIC = BoardLogic(
+    profile=REFERENCE,
+    counted=(*REFERENCE.input_names, "fsr", "command_e4"),
+    converted={"proximal": INT16, "distal": INT16, "current": INT16, "fsr": TWELVE_BITS},
+    stands={"target": "spindle"},
+)
+GRASPER_LOGIC = BoardLogic(
+    profile=GRASPER,
+    counted=(*GRASPER.input_names, *(f"command_{k}_e4" for k in MOTORS)),
+    converted={f"current_{k}": INT16 for k in MOTORS} | {f"force_{k}": TWELVE_BITS for k in MOTORS},
+    stands={f"target_{k}": f"motor_{k}" for k in MOTORS},
+)
+
+
 class Bench(Protocol):
-    """The physics behind a board, in ticks of its profile."""
+    """The physics behind a plain board, in ticks of its profile."""
 
     @property
     def advance(self) -> Callable[..., NDArray[np.int32]]:
         """Run closed-loop ticks and return the counts, a row a tick, int32.
 
-        Within a tick: the inputs are sampled into a row, the profile's tick
-        (`drivers.teensy.reference_board.drive_tick`, `drivers.teensy.grasper_board.grasper_tick`)
-        writes what the motors get behind them, the physics moves a tick. The result does not depend
-        on how ticks are divided between calls.
+        Within a tick: the inputs are sampled into a row, the controllers' commands are written
+        behind them, the physics moves a tick. The result does not depend on how ticks are divided
+        between calls.
 
         Args:
             ticks: Number of ticks.
             plan: A setpoint's fields, one array of shape (ticks,) each, int32; then the board's
-                `Drive`, changed in place.
+                `drivers.teensy.control.Controllers`, changed in place.
         """

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.device import Device
+from drivers.teensy.control import Controllers
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_board import COLUMNS, GRASPER_LOGIC, INPUTS, grasper_tick
-from drivers.teensy.logic import Drive
+from drivers.teensy.logic import GRASPER_LOGIC
 from drivers.teensy_master.driver import TeensyMaster
 from drivers.transport.faulty import Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
@@ -16,7 +16,7 @@ MIDDLE, REACH, TURN_HZ = 2048, 300.0, (0.5, 0.3, 0.7)
 
 
 class TurnedByHand:
-    """Implements the bench of a grasper's board; motors stand, potentiometers turn."""
+    """Implements `drivers.teensy.logic.Bench`; motors stand, potentiometers turn."""
 
     def __init__(self) -> None:
         self._ticks = 0
@@ -27,18 +27,16 @@ class TurnedByHand:
         one: NDArray[np.int32],
         two: NDArray[np.int32],
         three: NDArray[np.int32],
-        drive: Drive,
+        controllers: Controllers,
     ) -> NDArray[np.int32]:
         """Return the rows of the next ticks; commands move nothing."""
-        rows = np.zeros((ticks, COLUMNS), np.int32)
         time_s = (self._ticks + np.arange(ticks)) * GRASPER.tick_us * 1e-6
         self._ticks += ticks
-        for k, turn_hz in enumerate(TURN_HZ):
-            turned = np.sin(2 * np.pi * turn_hz * time_s)
-            rows[:, INPUTS - 3 + k] = np.round(MIDDLE + REACH * turned)
-        for row, targets in zip(rows, np.column_stack((one, two, three)), strict=True):
-            grasper_tick(row, targets, *drive.arrays)
-        return rows
+        turned = np.sin(2 * np.pi * np.outer(time_s, TURN_HZ))
+        pots = np.round(MIDDLE + REACH * turned).astype(np.int32)
+        still = np.zeros_like(pots)
+        commands = controllers.commands(np.column_stack((one, two, three)), still, still)
+        return np.hstack([still, still, pots, commands])
 
 
 def open_fake(faults: Faults) -> Device:

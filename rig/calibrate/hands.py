@@ -1,6 +1,7 @@
 """Simulated hands: they carry out the instruction of a step in the simulation."""
 
 import hashlib
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,28 +11,26 @@ from calibration.torque import STANDARD_GRAVITY_M_S2, weight_torque_n_m
 from drivers.ati_net.driver import AtiNet
 from drivers.ati_net.fake import RdtFake, fake_calibration
 from drivers.teensy.fake import PythonBoard
-from drivers.teensy.logic import Drive
-from drivers.teensy.reference_board import COLUMNS
 from drivers.transport.simulated import SimulatedTransport
 from rig.configuration.config import Config
 from rig.simulation.bench import REFERENCE_START_COUNT, SimulatedBench
 from rig.simulation.logger import plant_and_sensors
 from rig.simulation.press import PressedFsr, press_force_n
-from rig.simulation.sensors import DISTAL, FSR, PROXIMAL
+from rig.simulation.sensors import COMMAND_E4, DISTAL, FSR, PROXIMAL
 
 MARK_COUNT = 1000
 """Spindle count at which the simulated rig's index mark is lined up."""
 
 
 class HandledBench:
-    """The simulated bench with what hands add to it. Implements `drivers.teensy.fake.Bench`."""
+    """The simulated bench with what hands add to it. Implements `drivers.teensy.logic.Bench`."""
 
     def __init__(self, config: Config) -> None:
         simulation = config.simulation
         self._plant, self._sensors, self._effects = plant_and_sensors(simulation)
         self._inner = self._made(REFERENCE_START_COUNT, simulation.seed)
         self._seed = simulation.seed
-        self._added = np.zeros(COLUMNS)
+        self._added = np.zeros(COMMAND_E4)
         self._noise = np.random.default_rng(simulation.seed)
         self.fsr: PressedFsr | None = None
 
@@ -53,11 +52,9 @@ class HandledBench:
         at = MARK_COUNT + round(float(self._noise.normal(0.0, 1.5)))
         self._inner = self._made(at, self._seed)
 
-    def advance(
-        self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
-    ) -> NDArray[np.int32]:
-        """Run the bench with the actions of the hands; see `drivers.teensy.fake.Bench.advance`."""
-        rows = self._inner.advance(ticks, target, load_ma, drive)
+    def advance(self, ticks: int, *plan: Any) -> NDArray[np.int32]:
+        """Run the bench with the actions of the hands; see `drivers.teensy.logic.Bench.advance`."""
+        rows = self._inner.advance(ticks, *plan)
         for column in np.flatnonzero(self._added):
             limit = self._sensors.torque_limit_count
             moved = np.clip(np.round(rows[:, column] + self._added[column]), -limit - 1, limit)

@@ -10,16 +10,16 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.teensy import control, grasper_board
+from drivers.teensy import control
+from drivers.teensy.control import Controllers
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_board import COLUMNS, FORCE_MAX, INPUTS
-from drivers.teensy.logic import Drive
+from drivers.teensy.logic import FORCE_MAX
 from rig.grasper import plant as grasper_plant
 from rig.grasper.plant import PROTOTYPES, Prototype, vary
 from rig.simulation import noise
 from rig.simulation.bench import call_board_tick, hash_of
 
-MOTORS = GRASPER.motors
+MOTORS, INPUTS = GRASPER.motors, len(GRASPER.input_names)
 COUNTS_A_TURN = 2048
 """Of each motor's encoder."""
 FULL_SCALE_A = 2.0
@@ -50,17 +50,19 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
 
     @numba.njit(cache=True)
     def with_controllers(  # type: ignore[no-untyped-def]
-        state, rig, first_tick, targets, drive, rows
+        state, rig, first_tick, targets, memory, gains, rows
     ):
         _ = source
         axes, currents, _seed = rig
-        board, control_state, gains = drive
         for k in range(rows.shape[0]):
             row = rows[k]
             _sample(state, rig, first_tick + k, row)
-            grasper_board.grasper_tick(row, targets[k], board, control_state, gains)
             for motor in range(MOTORS):
-                command_e4 = row[grasper_board.COMMAND_E4 + motor]
+                count = row[motor]
+                command_e4 = control.control_tick(
+                    memory[motor], gains[motor], targets[k, motor], count, count
+                )
+                row[INPUTS + motor] = command_e4
                 currents[motor] = FULL_SCALE_A * 1e-4 * command_e4
                 grasper_plant.step_axis(state[motor], axes[motor], currents[motor], 1.0)
 
@@ -85,9 +87,7 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
     return with_controllers, with_board
 
 
-_run_with_controllers, _run_with_board = _build_loops(
-    hash_of((control, grasper_board, grasper_plant, noise))
-)
+_run_with_controllers, _run_with_board = _build_loops(hash_of((control, grasper_plant, noise)))
 
 
 class GrasperBench:
@@ -118,14 +118,13 @@ class GrasperBench:
         return np.array(contact) / self._axes[:, _ARM]
 
     def advance(self, ticks: int, *plan: Any) -> NDArray[np.int32]:
-        """Run ticks with the controllers inside; see `drivers.teensy.fake.Bench.advance`."""
-        *targets, drive = plan
-        assert isinstance(drive, Drive)  # noqa: S101
-        rows = np.zeros((ticks, COLUMNS), np.int32)
+        """Run ticks with the controllers inside; see `drivers.teensy.logic.Bench.advance`."""
+        *targets, controllers = plan
+        assert isinstance(controllers, Controllers)  # noqa: S101
+        rows = np.zeros((ticks, INPUTS + MOTORS), np.int32)
         wanted = np.ascontiguousarray(np.stack(targets, axis=1), np.int32)
-        _run_with_controllers(
-            self._state, self._rig, self._ticks, wanted, tuple(drive.arrays), rows
-        )
+        memory, gains = controllers.state, controllers.gains
+        _run_with_controllers(self._state, self._rig, self._ticks, wanted, memory, gains, rows)
         self._ticks += ticks
         return rows
 

@@ -16,9 +16,8 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from drivers.teensy import control, reference_board
-from drivers.teensy.logic import Drive
-from drivers.teensy.reference_board import COLUMNS
+from drivers.teensy import control
+from drivers.teensy.control import Controllers
 from estimation.recording import FloatArray
 from rig.errors import UsageError
 from rig.simulation import (
@@ -48,8 +47,8 @@ class BenchInputError(UsageError):
 
 
 SOURCES = (
-    control, reference_board, hidden, hidden_cable, hidden_drive, hidden_sensors, noise,
-    parameters, places, plant, sensors,
+    control, hidden, hidden_cable, hidden_drive, hidden_sensors, noise, parameters, places, plant,
+    sensors,
 )  # fmt: skip
 """What the compiled loops are made of."""
 
@@ -95,19 +94,21 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
 
     @numba.njit(cache=True)
     def with_controller(  # type: ignore[no-untyped-def]
-        state, rig, first_tick, commands, drive, rows
+        state, rig, first_tick, setpoints, controller, rows
     ):
         _ = source
         p, s, table, seed = rig
         effects = table[0]
-        target, load_ma = commands
-        board, control_state, gains = drive
+        target, load_ma = setpoints
+        memory, gains = controller
         for k in range(rows.shape[0]):
             row = rows[k]
             sensors.sample(state, s, effects, seed, first_tick + k, row)
-            reference_board.drive_tick(row, target[k], load_ma[k], board, control_state, gains)
+            row[sensors.COMMAND_E4] = control.control_tick(
+                memory, gains, target[k], row[sensors.SPINDLE], row[sensors.MOTOR]
+            )
             current = -p.command_full_scale_a * 1e-4 * row[sensors.COMMAND_E4]
-            plant.step_tick(state, p, effects, current, 1e-3 * row[sensors.LOAD_MA])
+            plant.step_tick(state, p, effects, current, 1e-3 * load_ma[k])
 
     @numba.njit(cache=True)
     def with_board(  # type: ignore[no-untyped-def]
@@ -179,11 +180,16 @@ class SimulatedBench:
         per_rad = self.sensors.spindle_count_per_turn / sensors.TURN_RAD
         target = np.round(-target_angle_rad * per_rad).astype(np.int32)
         load_ma = np.round(1e3 * load_command_a).astype(np.int32)
-        counts = self.advance(target.size, target, load_ma, Drive.armed(REFERENCE_GAINS))
-        return sensors.columns_of(counts, target, self.sensors)
+        controllers = Controllers.fresh(REFERENCE_GAINS)
+        counts = self.advance(target.size, target, load_ma, controllers)
+        return sensors.columns_of(counts, target, load_ma, self.sensors)
 
     def advance(
-        self, ticks: int, target: NDArray[np.int32], load_ma: NDArray[np.int32], drive: Drive
+        self,
+        ticks: int,
+        target: NDArray[np.int32],
+        load_ma: NDArray[np.int32],
+        controllers: Controllers,
     ) -> NDArray[np.int32]:
         """Run closed-loop ticks of 1 ms with the plain board's controller, without guards.
 
@@ -191,10 +197,10 @@ class SimulatedBench:
             ticks: Number of ticks.
             target: Target of the spindle, encoder counts, shape (ticks,).
             load_ma: Current of the load motor, mA, shape (ticks,).
-            drive: The board's state and gains, changed in place.
+            controllers: The spindle's controller, changed in place.
 
         Returns:
-            Counts with raw signs, shape (ticks, 11), as in `drivers.teensy.reference_board`.
+            Counts with raw signs, shape (ticks, 8): seven inputs and the command.
 
         Raises:
             BenchInputError: A shape does not fit.
@@ -204,11 +210,10 @@ class SimulatedBench:
                 raise BenchInputError(
                     f"{name} has shape {array.shape}.", f"{ticks} ticks need shape ({ticks},)."
                 )
-        rows = np.empty((ticks, COLUMNS), np.int32)
-        commands = np.ascontiguousarray(target, np.int32), np.ascontiguousarray(load_ma, np.int32)
-        _run_with_controller(
-            self._state, self._rig, self.ticks_done, commands, tuple(drive.arrays), rows
-        )
+        rows = np.empty((ticks, sensors.COMMAND_E4 + 1), np.int32)
+        setpoints = np.ascontiguousarray(target, np.int32), np.ascontiguousarray(load_ma, np.int32)
+        controller = controllers.state[0], controllers.gains[0]
+        _run_with_controller(self._state, self._rig, self.ticks_done, setpoints, controller, rows)
         self.ticks_done += ticks
         return rows
 

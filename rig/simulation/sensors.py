@@ -18,7 +18,7 @@ from rig.simulation.hidden import STRENGTH
 from rig.simulation.noise import normal
 from rig.simulation.parameters import SensorParameters
 
-MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT, FSR, COMMAND_E4, LOAD_MA = range(9)
+MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT, FSR, COMMAND_E4 = range(8)
 """Columns of a row of counts; the board is given the first seven."""
 
 TURN_RAD = 2.0 * np.pi
@@ -132,9 +132,12 @@ def spindle_count_of(angle_rad: float, sensors: SensorParameters) -> int:
 
 
 def columns_of(
-    counts: NDArray[np.int32], target_count: NDArray[np.int32], sensors: SensorParameters
+    counts: NDArray[np.int32],
+    target_count: NDArray[np.int32],
+    load_ma: NDArray[np.int32],
+    sensors: SensorParameters,
 ) -> dict[str, NDArray[np.float64]]:
-    """Return counts, shape (n, 9), and the spindle's target, shape (n,), as channels in SI units.
+    """Return counts, shape (n, 8), and the setpoints, shape (n,), as channels in SI units.
 
     They are closing positive, with the nominal scales; offsets and drift of the sensors stay in.
     """
@@ -149,6 +152,6 @@ def columns_of(
         "distal_torque_n_m": -rows[:, DISTAL] * sensors.torque_n_m_per_count,
         "motor_current_a": rows[:, CURRENT] * sensors.current_a_per_count,
         "motor_command_ratio": -rows[:, COMMAND_E4] * 1e-4,
-        "load_command_a": rows[:, LOAD_MA] * 1e-3,
+        "load_command_a": load_ma.astype(np.float64) * 1e-3,
         "fsr_v": rows[:, FSR] * 3.3 / 4095.0,
     }

@@ -16,7 +16,7 @@ from drivers.registry import DRIVERS, Driver, drivers, fakes, open_device
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.grasper import GRASPER
-from drivers.teensy.grasper_board import GRASPER_LOGIC
+from drivers.teensy.logic import GRASPER_LOGIC
 from drivers.teensy_master.fake import TurnedByHand
 from drivers.transport.faulty import Fault, Faults, FaultyTransport
 from drivers.transport.simulated import SimulatedTransport

@@ -12,7 +12,6 @@ from drivers.teensy import protocol
 from drivers.teensy.core import FirmwareBoard
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.grasper import GRASPER, AxisLimits, GrasperLimits
-from drivers.teensy.grasper_board import INPUTS
 from drivers.teensy.protocol import Kind, Result, SafeState, Trip
 from drivers.transport.simulated import SimulatedTransport
 from tests.drivers.raw_host import RawHost, ScriptedBench
@@ -30,7 +29,7 @@ def scripted(inputs: NDArray[np.int32]) -> ScriptedBench:
 def moving(ticks: int) -> NDArray[np.int32]:
     """Inputs in which every motor turns and every sensor lives."""
     tick = np.arange(ticks)
-    inputs = np.zeros((ticks, INPUTS), np.int32)
+    inputs = np.zeros((ticks, len(GRASPER.input_names)), np.int32)
     for k in range(3):
         inputs[:, k] = (5 - 2 * k) * tick
         inputs[:, 3 + k] = tick * (7 + k) % 23 - 11

@@ -23,8 +23,8 @@ from benchmarks.reliability.encoder_faults import (
 from benchmarks.reliability.faults import SENSOR_FAULTS, inject
 from benchmarks.reliability.targets import TARGETS
 from drivers.registry import fakes
+from drivers.teensy.control import Controllers
 from drivers.teensy.core import CoreGuard, FirmwareBoard
-from drivers.teensy.logic import Drive
 from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, Kind, Result, Trip
 from drivers.transport.faulty import Fault
 from rig.configuration.config import load_config
@@ -83,7 +83,7 @@ def counts_of(seed: int, plan: RunPlan) -> np.ndarray:
     load_ma = np.round(1e3 * load_a).astype(np.int32)
     plant = vary(PlantParameters(), seed, 0.15)
     bench = SimulatedBench(plant, effects=[draw(seed)], seed=seed, start_count=int(target[0]))
-    return bench.advance(target.size, target, load_ma, Drive.armed(REFERENCE_GAINS))
+    return bench.advance(target.size, target, load_ma, Controllers.fresh(REFERENCE_GAINS))
 
 
 @pytest.mark.parametrize("seed", [13, 17, 24, 26, 36])

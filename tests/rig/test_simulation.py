@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivers.teensy import control
-from drivers.teensy.logic import Drive
+from drivers.teensy.control import Controllers
 from rig.protocols import trajectory
 from rig.simulation import places, sensors
 from rig.simulation.bench import BenchInputError, SimulatedBench
@@ -29,7 +29,7 @@ LOAD = np.full(TICKS, 400, np.int32)
 def run(seed: int, cuts: tuple[int, ...] = (), **options: object) -> tuple[np.ndarray, np.ndarray]:
     """Counts and final state of one run, advanced in pieces."""
     bench = SimulatedBench(seed=seed, **options)
-    drive = Drive.armed(GAINS)
+    drive = Controllers.fresh(GAINS)
     edges = [0, *sorted(cuts), TICKS]
     parts = [
         bench.advance(b - a, TARGET[a:b], LOAD[a:b], drive) for a, b in itertools.pairwise(edges)
@@ -49,8 +49,8 @@ def test_a_seed_gives_the_same_bytes_however_the_run_is_cut(cuts):
 
 def test_sensors_are_sampled_before_the_command_acts():
     none = np.zeros(2, np.int32)
-    rows = SimulatedBench().advance(2, none, none, Drive.armed(GAINS))
-    at_rest = SimulatedBench().advance(2, none, none, Drive.idle())
+    rows = SimulatedBench().advance(2, none, none, Controllers.fresh(GAINS))
+    at_rest = SimulatedBench().advance(2, none, none, Controllers.idle())
     np.testing.assert_array_equal(rows[0, :7], at_rest[0, :7])
     assert rows[0, 7] != 0
     assert rows[1, 5] > rows[0, 5] + 100  # the current has answered one tick later
@@ -58,7 +58,7 @@ def test_sensors_are_sampled_before_the_command_acts():
 
 def test_shapes_that_do_not_fit_are_refused():
     with pytest.raises(BenchInputError, match="target has shape"):
-        SimulatedBench().advance(5, TARGET, LOAD[:5], Drive.idle())
+        SimulatedBench().advance(5, TARGET, LOAD[:5], Controllers.idle())
     with pytest.raises(BenchInputError, match="address 0x0"):
         SimulatedBench().advance_with_board(5, 0, 0, 0)
 
@@ -111,7 +111,7 @@ def let_go(parameters: PlantParameters, place: int, by_rad: float, ticks: int) -
     bench._state[place] += by_rad
     none, states = np.zeros(1, np.int32), [bench.state]
     for _ in range(ticks):
-        bench.advance(1, none, none, Drive.idle())
+        bench.advance(1, none, none, Controllers.idle())
         states.append(bench.state)
     return states
 
@@ -166,7 +166,7 @@ def test_friction_holds_without_creep_or_chatter():
     rest_rad = -1000 * 2 * np.pi / 8192
     closing = trajectory.minimum_jerk(rest_rad, rest_rad + 0.4, 1.0)
     bench.play(closing, np.full(closing.size, 0.1))
-    idle, drive = np.zeros(300, np.int32), Drive.idle()
+    idle, drive = np.zeros(300, np.int32), Controllers.idle()
     bench.advance(300, idle, idle, drive)
     before = bench.state
     bench.advance(300, idle, idle, drive)
@@ -194,7 +194,7 @@ def test_the_drive_limits_its_current():
     bench = SimulatedBench(start_count=0)
     far = np.full(200, -20000, np.int32)
     gains = np.array([20.0, 0.0, 0.0, 1.0, 10000.0])
-    bench.advance(200, far, np.zeros(200, np.int32), Drive.armed(gains))
+    bench.advance(200, far, np.zeros(200, np.int32), Controllers.fresh(gains))
     assert bench.state[places.CURRENT] == pytest.approx(0.56)
 
 
@@ -234,7 +234,7 @@ QUIET = SensorParameters(
 def rest(parameters: SensorParameters, ticks: int) -> np.ndarray:
     """Counts of the disarmed rig at rest."""
     idle = np.zeros(ticks, np.int32)
-    return SimulatedBench(None, parameters).advance(ticks, idle, idle, Drive.idle())
+    return SimulatedBench(None, parameters).advance(ticks, idle, idle, Controllers.idle())
 
 
 def test_channels_are_closing_positive_and_agree():
@@ -276,7 +276,7 @@ def test_converters_saturate_at_their_limits():
     narrow = SensorParameters(torque_limit_count=400.0, current_limit_count=50.0)
     close = np.round(1366 - 0.4 * np.arange(1000)).astype(np.int32)
     loads = np.full(1000, 500, np.int32)
-    rows = SimulatedBench(None, narrow).advance(1000, close, loads, Drive.armed(GAINS))
+    rows = SimulatedBench(None, narrow).advance(1000, close, loads, Controllers.fresh(GAINS))
     assert rows[:, sensors.PROXIMAL].max() == 400
     assert rows[:, sensors.DISTAL].min() == -401
     assert rows[:, sensors.CURRENT].max() == 50

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.teensy.logic import Drive
+from drivers.teensy.control import Controllers
 from rig.protocols import trajectory
 from rig.simulation import places
 from rig.simulation.bench import SimulatedBench
@@ -104,7 +104,7 @@ def test_no_effect_drives_the_rig_by_itself(name):
     bench = SimulatedBench(effects=[HiddenEffect(name, 2.0)], start_count=683)
     idle = np.zeros(2000, np.int32)
     bench._state[places.JAW_ANGLE] -= 0.1
-    bench.advance(2000, idle, idle, Drive.idle())
+    bench.advance(2000, idle, idle, Controllers.idle())
     speeds = bench.state[[places.MOTOR_SPEED, places.SPINDLE_SPEED, places.JAW_SPEED]]
     np.testing.assert_allclose(speeds, 0.0, atol=1e-3)
 
