@@ -14,7 +14,6 @@ from estimation.arm.effects import slip
 from estimation.arm.motion import Motion
 from estimation.recording import FloatArray
 from rig.simulation.forms import (
-    BANK,
     Random,
     bank,
     course,
@@ -74,11 +73,7 @@ def _loop(random: Random, reference: Joint) -> Torque:
     if kind == "bouc_wen":
         turn, sharpness, loads = reach
         return lambda j: bouc_wen(j.angle[:, None], np.array([turn]), sharpness, loads)[:, 0]
-    if kind == "stops":
-        return lambda j: np.column_stack([slip(j.angle[:, None], r)[:, 0] for r in reach]) @ weights
-    middle = np.median(reference.angle) + 0.4 * span * random.uniform(-1.0, 1.0, BANK)
-    on, off = reach[:BANK] + middle, reach[BANK:] + middle
-    return lambda j: _relays(j.angle, on, off) @ weights
+    return lambda j: np.column_stack([slip(j.angle[:, None], r)[:, 0] for r in reach]) @ weights
 
 
 def _friction(
@@ -131,8 +126,7 @@ def _beyond(random: Random, reference: Joint) -> Torque:
 def _switched(random: Random, reference: Joint) -> Torque:
     fast = np.percentile(np.abs(reference.speed), 99.5)
     on, off = random.uniform(0.35, 0.6) * fast, random.uniform(0.08, 0.25) * fast
-    thresholds = np.array([on]), np.array([off])
-    return _signed(reference, lambda j: _relays(np.abs(j.speed), *thresholds)[:, 0])
+    return _signed(reference, lambda j: _relay(np.abs(j.speed), on, off))
 
 
 _falling = _friction("speed", lambda r: falling(r, grid() / r.uniform(0.05, 0.3)), _sized)
@@ -206,11 +200,11 @@ def _joint(motion: Motion, k: int) -> Joint:
     )
 
 
-def _relays(x: FloatArray, on: FloatArray, off: FloatArray) -> FloatArray:
-    """Return relays side by side, shape (n, relays); each keeps its state between thresholds."""
-    switched = (x[:, None] > on).astype(np.float64) - (x[:, None] < off)
-    at = np.where(switched != 0, np.arange(len(x))[:, None], 0)
-    return np.take_along_axis(switched, np.maximum.accumulate(at, axis=0), axis=0)
+def _relay(x: FloatArray, on: float, off: float) -> FloatArray:
+    """Return a relay, shape (n,), which keeps its state between its thresholds."""
+    switched = (x > on).astype(np.float64) - (x < off)
+    at = np.where(switched != 0, np.arange(len(x)), 0)
+    return switched[np.maximum.accumulate(at)]
 
 
 def bouc_wen(
