@@ -63,7 +63,6 @@ class PythonCanBus(HostLink):
         super().__init__(url)
         self._bus = bus
         self._own: deque[tuple[int, bytes]] | None = deque(maxlen=_ECHOES_KEPT) if echoes else None
-        self._closed = False
         self.counters = CanCounters()
         """Counters of the bus."""
 
@@ -108,11 +107,8 @@ class PythonCanBus(HostLink):
 
     def close(self) -> None:
         """Let go of the interface."""
-        if self._closed:
-            return
-        self._closed = True
-        self._closes()
-        self._bus.shutdown()  # not every interface bears a second one
+        if self._closes():
+            self._bus.shutdown()  # not every interface bears a second one
 
     def _is_echo(self, message: can.Message) -> bool:
         key = (message.arbitration_id, bytes(message.data))

@@ -47,6 +47,7 @@ class HostLink:
     def __init__(self, url: str) -> None:
         self.url = url
         self._lost: LinkLostError | None = None
+        self._closed = False
 
     @property
     def now_s(self) -> float:
@@ -60,8 +61,11 @@ class HostLink:
         self._lost = kind(what, why, fix)
         return self._lost
 
-    def _closes(self) -> None:
+    def _closes(self) -> bool:
+        """Let every later call raise an error; return whether it was open until now."""
+        was_open, self._closed = not self._closed, True
         self._lost = self._lost or LinkLostError(f"{self.url} is closed.")
+        return was_open
 
     def _require_link(self) -> None:
         if self._lost is not None:

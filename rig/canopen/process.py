@@ -11,11 +11,11 @@ import select
 import socket
 import subprocess
 import sys
-import time
 
 from drivers import errors
 from drivers.epos4.faults import DriveFaultError
 from drivers.errors import DriverError, LinkLostError, LinkTimeoutError
+from drivers.transport.transport import HostLink
 from rig.configuration.config import Config
 
 STARTS_S = 90.0
@@ -31,7 +31,7 @@ _KINDS: dict[str, type[DriverError]] = {
 } | {"DriveFaultError": DriveFaultError}
 
 
-class CanopenProcess:
+class CanopenProcess(HostLink):
     """A transport to such a process of a rig with an EPOS4, which it starts and ends.
 
     Raises:
@@ -39,7 +39,7 @@ class CanopenProcess:
     """
 
     def __init__(self, config: Config) -> None:
-        self.url = config.logger.url
+        super().__init__(config.logger.url)
         ours, theirs = socket.socketpair()
         with theirs:
             # a group of its own: what ends this program must not end that before the drive is safe
@@ -56,7 +56,6 @@ class CanopenProcess:
         assert self.process.stdout is not None  # noqa: S101
         self._told = self.process.stdout.fileno()
         self._text = b""
-        self._closed = False
         with self.process.stdin as there:
             there.write(config.model_dump_json().encode())
         try:
@@ -64,11 +63,6 @@ class CanopenProcess:
         except BaseException:
             self.close()
             raise
-
-    @property
-    def now_s(self) -> float:
-        """The host's monotonic clock, seconds."""
-        return time.monotonic()
 
     def read(self, timeout_s: float) -> bytes:
         """Return the bytes that are there, waiting at most `timeout_s` for the first.
@@ -110,9 +104,8 @@ class CanopenProcess:
         Raises:
             DriverError: The drive has not confirmed that it is disarmed.
         """
-        if self._closed:
+        if not self._closes():
             return
-        self._closed = True
         self._socket.close()
         try:
             self.process.wait(ENDS_S)
@@ -126,9 +119,9 @@ class CanopenProcess:
             _raise_if_error(line)
 
     def _wait_until_ready(self) -> None:
-        give_up_s = time.monotonic() + STARTS_S
+        give_up_s = self.now_s + STARTS_S
         while True:
-            left_s = give_up_s - time.monotonic()
+            left_s = give_up_s - self.now_s
             if not select.select([self._told], [], [], max(0.0, left_s))[0]:
                 raise LinkTimeoutError(
                     f"The drive at {self.url} was not set up in {STARTS_S:g} s.",
@@ -150,10 +143,6 @@ class CanopenProcess:
         for line in lines:
             _raise_if_error(line)
         return bool(lines)
-
-    def _require_link(self) -> None:
-        if self._closed:
-            raise LinkLostError(f"{self.url} is closed.")
 
     def _gone(self) -> LinkLostError:
         return LinkLostError(

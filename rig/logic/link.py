@@ -17,10 +17,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from drivers.device import Channel, Drive
-from drivers.errors import LinkLostError
 from drivers.teensy.core import BoardStart, FirmwareBoard
 from drivers.teensy.protocol import MISSING, TOP
 from drivers.transport.simulated import Pace
+from drivers.transport.transport import HostLink
 from rig.logic.latch import TripLatch
 
 READ_S = 0.02
@@ -104,7 +104,7 @@ class DriveBench:
         self.samples.append((tick_us, values, int(batch.flags[-1])))
 
 
-class LogicLink:
+class LogicLink(HostLink):
     """A link to the logic of a logger, with the interface of `drivers.transport.Transport`.
 
     Args:
@@ -129,12 +129,11 @@ class LogicLink:
         pace: float | None = None,
         latch: TripLatch | None = None,
     ) -> None:
-        self.url = url
+        super().__init__(url)
         self._device = device
         self._period_us = round(1e6 / rate_hz)
         self._ticks_a_read = max(1, round(READ_S * rate_hz))
         self._pace = Pace(pace)
-        self._closed = False
         identity = device.identify()
         device.start()
         self.bench = DriveBench(device)
@@ -212,8 +211,7 @@ class LogicLink:
         Raises:
             DisarmUnconfirmedError: The bus is closed, but the drive's state is unknown.
         """
-        if not self._closed:
-            self._closed = True
+        if self._closes():
             self._device.close()
 
     def _tick(self) -> None:
@@ -242,7 +240,3 @@ class LogicLink:
         if missed > 0:
             self._board.skip(missed)
             self._ticks += missed
-
-    def _require_link(self) -> None:
-        if self._closed:
-            raise LinkLostError(f"{self.url} is closed.")
