@@ -18,14 +18,14 @@ def measure() -> list[Ratio]:
     """Time closed-loop grasps at 0.3 Hz, plain and with the four dearest hidden effects."""
     ticks = round(1e3 * DURATION_S)
     phase = 2.0 * np.pi * 0.3 * 1e-3 * np.arange(ticks)
-    target = np.round(683.0 * (1.0 + np.cos(phase))).astype(np.int32)
-    load_ma = np.full(ticks, 500, np.int32)
+    target = np.round(683.0 * (1.0 + np.cos(phase)))
+    setpoints = np.column_stack((target, np.full(ticks, 500))).astype(np.int32)
 
     def seconds(effects: list[HiddenEffect], plant: PlantParameters | None = None) -> float:
         bench = SimulatedBench(plant, effects=effects)
         drive = Controllers.fresh(REFERENCE_GAINS)
-        bench.advance(ticks, target, load_ma, drive)  # compiles
-        return best_of(lambda: bench.advance(ticks, target, load_ma, drive), 5)
+        bench.advance(setpoints, drive)  # compiles
+        return best_of(lambda: bench.advance(setpoints, drive), 5)
 
     plain_s = seconds([])
     loaded_s = seconds([HiddenEffect(name) for name in DEAREST])

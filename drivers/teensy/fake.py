@@ -260,7 +260,7 @@ class PythonBoard(Outbox):
         engaged = self._armed and (self._held is not None or len(self._queued) > 0)
         setpoints, fed = self._play(ticks, engaged)
         controllers = self._controllers if engaged else self._idle
-        counts = self._bench.advance(ticks, *np.ascontiguousarray(setpoints.T), controllers)
+        counts = self._bench.advance(setpoints, controllers)
         status = np.full(ticks, self._status, np.uint16)
         if self._armed:
             status[fed:] |= protocol.STATUS_QUEUE_DRY

@@ -17,22 +17,16 @@ class HandMovedBench:
     def __init__(self) -> None:
         self._ticks = 0
 
-    def advance(
-        self,
-        ticks: int,
-        target: NDArray[np.int32],
-        load_ma: NDArray[np.int32],
-        controllers: Controllers,
-    ) -> NDArray[np.int32]:
+    def advance(self, setpoints: NDArray[np.int32], controllers: Controllers) -> NDArray[np.int32]:
         """Turn the shaft to and fro once a second; see `drivers.teensy.logic.Bench.advance`."""
-        time_s = (self._ticks + np.arange(ticks)) * 1e-3
-        self._ticks += ticks
+        time_s = (self._ticks + np.arange(len(setpoints))) * 1e-3
+        self._ticks += len(setpoints)
         turn = np.sin(2 * np.pi * time_s)
         current = 3 * np.cos(2 * np.pi * 50 * time_s)
         fsr = 300 * np.maximum(turn, 0.0)
         motor, spindle, *others = (size * turn for size in (3500, -200, 80, 900, -700))
         inputs = np.stack([motor, spindle, *others, current, fsr], axis=1).astype(np.int32)
-        commands = controllers.commands(target[:, None], inputs[:, [1]], inputs[:, [0]])
+        commands = controllers.commands(setpoints[:, [0]], inputs[:, [1]], inputs[:, [0]])
         return np.hstack([inputs, commands])
 
 

@@ -1,12 +1,13 @@
 """What the plain simulated board makes of a bench's counts, by profile."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.teensy.control import Controllers
 from drivers.teensy.grasper import GRASPER, MOTORS
 from drivers.teensy.profile import Profile
 from drivers.teensy.reference import REFERENCE
@@ -78,16 +79,14 @@ GRASPER_LOGIC = BoardLogic(
 class Bench(Protocol):
     """The physics behind a plain board, in ticks of its profile."""
 
-    @property
-    def advance(self) -> Callable[..., NDArray[np.int32]]:
-        """Run closed-loop ticks and return the counts, a row a tick, int32.
+    def advance(self, setpoints: NDArray[np.int32], controllers: Controllers) -> NDArray[np.int32]:
+        """Run a closed-loop tick for each setpoint and return the counts, a row a tick.
 
         Within a tick: the inputs are sampled into a row, the controllers' commands are written
         behind them, the physics moves a tick. The result does not depend on how ticks are divided
         between calls.
 
         Args:
-            ticks: Number of ticks.
-            plan: A setpoint's fields, one array of shape (ticks,) each, int32; then the board's
-                `drivers.teensy.control.Controllers`, changed in place.
+            setpoints: Shape (ticks, fields), in the order of the profile's setpoint.
+            controllers: The board's, changed in place.
         """

@@ -21,21 +21,14 @@ class TurnedByHand:
     def __init__(self) -> None:
         self._ticks = 0
 
-    def advance(
-        self,
-        ticks: int,
-        one: NDArray[np.int32],
-        two: NDArray[np.int32],
-        three: NDArray[np.int32],
-        controllers: Controllers,
-    ) -> NDArray[np.int32]:
+    def advance(self, setpoints: NDArray[np.int32], controllers: Controllers) -> NDArray[np.int32]:
         """Return the rows of the next ticks; commands move nothing."""
-        time_s = (self._ticks + np.arange(ticks)) * GRASPER.tick_us * 1e-6
-        self._ticks += ticks
+        time_s = (self._ticks + np.arange(len(setpoints))) * GRASPER.tick_us * 1e-6
+        self._ticks += len(setpoints)
         turned = np.sin(2 * np.pi * np.outer(time_s, TURN_HZ))
         pots = np.round(MIDDLE + REACH * turned).astype(np.int32)
         still = np.zeros_like(pots)
-        commands = controllers.commands(np.column_stack((one, two, three)), still, still)
+        commands = controllers.commands(setpoints, still, still)
         return np.hstack([still, still, pots, commands])
 
 

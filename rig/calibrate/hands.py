@@ -1,7 +1,6 @@
 """Simulated hands: they carry out the instruction of a step in the simulation."""
 
 import hashlib
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +9,7 @@ from calibration.procedure import Step
 from calibration.torque import STANDARD_GRAVITY_M_S2, weight_torque_n_m
 from drivers.ati_net.driver import AtiNet
 from drivers.ati_net.fake import RdtFake, fake_calibration
+from drivers.teensy.control import Controllers
 from drivers.teensy.fake import PythonBoard
 from drivers.transport.simulated import SimulatedTransport
 from rig.configuration.config import Config
@@ -52,15 +52,15 @@ class HandledBench:
         at = MARK_COUNT + round(float(self._noise.normal(0.0, 1.5)))
         self._inner = self._made(at, self._seed)
 
-    def advance(self, ticks: int, *plan: Any) -> NDArray[np.int32]:
+    def advance(self, setpoints: NDArray[np.int32], controllers: Controllers) -> NDArray[np.int32]:
         """Run the bench with the actions of the hands; see `drivers.teensy.logic.Bench.advance`."""
-        rows = self._inner.advance(ticks, *plan)
+        rows = self._inner.advance(setpoints, controllers)
         for column in np.flatnonzero(self._added):
             limit = self._sensors.torque_limit_count
             moved = np.clip(np.round(rows[:, column] + self._added[column]), -limit - 1, limit)
             rows[:, column] = moved.astype(np.int32)
         if self.fsr is not None:
-            rows[:, FSR] = self.fsr.counts(ticks)
+            rows[:, FSR] = self.fsr.counts(len(setpoints))
         return rows
 
 

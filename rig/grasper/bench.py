@@ -4,7 +4,6 @@ Within a tick of 0.5 ms: sensors are sampled, the board computes from them, the 
 """
 
 import hashlib
-from typing import Any
 
 import numba
 import numpy as np
@@ -117,15 +116,12 @@ class GrasperBench:
         ]
         return np.array(contact) / self._axes[:, _ARM]
 
-    def advance(self, ticks: int, *plan: Any) -> NDArray[np.int32]:
+    def advance(self, setpoints: NDArray[np.int32], controllers: Controllers) -> NDArray[np.int32]:
         """Run ticks with the controllers inside; see `drivers.teensy.logic.Bench.advance`."""
-        *targets, controllers = plan
-        assert isinstance(controllers, Controllers)  # noqa: S101
-        rows = np.zeros((ticks, INPUTS + MOTORS), np.int32)
-        wanted = np.ascontiguousarray(np.stack(targets, axis=1), np.int32)
+        rows = np.zeros((len(setpoints), INPUTS + MOTORS), np.int32)
         memory, gains = controllers.state, controllers.gains
-        _run_with_controllers(self._state, self._rig, self._ticks, wanted, memory, gains, rows)
-        self._ticks += ticks
+        _run_with_controllers(self._state, self._rig, self._ticks, setpoints, memory, gains, rows)
+        self._ticks += len(setpoints)
         return rows
 
     def advance_with_board(

@@ -99,16 +99,15 @@ def _build_loops(source: str) -> tuple[Callable[..., None], Callable[..., None]]
         _ = source
         p, s, table, seed = rig
         effects = table[0]
-        target, load_ma = setpoints
         memory, gains = controller
         for k in range(rows.shape[0]):
             row = rows[k]
             sensors.sample(state, s, effects, seed, first_tick + k, row)
             row[sensors.COMMAND_E4] = control.control_tick(
-                memory, gains, target[k], row[sensors.SPINDLE], row[sensors.MOTOR]
+                memory, gains, setpoints[k, 0], row[sensors.SPINDLE], row[sensors.MOTOR]
             )
             current = -p.command_full_scale_a * 1e-4 * row[sensors.COMMAND_E4]
-            plant.step_tick(state, p, effects, current, 1e-3 * load_ma[k])
+            plant.step_tick(state, p, effects, current, 1e-3 * setpoints[k, 1])
 
     @numba.njit(cache=True)
     def with_board(  # type: ignore[no-untyped-def]
@@ -178,43 +177,26 @@ class SimulatedBench:
         `sensors.columns_of`.
         """
         per_rad = self.sensors.spindle_count_per_turn / sensors.TURN_RAD
-        target = np.round(-target_angle_rad * per_rad).astype(np.int32)
-        load_ma = np.round(1e3 * load_command_a).astype(np.int32)
-        controllers = Controllers.fresh(REFERENCE_GAINS)
-        counts = self.advance(target.size, target, load_ma, controllers)
-        return sensors.columns_of(counts, target, load_ma, self.sensors)
+        asked = np.column_stack((-target_angle_rad * per_rad, 1e3 * load_command_a))
+        setpoints = np.round(asked).astype(np.int32)
+        counts = self.advance(setpoints, Controllers.fresh(REFERENCE_GAINS))
+        return sensors.columns_of(counts, setpoints, self.sensors)
 
-    def advance(
-        self,
-        ticks: int,
-        target: NDArray[np.int32],
-        load_ma: NDArray[np.int32],
-        controllers: Controllers,
-    ) -> NDArray[np.int32]:
+    def advance(self, setpoints: NDArray[np.int32], controllers: Controllers) -> NDArray[np.int32]:
         """Run closed-loop ticks of 1 ms with the plain board's controller, without guards.
 
         Args:
-            ticks: Number of ticks.
-            target: Target of the spindle, encoder counts, shape (ticks,).
-            load_ma: Current of the load motor, mA, shape (ticks,).
+            setpoints: Target of the spindle, encoder counts, and current of the load motor, mA;
+                shape (ticks, 2).
             controllers: The spindle's controller, changed in place.
 
         Returns:
             Counts with raw signs, shape (ticks, 8): seven inputs and the command.
-
-        Raises:
-            BenchInputError: A shape does not fit.
         """
-        for name, array in (("target", target), ("load_ma", load_ma)):
-            if array.shape != (ticks,):
-                raise BenchInputError(
-                    f"{name} has shape {array.shape}.", f"{ticks} ticks need shape ({ticks},)."
-                )
-        rows = np.empty((ticks, sensors.COMMAND_E4 + 1), np.int32)
-        setpoints = np.ascontiguousarray(target, np.int32), np.ascontiguousarray(load_ma, np.int32)
+        rows = np.empty((len(setpoints), sensors.COMMAND_E4 + 1), np.int32)
         controller = controllers.state[0], controllers.gains[0]
         _run_with_controller(self._state, self._rig, self.ticks_done, setpoints, controller, rows)
-        self.ticks_done += ticks
+        self.ticks_done += len(setpoints)
         return rows
 
     def advance_with_board(

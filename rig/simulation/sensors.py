@@ -132,12 +132,9 @@ def spindle_count_of(angle_rad: float, sensors: SensorParameters) -> int:
 
 
 def columns_of(
-    counts: NDArray[np.int32],
-    target_count: NDArray[np.int32],
-    load_ma: NDArray[np.int32],
-    sensors: SensorParameters,
+    counts: NDArray[np.int32], setpoints: NDArray[np.int32], sensors: SensorParameters
 ) -> dict[str, NDArray[np.float64]]:
-    """Return counts, shape (n, 8), and the setpoints, shape (n,), as channels in SI units.
+    """Return counts, shape (n, 8), and setpoints, shape (n, 2), as channels in SI units.
 
     They are closing positive, with the nominal scales; offsets and drift of the sensors stay in.
     """
@@ -147,11 +144,11 @@ def columns_of(
         "motor_angle_rad": rows[:, MOTOR] * TURN_RAD / sensors.motor_count_per_turn,
         "spindle_angle_rad": -rows[:, SPINDLE] * spindle_rad,
         "jaw_angle_rad": rows[:, JAW] * TURN_RAD / sensors.jaw_count_per_turn,
-        "target_angle_rad": -target_count.astype(np.float64) * spindle_rad,
+        "target_angle_rad": -setpoints[:, 0].astype(np.float64) * spindle_rad,
         "proximal_torque_n_m": rows[:, PROXIMAL] * sensors.torque_n_m_per_count,
         "distal_torque_n_m": -rows[:, DISTAL] * sensors.torque_n_m_per_count,
         "motor_current_a": rows[:, CURRENT] * sensors.current_a_per_count,
         "motor_command_ratio": -rows[:, COMMAND_E4] * 1e-4,
-        "load_command_a": load_ma.astype(np.float64) * 1e-3,
+        "load_command_a": setpoints[:, 1].astype(np.float64) * 1e-3,
         "fsr_v": rows[:, FSR] * 3.3 / 4095.0,
     }

@@ -79,11 +79,11 @@ def counts_of(seed: int, plan: RunPlan) -> np.ndarray:
     """Counts of a run of a drawn rig that nothing watches."""
     motion = motion_of(plan, float(plan.target_angle_rad[0]))
     angle_rad, load_a = motion.setpoints
-    target = np.round(angle_rad * PER_RAD[SPINDLE]).astype(np.int32)
-    load_ma = np.round(1e3 * load_a).astype(np.int32)
+    asked = np.column_stack((angle_rad * PER_RAD[SPINDLE], 1e3 * load_a))
+    setpoints = np.round(asked).astype(np.int32)
     plant = vary(PlantParameters(), seed, 0.15)
-    bench = SimulatedBench(plant, effects=[draw(seed)], seed=seed, start_count=int(target[0]))
-    return bench.advance(target.size, target, load_ma, Controllers.fresh(REFERENCE_GAINS))
+    bench = SimulatedBench(plant, effects=[draw(seed)], seed=seed, start_count=int(setpoints[0, 0]))
+    return bench.advance(setpoints, Controllers.fresh(REFERENCE_GAINS))
 
 
 @pytest.mark.parametrize("seed", [13, 17, 24, 26, 36])

@@ -102,9 +102,8 @@ def test_the_late_jaw_encoder_answers_its_delay_later(plain):
 @pytest.mark.parametrize("name", NAMES)
 def test_no_effect_drives_the_rig_by_itself(name):
     bench = SimulatedBench(effects=[HiddenEffect(name, 2.0)], start_count=683)
-    idle = np.zeros(2000, np.int32)
     bench._state[places.JAW_ANGLE] -= 0.1
-    bench.advance(2000, idle, idle, Controllers.idle())
+    bench.advance(np.zeros((2000, 2), np.int32), Controllers.idle())
     speeds = bench.state[[places.MOTOR_SPEED, places.SPINDLE_SPEED, places.JAW_SPEED]]
     np.testing.assert_allclose(speeds, 0.0, atol=1e-3)
 
