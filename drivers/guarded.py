@@ -1,13 +1,13 @@
 """A device whose driver is of another package: its errors and wrong samples name the driver."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from traceback import extract_tb
 from typing import Any, TypeVar
 
 import numpy as np
 
-from drivers.device import Axis, Batch, Channel, Device, DeviceIdentity, Drive
+from drivers.device import Batch, Device, DeviceIdentity, Drive
 from drivers.errors import DriverError
 
 Answer = TypeVar("Answer")
@@ -64,16 +64,24 @@ def require_whole(batch: Batch, names: Iterable[str], title: str) -> None:
         )
 
 
-def _passed_on(call: str) -> Any:
+def _call(name: str) -> Any:
     def pass_on(self: "Guarded", *arguments: Any) -> Any:
         with blaming(self._title):
-            return getattr(self._device, call)(*arguments)
+            return getattr(self._device, name)(*arguments)
 
     return pass_on
 
 
+def _value(name: str, made: Callable[[Any], Any] = lambda value: value) -> Any:
+    def get(self: "Guarded") -> Any:
+        with blaming(self._title):
+            return made(getattr(self._device, name))
+
+    return property(get)
+
+
 class Guarded(Device):
-    """See `guarded`."""
+    """See `guarded`; its members are those of `drivers.device.Device`."""
 
     def __init__(self, device: Any, title: str) -> None:
         self._device = device
@@ -83,27 +91,12 @@ class Guarded(Device):
         """Return a member that this device has and others lack."""
         return getattr(self._device, name)
 
-    start = _passed_on("start")
-    stop = _passed_on("stop")
-    close = _passed_on("close")
-
-    @property
-    def name(self) -> str:
-        """See `Device`; so has every member below."""
-        with blaming(self._title):
-            return str(self._device.name)
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Its channels."""
-        with blaming(self._title):
-            return tuple(self._device.channels)
-
-    @property
-    def counters(self) -> Mapping[str, int]:
-        """Its counters."""
-        with blaming(self._title):
-            return dict(self._device.counters)
+    name = _value("name", str)
+    channels = _value("channels", tuple)
+    counters = _value("counters", dict)
+    start = _call("start")
+    stop = _call("stop")
+    close = _call("close")
 
     def identify(self) -> DeviceIdentity:
         """Ask who is there."""
@@ -123,26 +116,10 @@ class Guarded(Device):
 class GuardedDrive(Guarded, Drive):
     """A drive; see `guarded`."""
 
-    idle = _passed_on("idle")
-    arm = _passed_on("arm")
-    command = _passed_on("command")
-    disarm = _passed_on("disarm")
-
-    @property
-    def axis(self) -> Axis:  # type: ignore[override]
-        """What it measures of its motor."""
-        with blaming(self._title):
-            axis: Axis = self._device.axis
-            return axis
-
-    @property
-    def now_s(self) -> float:
-        """The clock of its samples."""
-        with blaming(self._title):
-            return float(self._device.now_s)
-
-    @property
-    def wait_s(self) -> float:
-        """Time until the next sample is due."""
-        with blaming(self._title):
-            return float(self._device.wait_s)
+    axis = _value("axis")
+    now_s = _value("now_s", float)
+    wait_s = _value("wait_s", float)
+    idle = _call("idle")
+    arm = _call("arm")
+    command = _call("command")
+    disarm = _call("disarm")
