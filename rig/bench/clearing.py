@@ -13,7 +13,7 @@ from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Trip
 from drivers.transport.can_bus import CanBus
 from drivers.transport.python_can import open_can
-from rig.bench.logger import VIRTUAL_CAN_URL, open_logger
+from rig.bench.logger import open_logger
 from rig.bench.trips import WORDS
 from rig.configuration.config import Config
 from rig.logic.latch import TripLatch
@@ -46,8 +46,7 @@ def clear_latch(config: Config) -> Latch:
 
 
 def _clear_drive(config: Config) -> Latch:
-    options = {"node_id": 1, **config.logger.options}
-    drive = made(_bus(config), lambda bus: Epos4(bus, **options), "EPOS4")
+    drive = made(_bus(config), lambda bus: Epos4(bus, **config.logger.options), "EPOS4")
     try:
         code = drive.clear_fault()
     finally:
@@ -64,10 +63,9 @@ def _clear_drive(config: Config) -> Latch:
 def _bus(config: Config) -> CanBus:
     if not config.is_simulated:
         return open_can(config.logger.url)
-    from rig.canopen.simulated import open_live_bus, open_simulated_bus
+    from rig.canopen.simulated import open_simulated_bus
 
-    is_live = config.logger.url == VIRTUAL_CAN_URL
-    return open_live_bus(config) if is_live else open_simulated_bus(config)
+    return open_simulated_bus(config)
 
 
 def _clear_board(config: Config) -> Latch:

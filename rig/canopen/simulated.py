@@ -48,7 +48,7 @@ class PlantMotor:
 def open_simulated_canopen(config: Config) -> LogicLink:
     """Return the link to the logic of a simulated CANopen rig, in virtual time."""
     bus = open_simulated_bus(config)
-    return LogicLink(Epos4(bus, **{"node_id": 1, **config.logger.options}), bus.url)
+    return LogicLink(Epos4(bus, **config.logger.options), bus.url)
 
 
 def open_simulated_bus(config: Config) -> CanBus:

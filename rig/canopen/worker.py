@@ -57,7 +57,6 @@ def main() -> int:
 @contextmanager
 def _opened(config: Config) -> Iterator[LogicLink]:
     """Open the bus and what is on it; the drive is disarmed and the bus closed on the way out."""
-    options = {"node_id": 1, **config.logger.options}
     late_s = 0.0
     if config.is_simulated:
         from rig.canopen.simulated import open_live_bus
@@ -66,7 +65,7 @@ def _opened(config: Config) -> Iterator[LogicLink]:
     else:
         bus = open_can(config.logger.url)
         late_s = LATE_S
-    device = made(bus, lambda way: Epos4(way, **options, late_s=late_s), "EPOS4")
+    device = made(bus, lambda way: Epos4(way, **config.logger.options, late_s=late_s), "EPOS4")
     try:
         latch = None if config.is_simulated else TripLatch(config.logger.url)
         yield LogicLink(device, bus.url, late_s=late_s, is_cold=config.is_simulated, latch=latch)
