@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.amt21 import protocol
-from drivers.amt21.driver import Amt21, open_amt21, turns_at
+from drivers.amt21.driver import Amt21, turns_at
 from drivers.amt21.fake import Amt21Fake
-from drivers.errors import FrameError, LinkError
+from drivers.errors import FrameError
 from drivers.transport.simulated import SimulatedTransport
 from tests.drivers.taps import started
 
@@ -132,5 +132,3 @@ def test_a_caller_that_comes_late_has_lost_samples():
 def test_an_address_is_a_multiple_of_four():
     with pytest.raises(ValueError, match="multiple of 4"):
         protocol.request(0x55)
-    with pytest.raises(LinkError, match="multiple of 4"):
-        open_amt21("loop://", address=0x55)

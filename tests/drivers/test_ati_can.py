@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.ati_can import protocol
-from drivers.ati_can.driver import AtiCan, open_ati_can
+from drivers.ati_can.driver import AtiCan
 from drivers.ati_can.fake import MATRIX, AtiCanFake
 from drivers.device import AXES, SampleFlag
-from drivers.errors import DriverError, FrameError, LinkError
+from drivers.errors import DriverError, FrameError
 from drivers.transport.can_bus import CanFrame
 from drivers.transport.simulated_can import SimulatedCanBus
 
@@ -252,9 +252,3 @@ def test_any_bytes_are_decoded_or_refused(one, two, three):
     ):
         with contextlib.suppress(FrameError):  # nothing else may be raised
             decode()
-
-
-@pytest.mark.parametrize("options", [{"base": 128}, {"calibration": 16}, {"rate_hz": 0.0}])
-def test_options_that_are_no_sensors(options):
-    with pytest.raises(LinkError, match="not"):
-        open_ati_can("can:virtual:options", **options)

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.reliability.fault_names import EVIDENCE, SAID
 from drivers.amt21.driver import Amt21
 from drivers.device import Batch, Device, SampleFlag
-from drivers.errors import DriverError, LinkLostError, LinkTimeoutError
+from drivers.errors import DriverError, LinkError, LinkLostError, LinkTimeoutError
 from drivers.registry import DRIVERS, Driver, drivers, fakes, open_device
 from drivers.teensy.device import TeensyDevice
 from drivers.teensy.fake import PythonBoard
@@ -226,6 +226,28 @@ def test_an_unknown_driver_or_option_is_named():
         open_device("nonesuch", "/dev/null")
     with pytest.raises(DriverError, match="no option colour"):
         open_device("teensy", "/dev/null", colour="red")
+
+
+IMPOSSIBLE = (
+    ("amt21", "address", 0x55, "multiple of 4"),
+    ("ati-can", "base", 128, "a base identifier lies"),
+    ("ati-can", "calibration", 16, "a calibration has a number"),
+    ("ati-can", "rate_hz", 0.0, "a rate is above 0"),
+    ("dynamixel", "device_id", 253, "an identifier lies"),
+    ("dynamixel", "watchdog_ms", 10, "a watchdog has"),
+    ("epos4", "node_id", 0, "node number lies"),
+    ("epos4", "node_id", 127, "node number lies"),
+    ("epos4", "rate_hz", 0.0, "a rate is above 0"),
+    ("moteus", "device_id", 127, "an identifier lies"),
+)
+"""Values of options that no such device can have."""
+
+
+@pytest.mark.parametrize(("name", "option", "value", "words"), IMPOSSIBLE)
+def test_options_that_are_no_such_devices_are_refused(name, option, value, words):
+    url = "can:virtual:options" if drivers()[name].can else "loop://"
+    with pytest.raises(LinkError, match=words):
+        open_device(name, url, **{option: value})
 
 
 ROOM = PROJECT.parent / "drivers"

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from drivers.device import SampleFlag
 from drivers.dynamixel import protocol
-from drivers.dynamixel.driver import Dynamixel, InstructionRefusedError, open_dynamixel
+from drivers.dynamixel.driver import Dynamixel, InstructionRefusedError
 from drivers.dynamixel.fake import DynamixelFake
-from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError, LinkError
+from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError
 from drivers.transport.faulty import FaultyTransport
 from drivers.transport.simulated import SimulatedTransport
 from tests.drivers.taps import once, started
@@ -165,9 +165,3 @@ def test_models_that_cannot_be_driven_so_are_refused(model, words):
     with pytest.raises(DriverError, match=words):
         started(Dynamixel, DynamixelFake(model))
     started(Dynamixel, DynamixelFake(model), current_unit_a=1e-3)
-
-
-@pytest.mark.parametrize(("option", "value"), [("device_id", 253), ("watchdog_ms", 10)])
-def test_options_that_are_no_drives(option, value):
-    with pytest.raises(LinkError, match=r"an identifier lies|a watchdog has"):
-        open_dynamixel("loop://", **{option: value})

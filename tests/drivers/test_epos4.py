@@ -12,7 +12,7 @@ from drivers.counters import DeviceCounters
 from drivers.device import SampleFlag
 from drivers.epos4 import faults, protocol
 from drivers.epos4.canopen_link import CanopenLink, ObjectRefusedError
-from drivers.epos4.driver import Epos4, open_epos4
+from drivers.epos4.driver import Epos4
 from drivers.epos4.fake import Epos4Fake
 from drivers.epos4.faults import DriveFaultError
 from drivers.epos4.protocol import Ratings, State
@@ -367,12 +367,6 @@ def test_it_runs_in_real_time_over_multicast_and_a_drive_that_dies_is_reported()
         run(10_000)
     with pytest.raises(DisarmUnconfirmedError):
         device.close()
-
-
-@pytest.mark.parametrize("options", [{"node_id": 0}, {"node_id": 127}, {"rate_hz": 0.0}])
-def test_options_that_are_no_drives(options):
-    with pytest.raises(LinkError, match="not"):
-        open_epos4("can:virtual:options", **options)
 
 
 WORDS = {

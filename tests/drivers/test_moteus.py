@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.device import SampleFlag
-from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError, LinkError
+from drivers.errors import DisarmUnconfirmedError, DriverError, FrameError
 from drivers.moteus import protocol
-from drivers.moteus.driver import Moteus, open_moteus
+from drivers.moteus.driver import Moteus
 from drivers.moteus.fake import MoteusFake
 from drivers.moteus.protocol import State
 from drivers.transport.faulty import FaultyTransport
@@ -170,5 +170,3 @@ def test_who_answers():
     identity = device.identify()
     assert (identity.model, identity.serial) == ("moteus 0x0700", "333333332222222211111111")
     assert (device.counters["retries"], device.counters["crc_errors"]) == (1, 1)
-    with pytest.raises(LinkError, match="identifier"):
-        open_moteus("loop://", device_id=127)
