@@ -27,21 +27,29 @@ COUNTS_A_NEWTON = 4095 / 4.4
 FORCE_ZERO = 100.0
 """Counts of a force sensor's amplifier without force, so that one that lives is seen to."""
 _COUNTS_A_RADIAN = COUNTS_A_TURN / (2 * np.pi)
-_RATIO, _ARM, _OFFSET, _CURRENT_NOISE, _FORCE_NOISE = 0, 11, 12, 13, 14
 
 
-@numba.njit(cache=True)
+@numba.njit()
 def _sample(state, rig, tick, row):  # type: ignore[no-untyped-def]
     axes, currents, seed = rig
     for k in range(MOTORS):
         p, angle = axes[k], state[k, grasper_plant.ANGLE]
-        row[k] = np.floor(angle * p[_RATIO] * _COUNTS_A_RADIAN)
-        current = currents[k] + p[_OFFSET] + p[_CURRENT_NOISE] * noise.normal(seed, tick, k)
+        row[k] = np.floor(angle * p.gearhead_ratio * _COUNTS_A_RADIAN)
+        current = currents[k] + p.current_offset_a
+        current += p.current_noise_a * noise.normal(seed, tick, k)
         row[MOTORS + k] = np.floor(1e3 * current + 0.5)
-        force = grasper_plant.contact_torque(p, angle) / p[_ARM]
-        force += p[_FORCE_NOISE] * noise.normal(seed, tick, MOTORS + k)
+        force = grasper_plant.contact_torque(p, angle) / p.arm_m
+        force += p.force_noise_n * noise.normal(seed, tick, MOTORS + k)
         converted = np.floor(FORCE_ZERO + COUNTS_A_NEWTON * force + 0.5)
         row[2 * MOTORS + k] = min(max(converted, 0), FORCE_MAX)
+
+
+@numba.njit()
+def _move(state, rig, commands_e4):  # type: ignore[no-untyped-def]
+    axes, currents, _seed = rig
+    for k in range(MOTORS):
+        currents[k] = FULL_SCALE_A * 1e-4 * commands_e4[k]
+        grasper_plant.step_axis(state[k], axes[k], currents[k], 1.0)
 
 
 def _build_loops(source: str):  # type: ignore[no-untyped-def]
@@ -52,25 +60,20 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
         state, rig, first_tick, targets, memory, gains, rows
     ):
         _ = source
-        axes, currents, _seed = rig
         for k in range(rows.shape[0]):
             row = rows[k]
             _sample(state, rig, first_tick + k, row)
             for motor in range(MOTORS):
-                count = row[motor]
-                command_e4 = control.control_tick(
-                    memory[motor], gains[motor], targets[k, motor], count, count
+                row[INPUTS + motor] = control.control_tick(
+                    memory[motor], gains[motor], targets[k, motor], row[motor], row[motor]
                 )
-                row[INPUTS + motor] = command_e4
-                currents[motor] = FULL_SCALE_A * 1e-4 * command_e4
-                grasper_plant.step_axis(state[motor], axes[motor], currents[motor], 1.0)
+            _move(state, rig, row[INPUTS:])
 
     @numba.njit(cache=True)
     def with_board(  # type: ignore[no-untyped-def]
         state, rig, first_tick, ticks, call, clock_us
     ):
         _ = source
-        axes, currents, _seed = rig
         function, board = call
         tick_us, period_us = clock_us
         inputs = np.zeros(INPUTS, np.int32)
@@ -79,9 +82,7 @@ def _build_loops(source: str):  # type: ignore[no-untyped-def]
             _sample(state, rig, first_tick + k, inputs)
             now_us = np.uint32(tick_us + period_us * k)
             call_board_tick(function, board, now_us, inputs.ctypes.data, outputs.ctypes.data)
-            for motor in range(MOTORS):
-                currents[motor] = FULL_SCALE_A * 1e-4 * outputs[motor]
-                grasper_plant.step_axis(state[motor], axes[motor], currents[motor], 1.0)
+            _move(state, rig, outputs)
 
     return with_controllers, with_board
 
@@ -101,7 +102,7 @@ class GrasperBench:
     ) -> None:
         (yaw,), (jaw_1, jaw_2) = prototype.axes["yaw"], prototype.axes["grasp"]
         varied = [vary(axis, seed + k, spread) for k, axis in enumerate((yaw, jaw_1, jaw_2))]
-        self._axes: NDArray[np.float64] = np.array([axis.values for axis in varied])
+        self._axes = tuple(axis.compiled for axis in varied)
         self._state = np.zeros((MOTORS, 3))
         noise_seed = np.uint64(int.from_bytes(hashlib.sha256(str(seed).encode()).digest()[:8]))
         self._rig = (self._axes, np.zeros(MOTORS), noise_seed)
@@ -110,11 +111,9 @@ class GrasperBench:
     @property
     def force_n(self) -> NDArray[np.float64]:
         """The true force at each axis' tip."""
-        contact = [
-            grasper_plant.contact_torque(p, angle)
-            for p, angle in zip(self._axes, self._state[:, grasper_plant.ANGLE], strict=True)
-        ]
-        return np.array(contact) / self._axes[:, _ARM]
+        angles = self._state[:, grasper_plant.ANGLE]
+        pairs = zip(self._axes, angles, strict=True)
+        return np.array([grasper_plant.contact_torque(p, q) / p.arm_m for p, q in pairs])
 
     def advance(self, setpoints: NDArray[np.int32], controllers: Controllers) -> NDArray[np.int32]:
         """Run ticks with the controllers inside; see `drivers.teensy.logic.Bench.advance`."""

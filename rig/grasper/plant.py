@@ -15,6 +15,7 @@ after half a minute one that does not. The motor follows the master by a positio
 integral action, sampled at 2 kHz.
 """
 
+from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -66,11 +67,12 @@ class AxisParameters:
     form: Form = NO_FORM  # factor on the level of friction
 
     @property
-    def values(self) -> FloatArray:
-        """The numbers, in their order, without the form."""
-        numbers = [float(getattr(self, field.name)) for field in fields(self)[:-1]]
-        return np.array(numbers)
+    def compiled(self) -> Any:
+        """The numbers as compiled code takes them: an `AxisTuple`, floats of the same names."""
+        return AxisTuple(*(float(getattr(self, item.name)) for item in fields(self)[:-1]))
 
+
+AxisTuple = namedtuple("AxisTuple", [item.name for item in fields(AxisParameters)[:-1]])  # type: ignore[misc]
 
 HIDDEN = (
     "coulomb_n_m",
@@ -106,8 +108,8 @@ ANGLE, SPEED, BRISTLE = range(3)
 
 @numba.njit(cache=True)
 def contact_torque(p: Any, angle_rad: float) -> float:
-    """Return the torque of what is grasped at a joint's angle, N m; p are `AxisParameters`."""
-    return float(p[9] * max(angle_rad - p[10], 0.0))
+    """Return the torque of what is grasped at a joint's angle, N m; p is an `AxisTuple`."""
+    return float(p.contact_n_m_rad * max(angle_rad - p.contact_rad, 0.0))
 
 
 @numba.njit(cache=True)
@@ -116,19 +118,20 @@ def step_axis(state: Any, p: Any, current_a: float, factor: float) -> None:
 
     The current and the factor on the level of friction are constant.
     """
-    inertia = p[0] * p[0] * p[2]
-    gain = p[0] * p[1]
+    inertia = p.gearhead_ratio * p.gearhead_ratio * p.rotor_inertia_kg_m2
+    gain = p.gearhead_ratio * p.torque_constant_n_m_a
+    kept = p.relaxed_ratio
     h = 1.0 / RATE_HZ / SUBSTEPS
     q, w, s = state[ANGLE], state[SPEED], state[BRISTLE]
     for _ in range(SUBSTEPS):
         contact = contact_torque(p, q)
-        level = factor * (p[3] + p[4] * contact)
-        ds = w / p[6] * (1.0 - s * np.sign(w))
-        if abs(s) > p[7]:
-            ds -= (s - p[7] * np.sign(s)) / p[8]
+        level = factor * (p.coulomb_n_m + p.load_friction_ratio * contact)
+        ds = w / p.presliding_rad * (1.0 - s * np.sign(w))
+        if abs(s) > kept:
+            ds -= (s - kept * np.sign(s)) / p.relaxation_s
         s += h * ds
         s = min(max(s, -1.0), 1.0)
-        w += h / inertia * (gain * current_a - level * s - p[5] * w - contact)
+        w += h / inertia * (gain * current_a - level * s - p.viscous_n_m_s_rad * w - contact)
         q += h * w
     state[ANGLE], state[SPEED], state[BRISTLE] = q, w, s
 
@@ -146,7 +149,7 @@ def _run(p: Any, variable: int, high: float, table: Any, target: Any) -> Any:
     sizes = np.zeros(5)
     n = target.shape[0]
     out = np.empty((n, 4))
-    gain = p[0] * p[1]
+    gain = p.gearhead_ratio * p.torque_constant_n_m_a
     state = np.zeros(3)
     state[ANGLE] = target[0]
     total = 0.0
@@ -176,7 +179,7 @@ def play_axis(axis: AxisParameters, target_rad: FloatArray, seed: int) -> dict[s
     """
     form = axis.form
     target = np.ascontiguousarray(target_rad, np.float64)
-    out = _run(axis.values, form.variable, form.high, form.values, target)
+    out = _run(axis.compiled, form.variable, form.high, form.values, target)
     random = np.random.default_rng(seed)
     n = len(target_rad)
     return {
