@@ -17,7 +17,7 @@ from drivers.clock import ClockLine, arrival_fit
 from drivers.device import Batch, Device
 from drivers.errors import DriverError, LinkTimeoutError
 from estimation.channels import unit_or_none
-from rig.bench.devices import open_section
+from rig.bench.logger import open_section
 from rig.bench.sensor_logger import require_units
 from rig.configuration.config import Config, is_simulated
 from rig.configuration.sections import DeviceSection

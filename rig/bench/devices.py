@@ -4,27 +4,14 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 from drivers.device import Device
-from drivers.registry import open_device, open_fake
 from drivers.teensy.device import TeensyDevice, raw_channels
-from rig.bench.logger import DRIVE, SENSOR, open_logger
+from rig.bench.logger import DRIVE, SENSOR, open_logger, open_section
 from rig.configuration.check import LOGGER
-from rig.configuration.config import Config, is_simulated
-from rig.configuration.sections import DeviceSection
+from rig.configuration.config import Config
 from rig.machines.choose import machine_of
 
 SIMULATED_STEP_S = 0.02
 """A simulated device delivers as often as a real one may; its silences are counted."""
-
-
-def open_section(section: DeviceSection) -> Device:
-    """Open one configured device, or its driver's fake where its URL is `sim:`.
-
-    Raises:
-        DriverError: It cannot be opened.
-    """
-    if is_simulated(section.url):
-        return open_fake(section.driver)
-    return open_device(section.driver, section.url, **section.options)
 
 
 def openers(config: Config) -> Iterator[tuple[str, Callable[[], Device]]]:

@@ -7,8 +7,7 @@ from difflib import get_close_matches
 from calibration.linear import CalibrationSet
 from rig.bench.companions import Companion
 from rig.bench.device_logger import with_channels
-from rig.bench.devices import open_section
-from rig.bench.logger import DRIVE
+from rig.bench.logger import DRIVE, open_section
 from rig.configuration.check import LOGGER, Problem
 from rig.configuration.config import Config, is_simulated
 from rig.errors import UsageError

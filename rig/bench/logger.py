@@ -1,18 +1,19 @@
-"""Open the logger a configuration names: the real one, or the simulated one behind `sim://`."""
+"""Open the logger a configuration names, or a device: the real one, or what is behind `sim:`."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
-from drivers.device import Drive
+from drivers.device import Device, Drive
 from drivers.errors import DriverError
 from drivers.registry import open_device, open_fake
 from drivers.teensy.driver import SampleBatch, TeensyLogger
 from drivers.transport import Transport, open_transport
 from rig.bench.holding import holding
 from rig.bench.sensor_logger import SensorWay, require_units
-from rig.configuration.config import Config
+from rig.configuration.config import Config, is_simulated
+from rig.configuration.sections import DeviceSection
 from rig.errors import UsageError
 from rig.logic.latch import TripLatch
 from rig.logic.link import LogicLink
@@ -59,15 +60,19 @@ def open_logger(
         # the plant is compiled code that a session with a real rig does not need
         from rig.simulation.logger import open_simulated_logger
 
-        return open_simulated_logger(
-            config.simulation,
-            config.logger.url,
-            config.logger.profile,
-            pace,
-            config.safety.watchdog_s,
-            step_s,
-        )
+        return open_simulated_logger(config, pace, step_s)
     return open_transport(config.logger.url)
+
+
+def open_section(section: DeviceSection) -> Device:
+    """Open one configured device, or its driver's fake where its URL is `sim:`.
+
+    Raises:
+        DriverError: It cannot be opened.
+    """
+    if is_simulated(section.url):
+        return open_fake(section.driver)
+    return open_device(section.driver, section.url, **section.options)
 
 
 @contextmanager
@@ -112,11 +117,7 @@ def read_for(logger: TeensyLogger, duration_s: float, is_alive: bool = False) ->
 
 def _open_any(config: Config, pace: float | None) -> Transport:
     """Return the way to any device: a drive behind the board's logic, or a sensor alone."""
-    section = config.logger
-    if config.is_simulated:
-        device = open_fake(section.driver)
-    else:
-        device = open_device(section.driver, section.url, **section.options)
+    section, device = config.logger, open_section(config.logger)
     paced = pace if config.is_simulated else None
     try:
         if section.profile == SENSOR:

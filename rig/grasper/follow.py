@@ -11,8 +11,7 @@ from drivers.device import Device
 from drivers.errors import LinkTimeoutError
 from drivers.teensy.grasper import GRASPER
 from estimation.recording import FloatArray
-from rig.bench.devices import open_section
-from rig.bench.logger import open_logger
+from rig.bench.logger import open_logger, open_section
 from rig.bench.session import Session
 from rig.configuration.config import Config, is_simulated
 from rig.configuration.sections import DeviceSection

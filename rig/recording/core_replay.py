@@ -76,7 +76,7 @@ def replay_core(path: Path, config: Config | None = None) -> CoreReplay:
             "Name a log of a simulated rig (`sim://`).",
         )
     profile = machine_of(settings).profile
-    board = open_simulated_logger(settings.simulation, profile=settings.logger.profile).board
+    board = open_simulated_logger(settings).board
     if not isinstance(board, FirmwareBoard):
         raise UsageError("The firmware's core is not built.", fix="Run: make -C firmware")
     logged = log.topics[COUNTS].rows

@@ -4,6 +4,7 @@ from drivers.teensy.core import FirmwareBoard, firmware_library
 from drivers.teensy.fake import PythonBoard
 from drivers.teensy.reference import REFERENCE
 from drivers.transport.simulated import Board, SimulatedTransport
+from rig.configuration.config import Config
 from rig.configuration.machine_settings import installed
 from rig.configuration.sections import SimulationSection
 from rig.machines.choose import SIMULATED_BOARDS
@@ -16,32 +17,26 @@ UNPACED_STEP_S = 0.2
 
 
 def open_simulated_logger(
-    simulation: SimulationSection,
-    url: str = "sim://",
-    profile: str = "reference",
-    pace: float | None = None,
-    watchdog_s: float = 0.25,
-    step_s: float | None = None,
+    config: Config, pace: float | None = None, step_s: float | None = None
 ) -> SimulatedTransport:
     """Return the transport of a simulated rig.
 
     Args:
-        simulation: Seed, spread, hidden effects, and whether the compiled firmware is in the loop.
-        url: Name for messages.
-        profile: What is behind the board, a name in the entry point group `rig.simulated_boards`.
+        config: The configuration; its profile names a board in the entry point group
+            `rig.simulated_boards`.
         pace: Virtual seconds a real second, None for as fast as possible.
-        watchdog_s: Patience of the board with a silent host; time moves in smaller steps than that.
         step_s: Longest virtual time between looks at the board; a choice of its own if None.
+            It is always shorter than the board waits for its host.
 
     Raises:
         UnknownHiddenEffectError: A hidden effect has no such name.
         UsageError: No simulated board is installed for the profile.
     """
-    board, tick_s = installed(SIMULATED_BOARDS, profile)(simulation)
+    board, tick_s = installed(SIMULATED_BOARDS, config.logger.profile)(config.simulation)
     # a rig faster than real time is not displayed, so it may advance in larger steps
     usual_s = UNPACED_STEP_S if pace is None else PACED_STEP_S
-    step_s = min(step_s or usual_s, 0.8 * watchdog_s)
-    return SimulatedTransport(board, url, step_s=step_s, pace=pace, tick_s=tick_s)
+    step_s = min(step_s or usual_s, 0.8 * config.safety.watchdog_s)
+    return SimulatedTransport(board, config.logger.url, step_s=step_s, pace=pace, tick_s=tick_s)
 
 
 def reference_board(simulation: SimulationSection) -> tuple[Board, float]:

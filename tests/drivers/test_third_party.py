@@ -9,7 +9,7 @@ import pytest
 from drivers.device import LinkedDevice
 from drivers.errors import DriverError
 from drivers.registry import UnknownDriverError, broken_drivers, driver, drivers, open_device
-from rig.bench.devices import open_section
+from rig.bench.logger import open_section
 from rig.cli.main import main
 from rig.configuration.check import problems
 from rig.configuration.config import SIMULATED, Config, load_config

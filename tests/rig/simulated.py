@@ -31,7 +31,7 @@ def simulated(**simulation: object) -> Config:
 
 
 def transport(config: Config) -> SimulatedTransport:
-    return open_simulated_logger(config.simulation, watchdog_s=config.safety.watchdog_s)
+    return open_simulated_logger(config)
 
 
 def session(config: Config | None = None) -> Session:
