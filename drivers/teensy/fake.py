@@ -58,7 +58,6 @@ class PythonBoard(Outbox):
         self._offers = 0
         self._session: int | None = None
         self._newest = 0
-        self._host_heard = False
         self._last_host_us = 0
         self._watchdog_us = protocol.WATCHDOG_US
         self._now_us = 0
@@ -77,9 +76,6 @@ class PythonBoard(Outbox):
     def advance(self, ticks: int) -> None:
         """Let that many of the profile's ticks pass."""
         while ticks > 0:
-            if self._host_heard:
-                self._last_host_us = self._next_tick_us
-                self._host_heard = False
             block = min(ticks, self._ticks_to_watchdog())
             if block == 0:
                 self._trip_us = self._next_tick_us
@@ -210,7 +206,7 @@ class PythonBoard(Outbox):
 
     def _hear(self, sequence: int) -> None:
         self._newest = sequence
-        self._host_heard = True
+        self._last_host_us = self._next_tick_us
 
     def _queue_free(self) -> int:
         return protocol.QUEUE_CAPACITY - len(self._queued)

@@ -241,5 +241,5 @@ def decode_identity(fields: np.void) -> Identity:
 
 def decode_ack(fields: np.void) -> Ack:
     """Return the content of an acknowledgement."""
-    names = ("sequence", "command", "result", "status", "queue_free")
-    return Ack(*(int(fields[name]) for name in names))
+    _version, _kind, *content = fields.tolist()
+    return Ack(*content)
