@@ -21,6 +21,8 @@ from drivers.teensy.reference import REFERENCE
 
 _LIBRARY = Path(__file__).parents[2] / "firmware" / "build" / "librig_firmware.so"
 _TRANSMIT_SIZE = 65536
+TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p)
+"""The function that a bench calls; see `FirmwareBench.advance_with_board`."""
 
 
 class FirmwareBench(Protocol):

@@ -10,14 +10,13 @@ A tick runs at every read. The ticks of an EPOS4 in real time run in a separate 
 (`rig.canopen.process`), so that nothing delays them.
 """
 
-import ctypes
 from collections import deque
 from collections.abc import Mapping
 
 import numpy as np
 
 from drivers.device import Channel, Drive
-from drivers.teensy.core import BoardStart, FirmwareBoard
+from drivers.teensy.core import TICK, BoardStart, FirmwareBoard
 from drivers.teensy.protocol import MISSING, TOP
 from drivers.transport.simulated import Pace
 from drivers.transport.transport import HostLink
@@ -33,7 +32,6 @@ KEPT = 4096
 
 MOTOR, SPINDLE, CURRENT = 0, 1, 5
 """Columns of the inputs of a reference rig's board; the others are 0."""
-_TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p)
 
 
 class DriveBench:
@@ -63,7 +61,7 @@ class DriveBench:
         missing = self._missed >= MOST_MISSED
         inputs[[MOTOR, SPINDLE]] = MISSING if missing else self._position_count
         inputs[CURRENT] = self._current_ma
-        _TICK(tick_address)(board_address, tick_us, inputs.ctypes.data, outputs.ctypes.data)
+        TICK(tick_address)(board_address, tick_us, inputs.ctypes.data, outputs.ctypes.data)
         if self.board is None or not self.board.in_force:
             self.follow(False)
         elif self._powered:

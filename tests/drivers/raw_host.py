@@ -1,6 +1,5 @@
 """A host that sends what a test asks for to a board in virtual time, and a scripted bench."""
 
-import ctypes
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from drivers.framing import FrameStream, encode_frame
 from drivers.teensy import protocol
+from drivers.teensy.core import TICK
 from drivers.teensy.grasper import GRASPER, GrasperLimits
 from drivers.teensy.profile import ArmLimits, Profile
 from drivers.teensy.protocol import Kind, Result, TripReport
@@ -104,11 +104,6 @@ class RawHost:
         return list(frames.others)
 
 
-TICK_FUNCTION = ctypes.CFUNCTYPE(
-    None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p
-)
-
-
 class ScriptedBench:
     """No physics: the inputs of each tick, shape (n, channels), are given; the last ones stay."""
 
@@ -120,7 +115,7 @@ class ScriptedBench:
     def advance_with_board(
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
-        tick = TICK_FUNCTION(tick_address)
+        tick = TICK(tick_address)
         for k in range(ticks):
             inputs = self._inputs[min(self._ticks, len(self._inputs) - 1)]
             clock_us = (tick_us + self._tick_us * k) % 2**32

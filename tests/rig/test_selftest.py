@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.teensy.core import BoardStart, FirmwareBoard
+from drivers.teensy.core import TICK, BoardStart, FirmwareBoard
 from drivers.teensy.profile import Profile
 from drivers.transport.simulated import SimulatedTransport
 from rig.configuration.check import refuse_problems
@@ -97,7 +97,6 @@ def test_selftest_speaks_to_machines_and_names_the_tests_for_a_person(answered):
 
 
 MOTOR, SPINDLE, JAW, CURRENT = 0, 1, 2, 5
-TICK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p)
 
 
 class MiswiredBench:
