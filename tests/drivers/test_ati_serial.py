@@ -6,6 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymodbus.constants import ExcCodes
+from pymodbus.framer.rtu import FramerRTU
+from pymodbus.pdu import DecodePDU, ExceptionResponse
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersResponse,
+    WriteMultipleRegistersResponse,
+)
 
 from drivers import modbus
 from drivers.ati_serial import protocol
@@ -29,6 +36,23 @@ PUBLISHED = {
 def test_messages_are_the_published_bytes(published):
     assert PUBLISHED[published] == bytes.fromhex(published)
     assert protocol.encode(*protocol.decode(PUBLISHED[published])) == PUBLISHED[published]
+
+
+def test_another_library_reads_the_questions_and_writes_the_answers():
+    framer = FramerRTU(DecodePDU(True))
+    _, read = framer.handleFrame(protocol.read_registers(0x00E3, 104), protocol.SLAVE, 0)
+    assert (read.function_code, read.address, read.count) == (modbus.READ, 0x00E3, 104)
+    _, write = framer.handleFrame(protocol.write_registers(7, (1, 0xFFFE)), protocol.SLAVE, 0)
+    written = (modbus.WRITE, 7, [1, 0xFFFE])
+    assert (write.function_code, write.address, write.registers) == written
+    refused = ExceptionResponse(modbus.READ, ExcCodes.ILLEGAL_ADDRESS)
+    for answer, content in (
+        (ReadHoldingRegistersResponse(registers=[1, 0xFFFE]), (modbus.READ, b"\4\0\1\xff\xfe")),
+        (WriteMultipleRegistersResponse(address=7, count=2), (modbus.WRITE, b"\0\7\0\2")),
+        (refused, (modbus.READ | protocol.FAILED, b"\2")),
+    ):
+        answer.dev_id = protocol.SLAVE
+        assert protocol.decode(framer.buildFrame(answer)) == content
 
 
 @given(data=st.binary(min_size=1, max_size=40), bit=st.integers(0, 7), place=st.integers(0, 60))
@@ -90,13 +114,13 @@ def test_it_reads_its_calibration_and_puts_it_in_force():
     calibration = example_calibration()
     tops = np.abs(calibration.matrix).sum(axis=1) * 32768 / 1e6
     assert [channel.upper for channel in device.channels] == pytest.approx(tops.tolist())
-    assert fake.server.registers(0, 12) == calibration.gains + calibration.offsets
+    assert fake.registers(0, 12) == calibration.gains + calibration.offsets
     values, _ = gathered(device, 1)
     assert len(values) == 7 * 50 - 1  # the newest waits for its successor
     began = np.arange(fake._sent - 350, fake._sent)
     assert np.allclose(values, fake.gauges(began)[:-1] @ calibration.matrix.T / 1e6)
     device.close()
-    assert not fake.server.streaming
+    assert not fake.streaming
 
 
 def test_each_calibration_is_read_192_registers_behind_the_one_before():
