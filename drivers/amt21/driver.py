@@ -12,7 +12,7 @@ from drivers.device import Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.polling import PolledDevice
 from drivers.registry import BaudOption, Driver, RateOption, made
-from drivers.transport.serial_port import open_line
+from drivers.transport import open_line
 from drivers.transport.transport import Transport, arriving
 
 REPLY_TIMEOUT_S = 0.01

@@ -15,7 +15,7 @@ from drivers.errors import DriverError
 from drivers.modbus import StreamedSensor
 from drivers.registry import BaudOption, Driver, RateOption, made
 from drivers.streaming import QUIET_S
-from drivers.transport.serial_port import open_line
+from drivers.transport import open_line
 from drivers.transport.transport import Transport
 
 GAUGE_LIMIT = 32767

@@ -17,7 +17,7 @@ from drivers.dynamixel.protocol import Register
 from drivers.errors import CodedError, DriverError, FrameError
 from drivers.polling import PolledDrive
 from drivers.registry import BaudOption, Driver, RateOption, made
-from drivers.transport.serial_port import open_line
+from drivers.transport import open_line
 from drivers.transport.transport import Transport
 
 REPLY_TIMEOUT_S = 0.02

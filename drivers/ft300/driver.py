@@ -8,7 +8,7 @@ from drivers.errors import DriverError
 from drivers.ft300 import protocol
 from drivers.modbus import WRITE, StreamedSensor, write_registers
 from drivers.registry import BaudOption, Driver
-from drivers.transport.serial_port import open_line
+from drivers.transport import open_line
 from drivers.transport.transport import Transport
 
 RATE_HZ = 100.0

@@ -12,7 +12,7 @@ from drivers.errors import DriverError
 from drivers.qia128 import protocol
 from drivers.registry import BaudOption, Driver, RateOption
 from drivers.streaming import Samples, SlidingFrames, StreamedDevice
-from drivers.transport.serial_port import open_line
+from drivers.transport import open_line
 from drivers.transport.transport import Transport, arriving
 
 RATE_HZ = 1300.0

@@ -17,7 +17,7 @@ from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
 from drivers import errors
-from drivers.transport.transport import HostLink, Transport, open_transport
+from drivers.transport.transport import HostLink
 
 BAUD_RATE = 115200
 """Has no effect on a Teensy's USB port; a real UART behind an adapter uses it."""
@@ -69,9 +69,21 @@ class SerialTransport(HostLink):
             raise self._gone(error) from error
 
     def set_line(self, baud_rate: int, parity: str = "N") -> None:
-        """Set the speed of the line and its parity (`N`, `E` or `O`); 8 bits, 1 stop bit."""
-        self._port.baudrate = baud_rate
-        self._port.parity = parity
+        """Set the speed of the line and its parity (`N`, `E` or `O`); 8 bits, 1 stop bit.
+
+        Raises:
+            LinkError: The port cannot be set so; it is closed.
+        """
+        try:
+            self._port.baudrate = baud_rate
+            self._port.parity = parity
+        except _SETTING_ERRORS as error:
+            self.close()
+            raise errors.LinkError(
+                f"{self.url} cannot be set to {baud_rate} bit/s, parity {parity}.",
+                str(error),
+                "Use an adapter that has this speed, or set the device to another one.",
+            ) from error
 
     def close(self) -> None:
         """Close the port."""
@@ -121,26 +133,6 @@ def open_serial(url: str) -> SerialTransport:
     except (serial.SerialException, ValueError) as error:
         raise _explain(url, name, error) from error
     return SerialTransport(url, port)
-
-
-def open_line(url: str, baud_rate: int, parity: str = "N") -> Transport:
-    """Open any transport; where it is a serial port, set its speed, bit/s, and its parity.
-
-    Raises:
-        LinkError: The link cannot be opened, or the port cannot be set so.
-    """
-    transport = open_transport(url)
-    if isinstance(transport, SerialTransport):
-        try:
-            transport.set_line(baud_rate, parity)
-        except _SETTING_ERRORS as error:
-            transport.close()
-            raise errors.LinkError(
-                f"{url} cannot be set to {baud_rate} bit/s, parity {parity}.",
-                str(error),
-                "Use an adapter that has this speed, or set the device to another one.",
-            ) from error
-    return transport
 
 
 def find_usb_port(url: str) -> str:

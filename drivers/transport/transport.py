@@ -1,14 +1,11 @@
-"""The way bytes travel to a device, opened by URL, and the registry of URL schemes."""
+"""The way bytes travel to a device."""
 
-import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from time import monotonic
 from typing import Protocol
 
 from drivers.device import Clocked
-from drivers.errors import LinkLostError, UnknownSchemeError
-
-_SCHEME = re.compile(r"([a-z][a-z0-9+.-]*):", re.IGNORECASE)
+from drivers.errors import LinkLostError
 
 
 class Transport(Clocked, Protocol):
@@ -70,40 +67,3 @@ class HostLink:
     def _require_link(self) -> None:
         if self._lost is not None:
             raise type(self._lost)(self._lost.what, self._lost.why, self._lost.fix)
-
-
-Opener = Callable[[str], Transport]
-"""Opens the transport a URL names."""
-
-_openers: dict[str, Opener] = {}
-
-
-def register_scheme(scheme: str, opener: Opener) -> None:
-    """Let `open_transport` open URLs that start with `scheme:` by `opener`."""
-    _openers[scheme.lower()] = opener
-
-
-def known_schemes() -> list[str]:
-    """Return the schemes of `open_transport`, sorted."""
-    return sorted(_openers)
-
-
-def open_transport(url: str) -> Transport:
-    """Open the transport a URL names.
-
-    `/dev/...`, `COM3`, `usb:VID:PID:SERIAL` and pyserial's own URLs (`socket://host:port`) are
-    serial ports; further schemes are added by `register_scheme`.
-
-    Raises:
-        UnknownSchemeError: No opener for the URL's scheme.
-        LinkError: The link cannot be opened.
-    """
-    found = _SCHEME.match(url)
-    scheme = found[1].lower() if found else "serial"
-    if scheme not in _openers:
-        raise UnknownSchemeError(
-            f"No transport opens {url!r}.",
-            f"The scheme {scheme!r} is not one of {', '.join(known_schemes())}.",
-            "Give a port such as /dev/ttyACM0 or usb:16c0:0483:SERIAL.",
-        )
-    return _openers[scheme](url)

@@ -9,7 +9,7 @@ from drivers.device import Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.registry import BaudOption, Driver
 from drivers.streaming import Samples, StreamedDevice
-from drivers.transport.serial_port import open_line
+from drivers.transport import open_line
 from drivers.transport.transport import Transport
 from drivers.usb520 import protocol
 

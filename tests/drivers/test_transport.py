@@ -21,8 +21,8 @@ from drivers.errors import (
     PortPermissionError,
     UnknownSchemeError,
 )
-from drivers.transport import Transport, open_transport, register_scheme
-from drivers.transport.serial_port import SerialTransport, open_line
+from drivers.transport import Transport, open_line, open_transport
+from drivers.transport.serial_port import SerialTransport
 from drivers.transport.simulated import SimulatedTransport
 
 
@@ -84,9 +84,9 @@ def test_a_speed_the_adapter_does_not_have_is_reported():
     port = Mock()
     refused = PropertyMock(side_effect=termios.error(errno.EINVAL, "Invalid argument"))
     type(port).baudrate = refused
-    register_scheme("refusing", lambda url: SerialTransport(url, port))
+    transport = SerialTransport("/dev/refusing", port)
     with pytest.raises(LinkError, match="cannot be set to 1250000 bit/s"):
-        open_line("refusing:", 1_250_000, "E")
+        transport.set_line(1_250_000, "E")
     port.close.assert_called()
 
 
