@@ -23,9 +23,9 @@ def measure() -> list[Ratio]:
 
     def seconds(effects: list[HiddenEffect], plant: PlantParameters | None = None) -> float:
         bench = SimulatedBench(plant, effects=effects)
-        drive = Controllers.fresh(REFERENCE_GAINS)
-        bench.advance(setpoints, drive)  # compiles
-        return best_of(lambda: bench.advance(setpoints, drive), 5)
+        controllers = Controllers.fresh(REFERENCE_GAINS)
+        bench.advance(setpoints, controllers)  # compiles
+        return best_of(lambda: bench.advance(setpoints, controllers), 5)
 
     plain_s = seconds([])
     loaded_s = seconds([HiddenEffect(name) for name in DEAREST])

@@ -34,9 +34,9 @@ def nothing(ticks: int) -> NDArray[np.int32]:
 def run(seed: int, cuts: tuple[int, ...] = (), **options: object) -> tuple[np.ndarray, np.ndarray]:
     """Counts and final state of one run, advanced in pieces."""
     bench = SimulatedBench(seed=seed, **options)
-    drive = Controllers.fresh(GAINS)
+    controllers = Controllers.fresh(GAINS)
     edges = [0, *sorted(cuts), TICKS]
-    parts = [bench.advance(PLAN[a:b], drive) for a, b in itertools.pairwise(edges)]
+    parts = [bench.advance(PLAN[a:b], controllers) for a, b in itertools.pairwise(edges)]
     return np.concatenate(parts), bench.state
 
 
