@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from drivers.counters import TRIES, LinkCounters
 from drivers.errors import LinkTimeoutError
 from drivers.framing import DELIMITER, FrameStream, encode_frame
-from drivers.transport.transport import Transport
+from drivers.transport.transport import Transport, time_left
 
 _WRAP = 2**32
 REPLY_TIMEOUT_S = 0.1
@@ -89,15 +89,11 @@ class FramedLink:
             if attempt:
                 self.counters.retries += 1
             self.send(payload)
-            give_up_s = self.transport.now_s + REPLY_TIMEOUT_S
-            while True:
+            for remaining_s in time_left(self.transport, REPLY_TIMEOUT_S):
+                self.poll(remaining_s)
                 answer = self._take_first(answers)
                 if answer is not None:
                     return answer
-                remaining_s = give_up_s - self.transport.now_s
-                if remaining_s <= 0:
-                    break
-                self.poll(remaining_s)
         raise LinkTimeoutError(
             f"The device at {self.transport.url} does not answer.",
             f"{TRIES} commands had {REPLY_TIMEOUT_S:g} s each.",

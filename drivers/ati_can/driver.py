@@ -17,6 +17,7 @@ from drivers.polling import PolledDevice
 from drivers.registry import CanUse, Driver, RateOption, made
 from drivers.transport.can_bus import CanBus
 from drivers.transport.python_can import open_can
+from drivers.transport.transport import time_left
 
 REPLY_TIMEOUT_S = 0.02
 """Time for a whole answer: ten times the wire time of the longest at 250 kbit/s."""
@@ -217,11 +218,9 @@ class AtiCan(PolledDevice):
     def _receive(self, operation: int, frames: int) -> list[bytes] | None:
         """Return an answer's frames, None when they do not all come in time and in order."""
         first = protocol.identifier(self._base, operation)
-        give_up_s = self._bus.now_s + REPLY_TIMEOUT_S
         answer: list[bytes] = []
-        while len(answer) < frames:
-            remaining_s = give_up_s - self._bus.now_s
-            frame = self._bus.read(remaining_s) if remaining_s > 0 else None
+        for remaining_s in time_left(self._bus, REPLY_TIMEOUT_S):
+            frame = self._bus.read(remaining_s)
             if frame is None:
                 return None
             if frame.extended or frame.can_id >> 4 != self._base:
@@ -234,7 +233,9 @@ class AtiCan(PolledDevice):
                 answer.append(frame.data)
             else:
                 self._counters.late += 1
-        return answer
+            if len(answer) == frames:
+                return answer
+        return None
 
 
 def open_ati_can(

@@ -15,7 +15,7 @@ from drivers.errors import FrameError, LinkTimeoutError
 from drivers.registry import Driver
 from drivers.streaming import Samples, StreamedDevice
 from drivers.transport import open_transport
-from drivers.transport.transport import Transport
+from drivers.transport.transport import Transport, arriving
 from drivers.transport.udp import split_address
 
 ANSWER_TIMEOUT_S = 1.0
@@ -71,10 +71,10 @@ class AtiNet(StreamedDevice):
         link = self._open_calibration()
         try:
             link.write(protocol.READ_CALIBRATION)
-            give_up_s = link.now_s + ANSWER_TIMEOUT_S
             answer = b""
-            while len(answer) < protocol.CALIBRATION_SIZE and link.now_s < give_up_s:
-                answer += link.read(give_up_s - link.now_s)
+            for answer in arriving(link, ANSWER_TIMEOUT_S):
+                if len(answer) >= protocol.CALIBRATION_SIZE:
+                    break
         finally:
             link.close()
         if not answer:

@@ -18,7 +18,7 @@ from drivers.errors import CodedError, DriverError, FrameError
 from drivers.polling import PolledDrive
 from drivers.registry import BaudOption, Driver, RateOption, made
 from drivers.transport import open_line
-from drivers.transport.transport import Transport
+from drivers.transport.transport import Transport, time_left
 
 REPLY_TIMEOUT_S = 0.02
 """Time for an answer: 500 us at most in the device, and what a USB adapter takes."""
@@ -70,11 +70,10 @@ class Line:
 
     def _receive(self) -> bytes | None:
         """Return error and parameters of the next status packet, None when none comes in time."""
-        give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
         came = b""
-        while True:
-            found = protocol.find(came)
-            if found is not None:
+        for remaining_s in time_left(self._transport, REPLY_TIMEOUT_S):
+            came += self._transport.read(remaining_s)
+            while (found := protocol.find(came)) is not None:
                 packet, came = found
                 try:
                     device_id, instruction, body = protocol.decode(packet)
@@ -85,14 +84,11 @@ class Line:
                 if device_id == self._id and instruction == protocol.STATUS and body:
                     self._counters.discarded_bytes += len(came)
                     return body
-                continue  # an adapter's echo, or another device's
-            remaining_s = give_up_s - self._transport.now_s
-            if remaining_s <= 0:
-                if came:
-                    self._counters.crc_errors += 1  # bytes of it are missing
-                    self._counters.discarded_bytes += len(came)
-                return None
-            came += self._transport.read(remaining_s)
+                # else it is an adapter's echo, or another device's
+        if came:
+            self._counters.crc_errors += 1  # bytes of it are missing
+            self._counters.discarded_bytes += len(came)
+        return None
 
     def _checked(self, body: bytes, instruction: int) -> bytes:
         self.alert = bool(body[0] & protocol.ALERT)

@@ -16,6 +16,7 @@ from drivers.counters import TRIES, DeviceCounters
 from drivers.epos4.dictionary import object_dictionary
 from drivers.errors import CodedError, DriverError, LinkTimeoutError
 from drivers.transport.can_bus import CanBus, CanFrame
+from drivers.transport.transport import time_left
 
 T = TypeVar("T")
 REPLY_TIMEOUT_S = 0.1
@@ -134,13 +135,12 @@ class _InlineSdo(SdoClient):
     pump: Callable[[float], bool]
 
     def read_response(self) -> bytes:
-        bus = self.bus
-        give_up_s = bus.now_s + REPLY_TIMEOUT_S
-        while self.responses.empty():
-            remaining_s = give_up_s - bus.now_s
-            if remaining_s <= 0:
-                raise SdoCommunicationError("No SDO response received")
+        for remaining_s in time_left(self.bus, REPLY_TIMEOUT_S):
+            if not self.responses.empty():
+                break
             self.pump(remaining_s)
+        if self.responses.empty():
+            raise SdoCommunicationError("No SDO response received")
         self.RESPONSE_TIMEOUT = 0.001  # it is there
         answer: bytes = super().read_response()  # type: ignore[no-untyped-call]
         return answer

@@ -13,6 +13,7 @@ from drivers.epos4 import protocol
 from drivers.epos4.faults import DriveFaultError, fault
 from drivers.epos4.protocol import Feedback
 from drivers.errors import FrameError, LinkTimeoutError
+from drivers.transport.transport import time_left
 
 if TYPE_CHECKING:
     from drivers.epos4.canopen_link import CanopenLink
@@ -218,13 +219,12 @@ class Cycle:
             self._link.pump(0.0)  # not asleep: who is late already would wake up later still
         self._synced_s = self._bus.now_s
         self._link.send(0x80)
-        give_up_s = self._bus.now_s + FEEDBACK_TIMEOUT_S
-        while True:
-            feedback, self._feedback = self._feedback, None
-            remaining_s = give_up_s - self._bus.now_s
-            if feedback is not None or remaining_s <= INSTANT_S:
-                return feedback
+        for remaining_s in time_left(self._bus, FEEDBACK_TIMEOUT_S):
+            if self._feedback is not None:
+                break
             self._link.pump(remaining_s)
+        feedback, self._feedback = self._feedback, None
+        return feedback
 
     def command(self, controlword: int, torque_per_mille: int) -> None:
         """Send a controlword and a target torque; the drive takes them at once."""

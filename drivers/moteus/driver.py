@@ -18,7 +18,7 @@ from drivers.moteus.protocol import State
 from drivers.polling import PolledDrive
 from drivers.registry import Driver, RateOption, made
 from drivers.transport import open_transport
-from drivers.transport.transport import Transport
+from drivers.transport.transport import Transport, time_left
 
 REPLY_TIMEOUT_S = 0.02
 """Time for an answer: below a millisecond on the bus, and what USB takes."""
@@ -67,11 +67,10 @@ class FdcanusbLink:
     def _receive(self) -> bytes | None:
         """Return the data of the controller's next frame, None when none comes in time."""
         wanted = self._id << 8 | protocol.HOST
-        give_up_s = self._transport.now_s + REPLY_TIMEOUT_S
-        while True:
-            line, end, rest = self._held.partition(b"\n")
-            if end:
-                self._held = rest
+        for remaining_s in time_left(self._transport, REPLY_TIMEOUT_S):
+            self._held += self._transport.read(remaining_s)
+            while b"\n" in self._held:
+                line, _, self._held = self._held.partition(b"\n")
                 try:
                     frame = protocol.decode_line(line)
                 except FrameError:
@@ -80,14 +79,10 @@ class FdcanusbLink:
                     continue
                 if frame is not None and frame[0] == wanted:
                     return frame[1]
-                continue
-            if len(line) > protocol.LONGEST_LINE:
+            if len(self._held) > protocol.LONGEST_LINE:
+                self._counters.discarded_bytes += len(self._held)
                 self._held = b""
-                self._counters.discarded_bytes += len(line)
-            remaining_s = give_up_s - self._transport.now_s
-            if remaining_s <= 0:
-                return None
-            self._held += self._transport.read(remaining_s)
+        return None
 
 
 class Moteus(PolledDrive):

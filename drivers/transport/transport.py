@@ -29,11 +29,17 @@ class Transport(Clocked, Protocol):
         """
 
 
+def time_left(way: Clocked, timeout_s: float) -> Iterator[float]:
+    """Yield the time that is left, s, by the clock of a way, until there is none."""
+    give_up_s = way.now_s + timeout_s
+    while (remaining_s := give_up_s - way.now_s) > 1e-9:  # less is a sum's rounding
+        yield remaining_s
+
+
 def arriving(transport: Transport, timeout_s: float) -> Iterator[bytes]:
     """Yield all that has come from now on, again after each read, until the time is over."""
-    give_up_s = transport.now_s + timeout_s
     came = b""
-    while (remaining_s := give_up_s - transport.now_s) > 1e-9:  # less is a sum's rounding
+    for remaining_s in time_left(transport, timeout_s):
         came += transport.read(remaining_s)
         yield came
 
