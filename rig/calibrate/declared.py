@@ -34,7 +34,7 @@ from estimation.rest import SPINDLE_SPEED
 from rig.calibrate.raw import KIND, read_raw
 from rig.errors import UsageError
 from rig.log.check import looks_like_log
-from rig.log.reader import read_log
+from rig.log.reader import read_head
 
 STEADY = LowPass(cutoff_hz=20.0, order=3)
 """Steady motion is slow; noise of the current, a regressor, would pass for creep."""
@@ -91,7 +91,7 @@ def is_raw(path: Path) -> bool:
     first = next(iter(sorted(path.glob("*.mcap"))), None)
     if first is None or not looks_like_log(first):
         return False
-    run = read_log(first, topics=(), tolerant=True, checksums=False).run
+    run = read_head(first).run
     return run is not None and KIND in run.details
 
 

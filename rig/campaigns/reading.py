@@ -5,8 +5,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rig.campaigns.index import CALIBRATION, IndexedRun
-from rig.log.attempts import heads_of, is_unfinished, run_name, standing
-from rig.log.reader import LogFile
+from rig.log.attempts import is_unfinished, run_name, standing
+from rig.log.reader import LogFile, read_head
 from rig.log.scan import NotALogError
 from rig.log.streams import SAMPLE
 from rig.output.provenance import utc_of
@@ -17,7 +17,7 @@ def runs_in(paths: Sequence[Path]) -> list[IndexedRun]:
     heads, runs = [], []
     for path in paths:
         try:
-            heads += heads_of([path])
+            heads.append(read_head(path))
         except NotALogError as error:
             why, name = str(error), path.name
             runs.append(IndexedRun(name, path.stem, "", "", "", "", {}, "", why, 0, 0, None, why))

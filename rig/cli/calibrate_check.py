@@ -54,13 +54,13 @@ def check(
     from calibration.agreement import NoPairError, agreements
     from rig.calibrate.zeros import zero_motions
     from rig.importers.registry import open_campaign
-    from rig.log.attempts import heads_of
+    from rig.log.reader import read_head
 
     campaign = open_campaign(path, format_)
     say_left_out(path, campaign)
     kept = campaign.evidence.runs
     logs = [run.source for run in kept if run.source and run.source.suffix == ".mcap"]
-    zeros = zero_motions(heads_of(logs))
+    zeros = zero_motions(list(map(read_head, logs)))
     try:
         found = agreements(handle.recording() for handle in kept)
     except NoPairError:

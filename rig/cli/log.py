@@ -97,8 +97,8 @@ def check(path: LogOrFolder, json: JsonFlag = False) -> int:
 
 def _heads(path: Path) -> "tuple[list[LogFile], list[str]]":
     """Return the heads of the logs at a path, and the files of a folder that are no logs."""
-    from rig.log.attempts import heads_of
     from rig.log.check import logs_in
+    from rig.log.reader import read_head
     from rig.log.scan import NotALogError
 
     heads, foreign = [], []
@@ -107,7 +107,7 @@ def _heads(path: Path) -> "tuple[list[LogFile], list[str]]":
         raise UsageError(f"There is no log in {path}.", fix="Name a file or another folder.")
     for item in logs:
         try:
-            heads += heads_of([item])
+            heads.append(read_head(item))
         except NotALogError as error:
             if item == path:
                 raise

@@ -6,11 +6,11 @@ from pathlib import Path
 from estimation.campaign import Campaign, Run
 from estimation.recording import Recording
 from rig.errors import DataError
-from rig.log.attempts import heads_of, is_unfinished, run_name, standing, started_ns
+from rig.log.attempts import is_unfinished, run_name, standing, started_ns
 from rig.log.check import logs_in, looks_like_log
 from rig.log.convert import exclusion, recording_from_log
 from rig.log.devices import device_topics
-from rig.log.reader import LogFile, damaged, read_log
+from rig.log.reader import LogFile, damaged, read_head, read_log
 from rig.log.streams import SAMPLE
 
 
@@ -50,7 +50,7 @@ class LogImporter:
         read, bad = [], []
         for item in paths:
             try:
-                read += [_sound(log) for log in heads_of([item])]
+                read.append(_sound(read_head(item)))
             except DataError as error:
                 bad.append(_unreadable(item, error))
         if not read:

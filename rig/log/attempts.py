@@ -3,21 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from rig.log.reader import LogFile, read_log
+from rig.log.reader import LogFile
 from rig.log.repair import repaired_from
 from rig.log.writer import PART_SUFFIX
 
 SET_ASIDE = ".aborted-"
 """Stands before the number of an attempt that was set aside, in the name of its log."""
-
-
-def heads_of(paths: Sequence[Path]) -> list[LogFile]:
-    """Read what is known about logs without their samples.
-
-    Raises:
-        NotALogError: A file is not MCAP.
-    """
-    return [read_log(path, topics=(), tolerant=True, checksums=False) for path in paths]
 
 
 def standing(heads: Sequence[LogFile]) -> list[LogFile]:

@@ -156,6 +156,15 @@ def read_log(
     return log
 
 
+def read_head(path: Path) -> LogFile:
+    """Read what is known about a log without its samples.
+
+    Raises:
+        NotALogError: The file is not MCAP.
+    """
+    return read_log(path, topics=(), tolerant=True, checksums=False)
+
+
 def damaged(log: LogFile) -> DamagedLogError:
     """Return the error that describes the damage of a log."""
     first = log.damage[0]
