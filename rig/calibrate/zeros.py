@@ -40,11 +40,10 @@ def zero_motions(logs: Sequence[LogFile]) -> list[ZeroMotion]:
     zeros: dict[str, list[tuple[float, float]]] = defaultdict(list)
     limits: dict[str, float | None] = {}
     for log in logs:
-        attached = {item.name: item.data for item in log.attachments}
-        if log.run is None or log.end is None or ATTACHMENT not in attached:
+        if log.run is None or log.end is None or log.attached(ATTACHMENT) is None:
             continue
         lines = carried_calibrations(log).channels
-        limits |= json.loads(attached.get(CONFIG, b"{}")).get("drift", {})
+        limits |= json.loads(log.attached(CONFIG) or b"{}").get("drift", {})
         for key, before in log.run.zeros_before.items():
             line = lines.get(key.removesuffix(ZERO_SUFFIX))
             after = log.end.zeros_after.get(key)

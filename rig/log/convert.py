@@ -127,10 +127,8 @@ def recording_from_log(log: LogFile) -> Recording:
 
 def _has_simulated_logger(log: LogFile) -> bool:
     """Whether the configuration that a log carries is that of a simulated rig."""
-    for item in log.attachments:
-        if item.name == CONFIG:
-            with suppress(ValueError, KeyError, TypeError):
-                return str(json.loads(item.data)["logger"]["url"]).startswith("sim:")
+    with suppress(ValueError, KeyError, TypeError):
+        return str(json.loads(log.attached(CONFIG) or b"")["logger"]["url"]).startswith("sim:")
     return False
 
 

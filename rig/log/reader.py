@@ -91,6 +91,10 @@ class LogFile:
     salvaged: Mapping[str, int] = field(default_factory=dict)
     indexed: Mapping[str, int] = field(default_factory=dict)
 
+    def attached(self, name: str) -> bytes | None:
+        """Return the content of the file of a name that the log carries; None without it."""
+        return next((item.data for item in self.attachments if item.name == name), None)
+
 
 def read_log(
     path: Path,

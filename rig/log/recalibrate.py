@@ -20,14 +20,14 @@ def carried_calibrations(log: LogFile) -> CalibrationSet:
         UsageError: It carries none.
         CalibrationError: What it carries is not a set.
     """
-    for item in log.attachments:
-        if item.name == ATTACHMENT:
-            return CalibrationSet.from_json(item.data.decode())
-    raise UsageError(
-        f"{log.path} carries no calibrations.",
-        "It was not recorded by this rig.",
-        "Name a whole set with --calibration.",
-    )
+    carried = log.attached(ATTACHMENT)
+    if carried is None:
+        raise UsageError(
+            f"{log.path} carries no calibrations.",
+            "It was not recorded by this rig.",
+            "Name a whole set with --calibration.",
+        )
+    return CalibrationSet.from_json(carried.decode())
 
 
 def recalibrated(log: LogFile, calibrations: CalibrationSet) -> LogFile:

@@ -1,6 +1,5 @@
 """A simulated run made again from its log: the commands, the compiled core and the plant."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from drivers.teensy.protocol import TRIP_SHIFT, Trip
 from rig.configuration.config import Config
 from rig.errors import DataError, UsageError
 from rig.log.reader import LogFile, read_log
+from rig.log.run import CONFIG
 from rig.log.streams import COUNTS, FLIGHT
 from rig.machines.choose import machine_of
 from rig.simulation.logger import open_simulated_logger
@@ -98,10 +98,10 @@ def replay_core(path: Path, config: Config | None = None) -> CoreReplay:
 
 
 def _config_of(log: LogFile) -> Config:
-    for attached in log.attachments:
-        if attached.name == "config.json":
-            return Config.model_validate(json.loads(attached.data))
-    raise DataError(f"{log.path} has no configuration.", fix="Name one with --config.")
+    carried = log.attached(CONFIG)
+    if carried is None:
+        raise DataError(f"{log.path} has no configuration.", fix="Name one with --config.")
+    return Config.model_validate_json(carried)
 
 
 def _commands(rows: NDArray[np.void]) -> list[tuple[int, bytes]]:

@@ -8,11 +8,10 @@ from pathlib import Path
 from estimation.recording import Mark
 from rig.bench.companions import Beside
 from rig.bench.session import Session
-from rig.log.recalibrate import ZERO_SUFFIX
 from rig.log.run import RunEnd, RunInfo
 from rig.log.streams import COUNTS, SAMPLE
 from rig.machines.reading import Reading
-from rig.recording.session_log import SessionLog
+from rig.recording.session_log import SessionLog, mean_counts
 
 
 class LiveRecorder:
@@ -61,7 +60,7 @@ class LiveRecorder:
             name=self.path.stem,
             conditions={"trajectory": self._kind},
             started_at_ns=time.time_ns(),
-            zeros_before={n + ZERO_SUFFIX: zero for n, zero in self._session.zeros.items()},
+            zeros_before=mean_counts(self._session.zeros),
         )
         self._log = SessionLog(self._session, self.path, info, further=self._further)
         self._samples = self._marks = 0
