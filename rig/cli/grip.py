@@ -32,7 +32,7 @@ def grip(
     """
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
-    from rig.live.estimator import ModelEstimator, require_channels
+    from rig.live.estimator import estimators_of, require_channels
     from rig.live.grip import SHARE, hold_grip
     from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
@@ -42,7 +42,7 @@ def grip(
     path = model or settings.model_path
     if path is None:
         raise UsageError("No model estimates the torque.", fix="Name one with --model FILE.")
-    estimator = ModelEstimator(path, SAMPLE_RATE_HZ)
+    estimator = estimators_of(path, SAMPLE_RATE_HZ)[0]
     require_channels([estimator], settings, path)
     screen = results(json)
     held = []

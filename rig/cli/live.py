@@ -13,7 +13,7 @@ from rig.output.console import JsonLinesFlag, present, remarks, results
 if TYPE_CHECKING:
     from estimation.campaign import Campaign
     from estimation.recording import Recording
-    from rig.live.estimator import ModelEstimator
+    from rig.live.estimator import LiveEstimator
     from rig.live.web_server import PageServer
 
 
@@ -264,7 +264,7 @@ def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
 
 def _estimators(
     recording: "Recording", model: Path | None, any_instrument: bool, quiet: bool
-) -> "list[ModelEstimator]":
+) -> "list[LiveEstimator]":
     """Begin the estimates of the named model, else of that in use, at the recording's rate."""
     from estimation.estimators.instrument import require_own
     from rig.configuration.model_in_use import model_in_use

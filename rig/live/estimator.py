@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from estimation import model_file
 from estimation.bank.edges import other_levels
 from estimation.channels import ESTIMATED
-from estimation.estimator import Stepper, load
+from estimation.estimator import Estimator, Stepper, load
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.instrument import require_own
-from estimation.estimators.model import ModelEstimator as PhysicalEstimator
-from estimation.estimators.model import usual_half_width
+from estimation.estimators.model import ModelEstimator, usual_half_width
 from estimation.estimators.network import NetworkEstimator
-from estimation.model import Model
+from estimation.estimators.origin import Origin
+from estimation.model import Evidence, Model
 from estimation.recording import FloatArray, MissingChannelError, Recording
 from estimation.signals import reference
 from rig.configuration.config import Config
@@ -28,53 +28,44 @@ from rig.live.joint_forces import AXES, JOINTS, interval_of_joints
 NOT_STATED: Mapping[str, float | str] = {}
 
 
-class ModelEstimator:
+class LiveEstimator:
     """Feeds blocks to an estimator's causal stream."""
 
     def __init__(
         self,
-        path: Path,
+        estimator: Estimator,
         sample_rate_hz: float,
-        balance: str | None = None,
         conditions: Mapping[str, float | str] = NOT_STATED,
     ) -> None:
-        """Read an estimator and begin before the first sample.
+        """Begin before the first sample.
 
         Args:
-            path: Model file, or a state estimator or a network (`.npz`).
+            estimator: The estimator.
             sample_rate_hz: Nominal rate of the device's clock, Hz.
-            balance: Which model of a file of several; by default the first.
             conditions: Conditions of the run, as far as they are known.
 
         Raises:
-            EstimationError: The file is not an estimator, the model is not fitted, or it cannot run
-                at this rate.
+            EstimationError: The model is not fitted, or it cannot run at this rate.
         """
         self.model: Model | None = None  # only a physical model has effects to watch
         self.usual_half_width: float | None = None
-        self._settles_s, self._began_s = 0.0, math.nan
         self.instrument = ""  # a physical model has none
-        self.is_of_simulation = False  # as far as the file states where its recordings are from
         self.other_levels: Mapping[str, float] = {}  # conditions of the run that no run fitted had
-        if path.suffix == ".npz":
-            estimator = load(path)
-            if isinstance(estimator, BankEstimator):
-                self.other_levels = other_levels(estimator.only, conditions)
-                estimator = estimator.at(conditions)
-                interval = estimator.interval
-                self.usual_half_width = interval.typical if interval is not None else None
-            if isinstance(estimator, BankEstimator | NetworkEstimator):
-                self.instrument = estimator.instrument
-                origin = estimator.origin
-                self.is_of_simulation = origin is not None and origin.is_simulated
-        else:
-            models = model_file.read_all(path)
-            self.model = next((m for m in models if m.balance == balance), models[0])
-            estimator = PhysicalEstimator(self.model)
+        self._settles_s, self._began_s = 0.0, math.nan
+        origin: Evidence | Origin | None = None
+        if isinstance(estimator, ModelEstimator):
+            self.model = estimator.model
             self.usual_half_width = usual_half_width(self.model)
-            evidence = self.model.evidence
-            self.is_of_simulation = evidence is not None and evidence.is_simulated
             self._settles_s = 2.0 * self.model.low_pass.reach_s  # as offline, at either end
+            origin = self.model.evidence
+        elif isinstance(estimator, BankEstimator | NetworkEstimator):
+            self.instrument, origin = estimator.instrument, estimator.origin
+        if isinstance(estimator, BankEstimator):
+            self.other_levels = other_levels(estimator.only, conditions)
+            estimator = estimator.at(conditions)
+            interval = estimator.interval
+            self.usual_half_width = interval.typical if interval is not None else None
+        self.is_of_simulation = origin is not None and origin.is_simulated  # as far as stated
         self.target_channel = estimator.target
         self.stream: Stepper = estimator.stepper(sample_rate_hz)
 
@@ -110,18 +101,27 @@ class ModelEstimator:
         return np.where(time_s - self._began_s < self._settles_s, np.nan, estimate)
 
 
-def within_range(estimator: ModelEstimator, estimate: FloatArray) -> FloatArray:
+def within_range(estimator: LiveEstimator, estimate: FloatArray) -> FloatArray:
     """Return the estimate of the last samples, NaN outside the estimator's range, shape (n,)."""
     return estimate if estimator.inside is None else np.where(estimator.inside, estimate, np.nan)
 
 
 def estimators_of(
     path: Path, sample_rate_hz: float, conditions: Mapping[str, float | str] = NOT_STATED
-) -> list[ModelEstimator]:
-    """Return the estimators of a file, each before its first sample; as `ModelEstimator`."""
+) -> list[LiveEstimator]:
+    """Return the estimators of a file, each before its first sample.
+
+    The file is a model file, or a state estimator or a network (`.npz`).
+
+    Raises:
+        EstimationError: The file is not an estimator, else as `LiveEstimator`.
+    """
+    found: list[Estimator]
     if path.suffix == ".npz":
-        return [ModelEstimator(path, sample_rate_hz, conditions=conditions)]
-    return [ModelEstimator(path, sample_rate_hz, m.balance) for m in models_in_use(path)]
+        found = [load(path)]
+    else:
+        found = [ModelEstimator(model) for model in models_in_use(path)]
+    return [LiveEstimator(one, sample_rate_hz, conditions) for one in found]
 
 
 def with_estimates(recording: Recording, path: Path) -> Recording:
@@ -160,19 +160,19 @@ def without_interval(models: Iterable[Model | None], path: Path) -> list[str]:
     ]
 
 
-def half_widths(estimators: Sequence[ModelEstimator]) -> dict[str, float]:
+def half_widths(estimators: Sequence[LiveEstimator]) -> dict[str, float]:
     """Return half of the 95 % interval of each channel, SI, as of the newest sample."""
     found = {estimator.target_channel: estimator.stream.half_width for estimator in estimators}
     return interval_of_joints({k: width for k, width in found.items() if width is not None})
 
 
-def shown_channels(estimators: Sequence[ModelEstimator], usual: tuple[str, ...]) -> tuple[str, ...]:
+def shown_channels(estimators: Sequence[LiveEstimator], usual: tuple[str, ...]) -> tuple[str, ...]:
     """Return the signals to show: a grasper's joints, else the estimates, else the default."""
     targets = tuple(estimator.target_channel for estimator in estimators)
     return JOINTS if set(targets) & set(AXES) else targets or usual
 
 
-def require_channels(estimators: Sequence[ModelEstimator], config: Config, path: Path) -> None:
+def require_channels(estimators: Sequence[LiveEstimator], config: Config, path: Path) -> None:
     """Refuse a model that reads channels which the configured rig does not have.
 
     Of a rig without a logger board the channels are known only once its device is connected.
@@ -199,7 +199,7 @@ def require_channels(estimators: Sequence[ModelEstimator], config: Config, path:
     )
 
 
-def require_measured(estimators: Sequence[ModelEstimator], config: Config, path: Path) -> None:
+def require_measured(estimators: Sequence[LiveEstimator], config: Config, path: Path) -> None:
     """Refuse a model that states it is of simulated recordings, for a real rig (UsageError)."""
     if config.is_simulated or not any(one.is_of_simulation for one in estimators):
         return

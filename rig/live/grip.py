@@ -16,7 +16,7 @@ from drivers.teensy.reference import REFERENCE
 from estimation.rest import CLOSING_RAD_S
 from rig.bench.session import Session
 from rig.errors import SafetyTripError, UsageError
-from rig.live.estimator import ModelEstimator, within_range
+from rig.live.estimator import LiveEstimator, within_range
 from rig.machines.reading import Reading
 from rig.protocols import trajectory
 
@@ -82,7 +82,7 @@ class Grip:
 
 
 def hold_grip(
-    session: Session, estimator: ModelEstimator, torque_n_m: float, duration_s: float
+    session: Session, estimator: LiveEstimator, torque_n_m: float, duration_s: float
 ) -> Iterator[Held]:
     """Hold a grip torque, closing positive, in an open session; yield each period as it ends.
 

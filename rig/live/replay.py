@@ -10,7 +10,7 @@ from estimation.channels import ESTIMATED
 from estimation.recording import Flag, FloatArray, Recording
 from rig.errors import DataError, UsageError
 from rig.live.block import DeviceStatus, SampleBlock
-from rig.live.estimator import ModelEstimator
+from rig.live.estimator import LiveEstimator
 from rig.live.keys import LEAVE, OF_DISPLAY, Keys, no_keys
 
 OF_REPLAY = {
@@ -30,7 +30,7 @@ SHORTEST_WAIT_S, LONGEST_WAIT_S = 1e-4, 0.1
 
 def replay_blocks(
     recording: Recording,
-    estimators: Sequence[ModelEstimator],
+    estimators: Sequence[LiveEstimator],
     speed: float | None,
     keys: Keys = no_keys,
 ) -> Iterator[SampleBlock]:
@@ -53,7 +53,7 @@ def replay_blocks(
 
 
 def _blocks(
-    recording: Recording, estimators: Sequence[ModelEstimator], pace: "_Pace"
+    recording: Recording, estimators: Sequence[LiveEstimator], pace: "_Pace"
 ) -> Iterator[SampleBlock]:
     lost = lost_samples(recording)
     start_s = float(recording.time_s[0])

@@ -14,7 +14,7 @@ from rig.bench.companions import Beside, Companion
 from rig.bench.session import Session
 from rig.configuration.config import Config
 from rig.live.block import DeviceStatus, LimitStatus, SampleBlock
-from rig.live.estimator import ModelEstimator, within_range
+from rig.live.estimator import LiveEstimator, within_range
 from rig.live.keys import LEAVE, MARK, RECORD, STOP, TARE, Keys, no_keys
 from rig.live.status import CalibrationStatus
 from rig.log.devices import topic_of
@@ -29,7 +29,7 @@ def session_blocks(
     config: Config,
     open_transport: Callable[[], Transport],
     plans: Sequence[Plan],
-    estimators: Sequence[ModelEstimator],
+    estimators: Sequence[LiveEstimator],
     keys: Keys = no_keys,
     folder: Path = Path("logs"),
 ) -> Iterator[SampleBlock]:

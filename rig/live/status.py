@@ -18,7 +18,7 @@ from estimation.watch import ResidualWatch, Sight
 from rig.configuration.config import Config
 from rig.live import text as words
 from rig.live.block import DeviceStatus, SampleBlock, Step, joined
-from rig.live.estimator import ModelEstimator
+from rig.live.estimator import LiveEstimator
 from rig.live.joint_forces import with_joint_forces
 from rig.live.state import Value
 from rig.machines.reading import Reading
@@ -75,7 +75,7 @@ class CalibrationStatus:
 class ModelStatus:
     """Holds models against today and what they estimate against what they were fitted on."""
 
-    def __init__(self, models: Sequence[Model], estimators: Sequence[ModelEstimator] = ()) -> None:
+    def __init__(self, models: Sequence[Model], estimators: Sequence[LiveEstimator] = ()) -> None:
         self._estimators = estimators
         ranges = {model.target: fitted_range(model) for model in models}
         self._ranges = {target: known for target, known in ranges.items() if known is not None}
@@ -152,7 +152,7 @@ class FitStatus:
         return DeviceStatus("model", state, f"{self._model.name}: {detail}")
 
 
-def model_steps(estimators: Sequence[ModelEstimator]) -> list[Step]:
+def model_steps(estimators: Sequence[LiveEstimator]) -> list[Step]:
     """Return the steps of blocks that estimators estimate on.
 
     They add the forces of a grasper's joints, the state of the models, and of a single declared

@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from estimation.estimator import load
 from rig.bench.session import Session
 from rig.errors import SafetyTripError
-from rig.live.estimator import ModelEstimator
+from rig.live.estimator import LiveEstimator
 from rig.live.grip import hold_grip
 from tests.rig.simulated import is_armed, simulated, transport
 
@@ -60,7 +61,7 @@ def test_a_torque_there_was_no_time_for_is_not_called_held(said):
     assert "longer --duration" in err
 
 
-class ValidOnClosing(ModelEstimator):
+class ValidOnClosing(LiveEstimator):
     """The shipped model, which on opening gives a number far off, and knows that it does."""
 
     def push(self, columns, time_s):
@@ -75,7 +76,7 @@ class ValidOnClosing(ModelEstimator):
 
 def test_the_load_follows_samples_within_the_estimators_range_alone():
     config = simulated()
-    estimator = ValidOnClosing(config.model_path, 1000.0)
+    estimator = ValidOnClosing(load(config.model_path), 1000.0)
     with Session(config, transport(config)) as session:
         held = list(hold_grip(session, estimator, 0.05, 24.0))
     assert held[-1].estimate_n_m == pytest.approx(0.05, abs=0.005)
@@ -83,9 +84,9 @@ def test_the_load_follows_samples_within_the_estimators_range_alone():
 
 def test_an_estimator_that_is_never_within_its_range_moves_no_load(said, monkeypatch):
     never = property(lambda self: np.zeros(len(self.last), bool))
-    monkeypatch.setattr(ModelEstimator, "inside", never)
-    push = ModelEstimator.push
+    monkeypatch.setattr(LiveEstimator, "inside", never)
+    push = LiveEstimator.push
     monkeypatch.setattr(
-        ModelEstimator, "push", lambda self, c, t: setattr(self, "last", t) or push(self, c, t)
+        LiveEstimator, "push", lambda self, c, t: setattr(self, "last", t) or push(self, c, t)
     )
     assert "never within" in said("grip --torque 0.05 --duration 8", code=1).out

@@ -18,7 +18,7 @@ from estimation.recording import MissingChannelError, Recording
 from rig.configuration.config import SHIPPED
 from rig.diagnosis.subject import subject
 from rig.live.block import DeviceStatus
-from rig.live.estimator import ModelEstimator, half_widths
+from rig.live.estimator import estimators_of, half_widths
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints, of_joints
 from rig.live.replay import replay_blocks
 from rig.live.status import ModelStatus
@@ -48,7 +48,7 @@ def motor(tmp_path):
     evidence = replace(fitted.evidence, half_width=0.01)
     model_file.write(replace(fitted, evidence=evidence), path)
     run = made.runs[0].recording()
-    return lambda: ModelEstimator(path, run.sample_rate_hz), run
+    return lambda: estimators_of(path, run.sample_rate_hz)[0], run
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def model_path(tmp_path):
 
 def test_replayed_estimates_are_the_causal_prediction(model_path):
     run = recording(7)
-    estimator = ModelEstimator(model_path, run.sample_rate_hz)
+    (estimator,) = estimators_of(model_path, run.sample_rate_hz)
     blocks = list(replay_blocks(run, [estimator], speed=None))
     live = np.concatenate([block.estimates[SPINDLE] for block in blocks])
     offline = predict(model_file.read(model_path), run, causal=True)
@@ -100,7 +100,7 @@ def test_a_physical_model_states_no_interval_at_rest(motor):
 
 def test_a_channel_the_model_lacks_is_named(model_path):
     run = Recording("x", np.arange(100) / 1000, {SPINDLE: np.zeros(100)})
-    estimator = ModelEstimator(model_path, 1000.0)
+    (estimator,) = estimators_of(model_path, 1000.0)
     with pytest.raises(MissingChannelError, match="motor_current_a"):
         list(replay_blocks(run, [estimator], speed=None))
 
@@ -110,7 +110,7 @@ def test_a_state_estimator_runs_live_as_offline(tmp_path):
     fitted = BankRecipe(SPINDLE, Bank("motor_current_a"), causal=True).fit(Campaign.of(runs[1:]))
     path = tmp_path / "states.npz"
     fitted.save(path)
-    estimator = ModelEstimator(path, runs[0].sample_rate_hz)
+    (estimator,) = estimators_of(path, runs[0].sample_rate_hz)
     assert estimator.model is None
     assert estimator.target_channel == SPINDLE
     live, widths = [], []

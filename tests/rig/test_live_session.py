@@ -17,7 +17,7 @@ from estimation import model_file
 from estimation.rest import in_motion
 from rig.configuration.config import load_config
 from rig.live.block import DeviceStatus, through
-from rig.live.estimator import ModelEstimator
+from rig.live.estimator import estimators_of
 from rig.live.keys import display_keys
 from rig.live.session_blocks import session_blocks
 from rig.log.reader import read_log
@@ -70,8 +70,8 @@ def test_the_shipped_model_is_live_as_good_as_its_file_states(tmp_path):
     """In motion, where the file's error was measured; the quick protocol is not the fitted one."""
     config = load_config()
     stated = model_file.read(config.model_path).evidence
-    estimator = ModelEstimator(config.model_path, 1000.0)
-    played = stream(config, tmp_path, load_protocol("quick").plans(), estimators=[estimator])
+    estimators = estimators_of(config.model_path, 1000.0)
+    played = stream(config, tmp_path, load_protocol("quick").plans(), estimators=estimators)
     blocks = list(through(played, duration_s=60.0))
     truth = np.concatenate([b.columns["distal_torque_n_m"] for b in blocks])
     error = np.concatenate([b.estimates["distal_torque_n_m"] for b in blocks]) - truth

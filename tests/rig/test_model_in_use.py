@@ -161,7 +161,7 @@ def test_what_the_live_display_records_has_the_estimate_that_was_shown(tmp_path)
 def test_an_estimate_outside_its_range_is_a_gap(recorded, home, monkeypatch, said):
     folder, fitted = recorded
     outside = property(lambda self: np.arange(3000) >= 1000)
-    monkeypatch.setattr("rig.live.estimator.ModelEstimator.inside", outside)
+    monkeypatch.setattr("rig.live.estimator.LiveEstimator.inside", outside)
     said("log export", folder, "--model motor.toml --format mcap --out gaps")
     made = open_campaign(home / "gaps").runs[0].recording()
     found = made.columns[f"estimated_{fitted.target}"]

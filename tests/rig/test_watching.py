@@ -11,7 +11,7 @@ from estimation.recording import Recording
 from rig.diagnosis.subject import declared_models
 from rig.importers.registry import open_campaign
 from rig.live.block import through
-from rig.live.estimator import ModelEstimator
+from rig.live.estimator import estimators_of
 from rig.live.replay import replay_blocks
 from rig.live.status import FitStatus
 from rig.recording.campaign import open_campaign_folder, record_campaign
@@ -70,7 +70,8 @@ def test_a_file_of_several_balances_is_watched_whole_and_its_first_runs_live(mod
     path = tmp_path / "both.model.toml"
     model_file.write_all([model_file.read(model), gearbox], path)
     assert [one["name"] for one in watch_runs(path).to_json()] == ["motor", "gearbox"]
-    assert ModelEstimator(path, 1000.0).target_channel == "proximal_torque_n_m"
+    (estimator,) = estimators_of(path, 1000.0)
+    assert estimator.target_channel == "proximal_torque_n_m"
     assert [m.balance for m in declared_models(path, None)] == ["motor", "gearbox"]
     assert [m.balance for m in declared_models(path, "gearbox")] == ["gearbox"]
 
