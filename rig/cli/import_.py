@@ -1,6 +1,7 @@
 """`rig import`: a table of samples, of any layout, becomes recordings."""
 
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -92,8 +93,14 @@ def import_(
             "Nothing states where the recordings are to be written.",
             fix="Add --out FOLDER, or look at the table first with --preview.",
         )
-    stated = {"--column": column, "--condition": condition, "--runs": runs, "--set": set_}
-    mapping = read_mapping(None if machine is None else place_of(machine), _flags(stated, rate))
+    flags = [
+        *_entries("--column", column, "columns"),
+        *_entries("--condition", condition, "conditions"),
+        *_entries("--runs", runs, "runs"),
+        *_entries("--set", set_),
+        *([] if rate is None else [(("sample_rate_hz",), rate, f"--rate {rate:g}")]),
+    ]
+    mapping = read_mapping(None if machine is None else place_of(machine), flags)
     said: list[Remark] = []
     try:
         recordings = list(read_runs(path, mapping, said))
@@ -164,27 +171,18 @@ def _cell(value: float | str) -> str:
     return value[:MOST_CELL] if isinstance(value, str) else f"{value:.10g}"
 
 
-PARTS = {"--column": ["columns"], "--condition": ["conditions"], "--runs": ["runs"], "--set": []}
-"""Option to the part of a mapping that it states."""
-
-
-def _flags(
-    stated: dict[str, list[str] | None], rate: float | None
-) -> list[tuple[tuple[str, ...], Any, str]]:
-    """Return the options as entries of a mapping, each with the words that state it."""
-    found: list[tuple[tuple[str, ...], Any, str]] = []
-    for option, words in stated.items():
-        for word in words or []:
-            name, equals, value = word.partition("=")
-            if not (name and equals and value):
-                raise UsageError(
-                    f"{option} {word} is not NAME=VALUE.", fix=f"Write {option} NAME=VALUE."
-                )
-            entry = _rule(name, value) if option == "--runs" else value
-            found.append(((*PARTS[option], name.strip()), entry, f"{option} {word}"))
-    if rate is not None:
-        found.append((("sample_rate_hz",), rate, f"--rate {rate:g}"))
-    return found
+def _entries(
+    option: str, words: list[str] | None, *part: str
+) -> Iterator[tuple[tuple[str, ...], Any, str]]:
+    """Yield an option's entries in a part of a mapping, each with the words that state it."""
+    for word in words or []:
+        name, _, value = word.partition("=")
+        if not (name and value):
+            raise UsageError(
+                f"{option} {word} is not NAME=VALUE.", fix=f"Write {option} NAME=VALUE."
+            )
+        entry = _rule(name, value) if option == "--runs" else value
+        yield (*part, name.strip()), entry, f"{option} {word}"
 
 
 def _rule(name: str, value: str) -> Any:
