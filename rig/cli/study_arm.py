@@ -12,7 +12,7 @@ from typer import Option
 
 from rig.cli.options import FiguresFolder, TablesFile, WorkersOption
 from rig.configuration.folders import cache_folder
-from rig.output.console import JsonFlag, counted, described, progress
+from rig.output.console import JsonFlag, counted, counting, described
 
 if TYPE_CHECKING:
     from rig.studies.seeds import Keeper
@@ -35,9 +35,8 @@ def resumable(
 
     kept = state or cache_folder() / study
     try:
-        with progress() as bar:
-            task = bar.add_task(what, total=total)
-            yield Keeper(kept, workers, lambda: bar.advance(task))
+        with counting(what, total) as advance:
+            yield Keeper(kept, workers, advance)
     except KeyboardInterrupt:
         sys.stderr.write(f"Finished parts are kept in {kept}: the same command resumes.\n")
         raise
