@@ -17,6 +17,7 @@ from pydantic import (
 )
 
 from calibration.linear import CalibrationSet, load_calibration_set, shipped_calibration_set
+from calibration.record import CalibrationRecord
 from calibration.rules import Verdict, judge, judge_raw, refuse_errors
 from calibration.store import (
     CalibrationStore,
@@ -163,6 +164,12 @@ class Config(Section):
         folder = default_folder()
         return CalibrationStore(simulated_folder(folder) if self.is_simulated else folder)
 
+    @property
+    def calibration_records(self) -> list[CalibrationRecord]:
+        """The store's active lines for the instrument, one a channel; none without a store."""
+        known = {} if self.store is None else active_lines(self.store, self.instrument.serial)
+        return list(known.values())
+
     def calibration_set(self) -> CalibrationSet:
         """Return the calibrations in use: the set, with the store's active lines in place of its.
 
@@ -172,10 +179,8 @@ class Config(Section):
         path = Path(self.calibration)
         is_file = path.suffix == ".toml"
         base = load_calibration_set(path) if is_file else shipped_calibration_set(self.calibration)
-        if self.store is None:
-            return base
         refuse_errors(self.calibration_verdicts())
-        return compose(base, active_lines(self.store, self.instrument.serial).values())
+        return compose(base, self.calibration_records)
 
     @property
     def drift_limits(self) -> dict[str, float]:
@@ -184,11 +189,12 @@ class Config(Section):
 
     def calibration_verdicts(self) -> list[Verdict]:
         """Return the objections to the store's active lines now; empty without a store."""
-        if self.store is None:
-            return []
-        lines = active_lines(self.store, self.instrument.serial).values()
         now = datetime.now(UTC)
-        return [v for line in lines for v in (*judge(line, now, self.serials), *judge_raw(line))]
+        return [
+            verdict
+            for line in self.calibration_records
+            for verdict in (*judge(line, now, self.serials), *judge_raw(line))
+        ]
 
     def changed(self, **sections: Any) -> "Config":
         """Return a configuration with some keys changed; a section is a dict of its own keys."""

@@ -6,9 +6,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from calibration.record import CalibrationRecord
 from calibration.rules import judge_range
-from calibration.store import active_lines
 from estimation.channels import unit_of
 from estimation.errors import EstimationError
 from estimation.estimators.model import fitted_range
@@ -42,9 +40,7 @@ class CalibrationStatus:
 
     def __init__(self, config: Config, set_name: str) -> None:
         self._set_name = set_name
-        self._records: Sequence[CalibrationRecord] = ()
-        if config.store is not None:
-            self._records = tuple(active_lines(config.store, config.instrument.serial).values())
+        self._records = config.calibration_records
         self._remarks = [f"{v.channel} {v.message}" for v in config.calibration_verdicts()]
 
     def of(self, reading: Reading) -> DeviceStatus:
