@@ -24,6 +24,7 @@ from estimation.campaign import Campaign, Run
 from estimation.recording import FloatArray, Instrument, Recording
 from rig.errors import DataError
 from rig.importers.derivatives import Relation, relation
+from rig.importers.registry import files_ending
 
 USUAL_RATE_HZ = 200.0
 RATES_HZ = (50.0, 100.0, 125.0, 200.0, 250.0, 500.0, 1000.0)
@@ -52,7 +53,7 @@ class PsmImporter:
 
     def recognises(self, path: Path) -> bool:
         """Whether the path is, or holds, text of 21 numeric columns without a header."""
-        return any(_first_line_fits(file) for file in _files(path)[:1])
+        return any(_first_line_fits(file) for file in files_ending(path, *SUFFIXES)[:1])
 
     def open(self, path: Path) -> Campaign:
         """Open a file, or the files of a folder sorted by name, as a campaign.
@@ -61,7 +62,7 @@ class PsmImporter:
             DataError: No such file. Reading a run raises DataError where its file is
                 damaged, naming file, line and what was expected.
         """
-        files = _files(path)
+        files = files_ending(path, *SUFFIXES)
         if not files:
             raise DataError(f"{path} holds no .csv or .csv.xz file.")
         return Campaign(tuple(Run(_stem(f), partial(load_run, f), f) for f in files))
@@ -185,11 +186,6 @@ def _fault(path: Path, line: int, what: str, expected: str) -> DataError:
         f"Expected {expected}. Nothing of the file was imported.",
         "Copy the file again from its source.",
     )
-
-
-def _files(path: Path) -> list[Path]:
-    entries = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [e for e in entries if e.is_file() and e.name.lower().endswith(SUFFIXES)]
 
 
 def _stem(path: Path) -> str:

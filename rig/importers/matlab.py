@@ -25,6 +25,7 @@ from estimation.channels import CHANNELS, unit_or_none
 from estimation.recording import FloatArray, Recording, RecordingError
 from rig.errors import DataError
 from rig.importers.mat5 import Mat5Error, Unread, Value, read_mat5
+from rig.importers.registry import files_ending
 
 TIME = "time_s"
 MAX_BYTES = 1 << 31
@@ -49,7 +50,7 @@ class MatlabImporter:
             names = [entry.name.lower() for entry in path.iterdir()]
             if not all(name.endswith(".mat") for name in names):
                 return False
-        return bool(_files(path))
+        return bool(files_ending(path, ".mat"))
 
     def open(self, path: Path) -> Campaign:
         """Open a file, or the files of a folder sorted by name, as a campaign.
@@ -60,7 +61,7 @@ class MatlabImporter:
             DataError: A file is damaged, or contains names that are not channels.
                 The message lists the found and the expected names.
         """
-        files = _files(path)
+        files = files_ending(path, ".mat")
         if not files:
             raise DataError(f"{path} holds no .mat file.")
         runs = []
@@ -87,11 +88,6 @@ def load_run(path: Path, name: str, part: str = "") -> Recording:
         return Recording(name, **contents[part], source=f"{path}:{part}" if part else str(path))
     except RecordingError as error:
         raise DataError(f"{path}: {error.what}", error.why, error.fix) from error
-
-
-def _files(path: Path) -> list[Path]:
-    entries = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [entry for entry in entries if entry.suffix.lower() == ".mat" and entry.is_file()]
 
 
 def _contents(path: Path) -> dict[str, dict[str, Any]]:

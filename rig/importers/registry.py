@@ -201,6 +201,12 @@ def files_below(folder: Path, depth: int = MAX_DEPTH) -> Iterator[Path]:
                 yield from files_below(entry, depth - 1)
 
 
+def files_ending(path: Path, *endings: str) -> list[Path]:
+    """Return the files at a path with an ending: the file itself, or those of a folder by name."""
+    entries = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [e for e in entries if e.is_file() and e.name.lower().endswith(endings)]
+
+
 def _named(files: list[str]) -> str:
     shown = ", ".join(files[:MAX_NAMES])
     return f"{len(files)} files, {shown}, ..." if len(files) > MAX_NAMES else shown
