@@ -36,7 +36,7 @@ def reference(
     ] = False,
     yes: Annotated[bool, Option("--yes", help="The rig stands at its mark; do not ask.")] = False,
     json: JsonFlag = False,
-) -> int:
+) -> None:
     """Give the encoders their zeros, after every restart of the board.
 
     Turn the rig by hand to its mark first. The board refuses while it is armed or a shaft turns.
@@ -68,7 +68,6 @@ def reference(
         {"referenced": identity.referenced, "boot": identity.boot, "at_rad": here_rad},
         f"{settings.name}: referenced at {place}; board {identity.serial}, start {identity.boot}.",
     )
-    return 0
 
 
 def stop(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
@@ -147,7 +146,7 @@ def _ended(ending: Ending | None) -> str:
     return f"The session that had the rig (PID {ending.pid}) {how}."
 
 
-def clear(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> int:
+def clear(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = False) -> None:
     """Clear the rig's latched fault or trip; the motors stay out of force.
 
     Find the cause first. An EPOS4 drive is taken out of force, its communication is reset and set
@@ -164,4 +163,3 @@ def clear(config: ConfigOption = None, sim: SimFlag = False, json: JsonFlag = Fa
     latched = {"what": latch.what, "code": latch.code} if latch.code else None
     data = {"state": "disarmed", "latched": latched, "cleared": True}
     present(json, data, f"{settings.name}: out of force; {text}")
-    return 0
