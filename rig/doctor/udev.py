@@ -38,7 +38,7 @@ def udev_rules() -> str:
     return "\n".join(lines) + "\n"
 
 
-def has_rule(identity: str, root: Path = Path("/")) -> bool:
+def has_rule(identity: str, root: Path) -> bool:
     """Whether any installed rule names a USB identity `VID:PID` and keeps ModemManager off."""
     vendor = identity.split(":")[0].lower()
     for path in (path for folder in _FOLDERS for path in (root / folder).glob("*.rules")):

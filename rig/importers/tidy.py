@@ -19,7 +19,7 @@ CONDITION = "condition_"
 """What the name of a condition's column begins with, so that no channel's name is taken twice."""
 
 
-def write_tidy(campaign: Campaign, path: Path, format_: ExportFormat, force: bool = False) -> Path:
+def write_tidy(campaign: Campaign, path: Path, format_: ExportFormat, force: bool) -> Path:
     """Write all runs of a campaign that count into one table; one run is held in memory at a time.
 
     Columns: `run`, one for each condition, `time_s`, `flags`, one for each channel that any run has

@@ -56,7 +56,7 @@ FLIGHT_STREAM = Stream(
 """What the host sent to the board since the session began."""
 
 
-def sample_stream(channels: Sequence[str], rate_hz: float | None = RATE_HZ) -> Stream:
+def sample_stream(channels: Sequence[str], rate_hz: float | None) -> Stream:
     """Return the stream of SI samples with these channels.
 
     Args:

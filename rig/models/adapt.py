@@ -109,7 +109,7 @@ def run_adaptation(
     campaign: Campaign,
     used: Sequence[str],
     *,
-    from_scratch: bool = True,
+    from_scratch: bool,
     seed: int = 0,
     on_run: Callable[[str], None] = lambda run: None,
 ) -> tuple[Adaptation, Adaptable]:

@@ -197,7 +197,7 @@ def in_unit(value: float, unit: str) -> str:
     return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
 
 
-def display(unit: str, size: float = 0.0) -> tuple[float, str]:
+def display(unit: str, size: float) -> tuple[float, str]:
     """Return the factor and the symbol that a unit is shown with, for values of a size in it."""
     return (1e3, "mN m") if unit == "N m" and abs(size) < 1.0 else (1.0, unit)
 
