@@ -111,7 +111,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
     """
     scale, unit = words.display(diagnosis.unit[finding.error_of], finding.rmse_before)
     named = finding.verdict in ("identified", "one_of")
-    variables = " and ".join(v.replace("_", " ") for v in finding.depends_on)
+    variables = words.variables_of(finding)
     facts = []
     if named and finding.parameters:
         sizes = ", ".join(

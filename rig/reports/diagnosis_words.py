@@ -70,19 +70,20 @@ def _where(finding: Finding, runs: int) -> str:
 
 
 def _claim(finding: Finding) -> str:
-    words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
     if finding.verdict == "identified":
         return _named(finding)
+    others = ", ".join(placed(finding, name) for name in finding.alternatives)
+    also = f"; also possible: {others}; these runs cannot distinguish them" if others else ""
     if finding.verdict == "one_of":
-        if not finding.alternatives:
-            return f"{_named(finding)}; these runs are not enough to be sure of it"
-        others = ", ".join(placed(finding, name) for name in finding.alternatives)
-        return f"{_named(finding)}; also possible: {others}; these runs cannot distinguish them"
+        return _named(finding) + (also or "; these runs are not enough to be sure of it")
     if finding.verdict == "depends_on":
-        others = ", ".join(placed(finding, name) for name in finding.alternatives)
-        also = f"; also possible: {others}; these runs cannot distinguish them" if others else ""
-        return f"unmodelled effect of unknown form; it depends on {words}{also}"
+        return f"unmodelled effect of unknown form; it depends on {variables_of(finding)}{also}"
     return "the model is incomplete, and the cause cannot be identified from these runs"
+
+
+def variables_of(finding: Finding) -> str:
+    """Return the variables that a finding depends on, in words; empty where none is known."""
+    return " and ".join(name.replace("_", " ") for name in finding.depends_on)
 
 
 def placed(finding: Finding, alternative: str) -> str:
@@ -135,10 +136,9 @@ def check_of(finding: Finding) -> str:
         checks = [advice(name) for name in names]
         if any(checks):
             return " Then: ".join(dict.fromkeys(c[0].upper() + c[1:] for c in checks if c))
-    words = " and ".join(v.replace("_", " ") for v in finding.depends_on)
-    if words:
+    if variables := variables_of(finding):
         return (
-            f"Find the part of the rig whose behaviour changes with {words}: the residual below"
+            f"Find the part of the rig whose behaviour changes with {variables}: the residual below"
             " depends on it."
         )
     return (
