@@ -163,12 +163,10 @@ def export(
             "Models, state estimators and networks can.",
             "Fit one: rig fit PATH --out FILE.toml.",
         )
-    fitted = estimator.model.evidence if isinstance(estimator, ModelEstimator) else None
+    own = estimator.model if isinstance(estimator, ModelEstimator) else None
+    fitted = own and own.evidence
     if rate is None:
         rate = (fitted and fitted.sample_rate_hz) or USUAL_HZ
     write_text_atomic(out, header(estimator, out.stem.replace("-", "_").lower(), rate))
     said = f"Header: {out}, for {rate:g} calls a second"
-    unknown = []
-    if isinstance(estimator, ModelEstimator):
-        unknown = without_interval([estimator.model], model)
-    present(json, {"header": out, "rate_hz": rate}, said, *unknown)
+    present(json, {"header": out, "rate_hz": rate}, said, *without_interval([own], model))

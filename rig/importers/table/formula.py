@@ -6,6 +6,7 @@ A formula is parsed as an expression and walked; nothing else than what is liste
 import ast
 import operator
 from collections.abc import Callable, Mapping
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -88,11 +89,7 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
         case ast.UnaryOp(op=op, operand=operand) if type(op) in OPERATORS:
             return OPERATORS[type(op)](_value(operand, values))
         case ast.BoolOp(op=op, values=parts):
-            found = [_value(part, values) for part in parts]
-            whole = found[0]
-            for one in found[1:]:
-                whole = OPERATORS[type(op)](whole, one)
-            return whole
+            return reduce(OPERATORS[type(op)], [_value(part, values) for part in parts])
         case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in OPERATORS:
             return OPERATORS[type(op)](_value(left, values), _value(right, values))
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
