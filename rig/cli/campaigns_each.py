@@ -76,20 +76,19 @@ def _changes(
     good: Mapping[Path, Refit], dates: Mapping[Path, str], root: Path
 ) -> dict[str, list[dict[str, Any]]]:
     folders = list(good)
-    found = {}
-    for name in next(iter(good.values())).values if good else ():
-        moved = changes([one.values[name] for one in good.values()])
-        if moved:
-            found[name] = [
-                {
-                    "since": str(folders[one.first].relative_to(root)),
-                    "date": dates[folders[one.first]],
-                    "before": one.before,
-                    "after": one.after,
-                }
-                for one in moved
-            ]
-    return found
+    return {
+        name: [
+            {
+                "since": str(folders[one.first].relative_to(root)),
+                "date": dates[folders[one.first]],
+                "before": one.before,
+                "after": one.after,
+            }
+            for one in moved
+        ]
+        for name in (next(iter(good.values())).values if good else ())
+        if (moved := changes([one.values[name] for one in good.values()]))
+    }
 
 
 def _table(

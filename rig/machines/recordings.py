@@ -14,7 +14,7 @@ from estimation.derived import measured_channels
 from estimation.model import Model
 from estimation.plant import Plant
 from estimation.recording import Recording
-from rig.importers.log import LogImporter
+from rig.importers.log import IMPORTER as LOGS
 from rig.importers.registry import open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table
@@ -43,7 +43,7 @@ def open_recordings(
     if machine is None:
         return open_campaign(path, format_name, skip_bad)
     file = place_of(machine)
-    if format_name is not None or LogImporter().recognises(path) or not has_data(file):
+    if format_name is not None or LOGS.recognises(path) or not has_data(file):
         campaign = open_campaign(path, format_name, skip_bad)
     else:
         campaign = open_table(path, read_mapping(file, ()))

@@ -98,23 +98,20 @@ class SessionLog(LogWriter):
         Args:
             blocks: Samples of each by the topic of its stream.
         """
-        for name, block in blocks.items():
-            self._write_device(name, block)
-
-    def _write_device(self, topic: str, block: Beside) -> None:
         start_us = self._start_us or 0
-        if not block.host_s.size:
-            return
-        tick_s = self._session.clock.line.to_device(block.host_s)
-        tick_s = rising(tick_s, self._beside_s.get(topic, -np.inf), self._least_s[topic])
-        self._beside_s[topic] = float(tick_s[-1])
-        time_s = tick_s - start_us * 1e-6
-        of_run = time_s >= 0  # what came before the run began is not of it
-        rows: dict[str, NDArray[Any]] = dict(block.columns)
-        rows |= {"sequence": block.sequence, "flags": block.flags, "time_s": time_s}
-        log_time_ns = self._start_ns - start_us * 1000 + np.round(tick_s * 1e9).astype(np.int64)
-        kept = {name: values[of_run] for name, values in rows.items()}
-        self.write(topic, kept, log_time_ns[of_run])
+        for topic, block in blocks.items():
+            if not block.host_s.size:
+                continue
+            tick_s = self._session.clock.line.to_device(block.host_s)
+            tick_s = rising(tick_s, self._beside_s.get(topic, -np.inf), self._least_s[topic])
+            self._beside_s[topic] = float(tick_s[-1])
+            time_s = tick_s - start_us * 1e-6
+            of_run = time_s >= 0  # what came before the run began is not of it
+            rows: dict[str, NDArray[Any]] = {**block.columns, "sequence": block.sequence}
+            rows |= {"flags": block.flags, "time_s": time_s}
+            kept = {name: values[of_run] for name, values in rows.items()}
+            log_time_ns = self._start_ns - start_us * 1000 + np.round(tick_s * 1e9).astype(np.int64)
+            self.write(topic, kept, log_time_ns[of_run])
 
     def write_flight(self) -> None:
         """Write what was sent to the board since the session began and is not in the log yet."""
