@@ -1,6 +1,5 @@
 """From the columns of a file to channels and conditions in SI units."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
@@ -67,17 +66,17 @@ def to_samples(raw: Raw, mapping: Mapping) -> Samples:
     data = mapping.data
     sources = data.columns or _by_name(raw, mapping)
     channels = {
-        name: _channel(raw, mapping, ("columns", name), source)
+        name: _channel(raw, mapping.where("columns", name), name, source)
         for name, source in sources.items()
         if not (name == TIME and source.unit == DATE)
     }
     conditions = {
-        name: _condition(raw, mapping, ("conditions", name), source)
+        name: _condition(raw, mapping.where("conditions", name), name, source)
         for name, source in data.conditions.items()
     }
     started_at_ns = None
     if TIME in sources and sources[TIME].unit == DATE:
-        time_s, started_at_ns = _dates(raw, mapping, sources[TIME])
+        time_s, started_at_ns = _dates(raw, mapping.where("columns", TIME), sources[TIME])
     elif TIME in channels:
         time_s = channels.pop(TIME)
     elif data.sample_rate_hz is not None:
@@ -99,29 +98,29 @@ def to_samples(raw: Raw, mapping: Mapping) -> Samples:
     return Samples(raw, mapping, time_s, channels, conditions, started_at_ns)
 
 
-def find(raw: Raw, mapping: Mapping, path: Sequence[str], name: str) -> Values | float | str:
-    """Return a column or single value of a file by name, for an entry of the mapping.
+def find(raw: Raw, where: str, key: str, column: str) -> Values | float | str:
+    """Return a column or single value of a file by name, for a key of the mapping and its place.
 
     Raises:
         DataError: The file has neither.
     """
-    if name in raw.columns:
-        return raw.columns[name]
-    if name in raw.fields:
-        return raw.fields[name]
-    column, _, unit = name.rpartition(":")
-    if column in raw.columns or column in raw.fields:
+    if column in raw.columns:
+        return raw.columns[column]
+    if column in raw.fields:
+        return raw.fields[column]
+    name, _, unit = column.rpartition(":")
+    if name in raw.columns or name in raw.fields:
         raise DataError(
-            f"{mapping.where(*path)}: {unit!r} is not a unit that is known.",
+            f"{where}: {unit!r} is not a unit that is known.",
             "A unit is a product of powers of these with an optional number:"
             f" {', '.join(BASE)}; with a prefix, such as mm or N cm.",
-            f"Write {path[1]} = '{column}:UNIT', or the column alone where it is in SI units.",
+            f"Write {key} = '{name}:UNIT', or the column alone where it is in SI units.",
         )
-    near = raw.nearest(name)
+    near = raw.nearest(column)
     raise DataError(
-        f"{mapping.where(*path)}: {raw.path.name} has no column {name!r} for {path[1]}.",
+        f"{where}: {raw.path.name} has no column {column!r} for {key}.",
         raw.listing(),
-        f"Did you mean {near!r}? Write {path[1]} = {near!r}." if near else "Correct the name.",
+        f"Did you mean {near!r}? Write {key} = {near!r}." if near else "Correct the name.",
     )
 
 
@@ -136,37 +135,34 @@ def _by_name(raw: Raw, mapping: Mapping) -> dict[str, Source]:
     return found
 
 
-def _channel(raw: Raw, mapping: Mapping, path: tuple[str, str], source: Source) -> FloatArray:
-    found = find(raw, mapping, path, source.column)
+def _channel(raw: Raw, where: str, name: str, source: Source) -> FloatArray:
+    found = find(raw, where, name, source.column)
     if not isinstance(found, np.ndarray):
         found = np.full(len(raw), found)
     if found.dtype.kind not in "fiub":
         raise DataError(
-            f"{mapping.where(*path)}: column {source.column!r} of {raw.path.name} is not numbers:"
+            f"{where}: column {source.column!r} of {raw.path.name} is not numbers:"
             f" {bad_cell(raw, source.column) if source.column in raw.columns else found[0]}.",
             fix=f"Write {TIME} = '{source.column}:{DATE}'."
-            if path[1] == TIME and _date(str(found[0])) is not None
+            if name == TIME and _date(str(found[0])) is not None
             else "Correct the file, or map another column.",
         )
-    values = _in_si(raw, mapping, path, source, found.astype(np.float64))
+    values = _in_si(raw, where, name, source, found.astype(np.float64))
     if not np.isfinite(values).any():
         raise DataError(
-            f"{mapping.where(*path)}: column {source.column!r} of {raw.path.name} is empty.",
+            f"{where}: column {source.column!r} of {raw.path.name} is empty.",
             fix="Map another column, or delete this line.",
         )
     return values
 
 
-def _in_si(
-    raw: Raw, mapping: Mapping, path: tuple[str, str], source: Source, values: FloatArray
-) -> FloatArray:
+def _in_si(raw: Raw, where: str, name: str, source: Source, values: FloatArray) -> FloatArray:
     gain = source.gain
     if isinstance(gain, str):
-        gain_found = find(raw, mapping, path, gain)
+        gain_found = find(raw, where, name, gain)
         if not isinstance(gain_found, float | int):
             raise DataError(
-                f"{mapping.where(*path)}: the gain {gain!r} is not a single number of"
-                f" {raw.path.name}.",
+                f"{where}: the gain {gain!r} is not a single number of {raw.path.name}.",
                 fix="Write a number, or the name of a single value.",
             )
         gain = float(gain_found)
@@ -174,22 +170,21 @@ def _in_si(
         values = np.unwrap(values, period=source.wraps_at)
     if source.sign_bit is not None:
         values = np.where(values >= source.sign_bit, source.sign_bit - values, values)
-    unit = conversion(source.unit, path[1]) if source.unit else None
+    unit = conversion(source.unit, name) if source.unit else None
     if unit is None and gain == 1.0:
-        _check_name(mapping, path, source.column)
+        _check_name(where, name, source.column)
     if unit is None:
         return np.asarray(gain * (values - source.zero))
     return np.asarray(unit.factor * gain * (values - source.zero) + unit.shift)
 
 
-def _check_name(mapping: Mapping, path: tuple[str, str], column: str) -> None:
+def _check_name(where: str, name: str, column: str) -> None:
     """Refuse a column whose name states another unit than the channel's, where none is stated."""
-    name = path[1]
     stated = stated_in_name(column, name)
     if not stated:
         return
     raise DataError(
-        f"{mapping.where(*path)}: the name of the column {column!r} states {stated}, and the"
+        f"{where}: the name of the column {column!r} states {stated}, and the"
         f" mapping states no unit for {name}.",
         "Without one, values are taken as SI units.",
         f"Write {name} = '{column}:{stated}'; if they are in SI units, that unit in its place."
@@ -199,32 +194,29 @@ def _check_name(mapping: Mapping, path: tuple[str, str], column: str) -> None:
     )
 
 
-def _condition(
-    raw: Raw, mapping: Mapping, path: tuple[str, str], source: Source
-) -> float | str | Values:
+def _condition(raw: Raw, where: str, name: str, source: Source) -> float | str | Values:
     if source.value is not None:
         return source.value
-    found = find(raw, mapping, path, source.column)
+    found = find(raw, where, name, source.column)
     many = found if isinstance(found, np.ndarray) else np.array([found])
-    if many.dtype.kind in "US" and unit_or_none(path[1]):
+    if many.dtype.kind in "US" and unit_or_none(name):
         try:
             many = many.astype(np.float64)
         except ValueError as error:
             raise DataError(
-                f"{mapping.where(*path)}: {source.column!r} of {raw.path.name} is not a number:"
-                f" {str(many[0])!r}.",
-                f"{path[1]} ends in a unit, so it is one.",
+                f"{where}: {source.column!r} of {raw.path.name} is not a number: {str(many[0])!r}.",
+                f"{name} ends in a unit, so it is one.",
                 "Rename the condition without a unit, or map something else.",
             ) from error
     if many.dtype.kind in "fiub":
-        many = _in_si(raw, mapping, path, source, many.astype(np.float64))
+        many = _in_si(raw, where, name, source, many.astype(np.float64))
     if isinstance(found, np.ndarray):
         return many
     return str(many[0]) if many.dtype.kind in "US" else float(many[0])
 
 
-def _dates(raw: Raw, mapping: Mapping, source: Source) -> tuple[FloatArray, int | None]:
-    cells = find(raw, mapping, ("columns", TIME), source.column)
+def _dates(raw: Raw, where: str, source: Source) -> tuple[FloatArray, int | None]:
+    cells = find(raw, where, TIME, source.column)
     assert isinstance(cells, np.ndarray)  # noqa: S101  a single value has no clock
     at = []
     for index, cell in enumerate(cells):

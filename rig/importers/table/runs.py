@@ -74,11 +74,11 @@ def _edges(samples: Samples) -> list[int]:
 
 
 def _cutting(samples: Samples, rule: str, name: str) -> NDArray[np.generic]:
-    found = find(samples.raw, samples.mapping, ("runs", rule), name)
+    where = samples.mapping.where("runs", rule)
+    found = find(samples.raw, where, rule, name)
     if not isinstance(found, np.ndarray):
         raise DataError(
-            f"{samples.mapping.where('runs', rule)}: {name!r} of {samples.raw.path.name} is one"
-            " value, so it cuts nothing.",
+            f"{where}: {name!r} of {samples.raw.path.name} is one value, so it cuts nothing.",
             fix="Name a column.",
         )
     return found
