@@ -69,8 +69,12 @@ def read_mat5(content: bytes) -> dict[str, Value]:
     return variables
 
 
-def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
-    """Yield (type, data) of each element; all of `data` must be elements."""
+Elements = Iterator[tuple[int, bytes]]
+"""Type and data of each element."""
+
+
+def _elements(data: bytes, order: str) -> Elements:
+    """Yield the elements of `data`, all of which must be elements."""
     position = 0
     while position < len(data):
         if position + 8 > len(data):
@@ -134,18 +138,14 @@ def _matrix(data: bytes, order: str, depth: int) -> tuple[str, Value]:
     raise Mat5Error(f"an array of the unknown class {array_class}")
 
 
-def _expect(
-    elements: Iterator[tuple[int, bytes]], what: str, fits: Callable[[int, int], bool]
-) -> tuple[int, bytes]:
+def _expect(elements: Elements, what: str, fits: Callable[[int, int], bool]) -> tuple[int, bytes]:
     element = next(elements, None)
     if element is None or not fits(element[0], len(element[1])):
         raise Mat5Error(f"an array without its {what}")
     return element
 
 
-def _numbers(
-    elements: Iterator[tuple[int, bytes]], shape: tuple[int, ...], order: str
-) -> NDArray[np.generic]:
+def _numbers(elements: Elements, shape: tuple[int, ...], order: str) -> NDArray[np.generic]:
     count = math.prod(shape)
     if count == 0:
         return np.empty(0)
@@ -156,7 +156,7 @@ def _numbers(
     return np.frombuffer(data, dtype).reshape(shape, order="F").squeeze()
 
 
-def _text(elements: Iterator[tuple[int, bytes]], shape: tuple[int, ...], order: str) -> Value:
+def _text(elements: Elements, shape: tuple[int, ...], order: str) -> Value:
     if math.prod(shape) == 0:
         return ""
     if shape[0] != 1:
@@ -171,9 +171,7 @@ def _text(elements: Iterator[tuple[int, bytes]], shape: tuple[int, ...], order: 
         raise Mat5Error(f"text that is not {encoding}") from error
 
 
-def _struct(
-    elements: Iterator[tuple[int, bytes]], shape: tuple[int, ...], order: str, depth: int
-) -> Value:
+def _struct(elements: Elements, shape: tuple[int, ...], order: str, depth: int) -> Value:
     length_bytes = _expect(elements, "field length", lambda k, size: k == INT32 and size == 4)[1]
     length = struct.unpack(order + "i", length_bytes)[0]
     names = _expect(elements, "field names", lambda kind, _: kind == INT8)[1]
@@ -189,9 +187,7 @@ def _struct(
     return {str(number): one for number, one in enumerate(structs, 1)}
 
 
-def _members(
-    elements: Iterator[tuple[int, bytes]], names: Iterable[str], order: str, depth: int
-) -> dict[str, Value]:
+def _members(elements: Elements, names: Iterable[str], order: str, depth: int) -> dict[str, Value]:
     """Return the next values of a struct or a cell array, by their names."""
     members: dict[str, Value] = {}
     for name in names:
