@@ -15,7 +15,7 @@ from rig.output.table import TextTable, listed
 
 if TYPE_CHECKING:
     from estimation.recording import Recording
-    from rig.importers.table.mapping import Mapping
+    from rig.importers.table.mapping import ColumnMapping
     from rig.importers.table.preview import Preview
     from rig.importers.table.raw import Raw
 
@@ -213,7 +213,7 @@ def write_logs(recordings: "list[Recording]", out: Path) -> list[Path]:
     return [write_recording(p, recording) for p, recording in zip(paths, recordings, strict=True)]
 
 
-def _tables(found: "Preview", mapping: "Mapping") -> "list[TextTable]":
+def _tables(found: "Preview", mapping: "ColumnMapping") -> "list[TextTable]":
     runs = []
     for run in found.runs[:MOST_RUNS]:
         rate = f"{run.rate_hz:.6g}" if run.rate_hz else "-"
@@ -233,7 +233,7 @@ def _tables(found: "Preview", mapping: "Mapping") -> "list[TextTable]":
     ]
 
 
-def _source(mapping: "Mapping", name: str) -> str:
+def _source(mapping: "ColumnMapping", name: str) -> str:
     """Return where a channel comes from, in words."""
     data = mapping.data
     if name in data.formulas:

@@ -103,10 +103,10 @@ def reads_of(channel: str) -> Reads:
 def data_text(table: Path, plant: Plant) -> str:
     """Return `[data]` for a table: a line for each channel, and the table's columns as remarks."""
     from rig.importers.table.data import Data
-    from rig.importers.table.mapping import Mapping
+    from rig.importers.table.mapping import ColumnMapping
     from rig.importers.table.open import files_at, read_raw
 
-    mapping = Mapping(Data())
+    mapping = ColumnMapping(Data())
     raw = read_raw(files_at(table, mapping)[0], mapping)
     channels = [*(a.name for a in plant.actuators), *(s.name for s in plant.sensors)]
     lines = ["", f"# Columns of {table.name}, with the first sample:"]

@@ -11,7 +11,7 @@ from rig.errors import DataError, UsageError
 from rig.importers.table.data import DATE, TIME, Source
 from rig.importers.table.delimited import bad_cell
 from rig.importers.table.formula import names_in
-from rig.importers.table.mapping import Mapping, worked_out
+from rig.importers.table.mapping import ColumnMapping, worked_out
 from rig.importers.table.raw import Raw, Values
 from rig.importers.table.units import BASE, conversion, stated_in_name
 
@@ -49,14 +49,14 @@ class Samples:
     """
 
     raw: Raw
-    mapping: Mapping
+    mapping: ColumnMapping
     time_s: FloatArray
     channels: dict[str, FloatArray]
     conditions: dict[str, float | str | Values]
     started_at_ns: int | None = None
 
 
-def to_samples(raw: Raw, mapping: Mapping) -> Samples:
+def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:
     """Convert a file.
 
     Raises:
@@ -124,7 +124,7 @@ def find(raw: Raw, where: str, key: str, column: str) -> Values | float | str:
     )
 
 
-def _by_name(raw: Raw, mapping: Mapping) -> dict[str, Source]:
+def _by_name(raw: Raw, mapping: ColumnMapping) -> dict[str, Source]:
     """Return the columns that are named as channels, where no column is mapped at all."""
     found = {
         name: Source(column=name) for name in raw.columns if unit_or_none(name) and name.islower()
@@ -244,7 +244,7 @@ def _date(cell: str) -> datetime | None:
     return None
 
 
-def _in_order(mapping: Mapping) -> list[tuple[str, str]]:
+def _in_order(mapping: ColumnMapping) -> list[tuple[str, str]]:
     """Return the formulas so that each comes after those that it reads."""
     left = dict(mapping.data.formulas)
     ordered: list[tuple[str, str]] = []

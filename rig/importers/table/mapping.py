@@ -1,8 +1,7 @@
 """Reading a mapping from a machine's file and the command line, with the place of each entry."""
 
 import tomllib
-from collections.abc import Mapping as Names
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -28,7 +27,7 @@ class _Whole(Section):
 
 
 @dataclass(frozen=True)
-class Mapping:
+class ColumnMapping:
     """A mapping, and where each of its entries is written.
 
     Attributes:
@@ -41,7 +40,7 @@ class Mapping:
     data: Data
     file: Path | None = None
     text: str = ""
-    flags: Names[tuple[str, ...], str] = field(default_factory=dict)
+    flags: Mapping[tuple[str, ...], str] = field(default_factory=dict)
 
     def where(self, *path: str | int) -> str:
         """Return where an entry stands, such as `drive.toml, line 12`."""
@@ -59,7 +58,9 @@ class Mapping:
         return self.file.stem if self.file else ""
 
 
-def read_mapping(file: Path | None, flags: Sequence[tuple[tuple[str, ...], Any, str]]) -> Mapping:
+def read_mapping(
+    file: Path | None, flags: Sequence[tuple[tuple[str, ...], Any, str]]
+) -> ColumnMapping:
     """Read the mapping of a machine's file and of the command line, which comes first.
 
     Args:
@@ -87,7 +88,7 @@ def read_mapping(file: Path | None, flags: Sequence[tuple[tuple[str, ...], Any, 
         data = _Whole.model_validate({"data": content}).data
     except ValidationError as error:
         raise _wrong(error, file, text) from error
-    mapping = Mapping(data, file, text, words)
+    mapping = ColumnMapping(data, file, text, words)
     _check(mapping)
     return mapping
 
@@ -124,7 +125,7 @@ def _wrong(error: ValidationError, file: Path | None, text: str) -> UsageError:
     )
 
 
-def _check(mapping: Mapping) -> None:
+def _check(mapping: ColumnMapping) -> None:
     data = mapping.data
     if TIME in data.columns and data.sample_rate_hz is not None:
         what = "Time is stated twice: by a column for time_s and by a sample rate."
@@ -153,7 +154,7 @@ def _formula(where: str, formula: str) -> None:
         raise UsageError(f"{where}: {error}.") from error
 
 
-def worked_out(where: str, formula: str, known: Names[str, Any]) -> Any:
+def worked_out(where: str, formula: str, known: Mapping[str, Any]) -> Any:
     """Return the values of a formula of the mapping.
 
     Raises:
@@ -175,7 +176,7 @@ def worked_out(where: str, formula: str, known: Names[str, Any]) -> Any:
     )
 
 
-def _check_source(mapping: Mapping, part: str, name: str, source: Source) -> None:
+def _check_source(mapping: ColumnMapping, part: str, name: str, source: Source) -> None:
     where = mapping.where(part, name)
     if part == "columns" and source.value is not None:
         raise UsageError(f"{where}: a channel has a column, not a value.", fix="Write column = .")

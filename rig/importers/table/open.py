@@ -14,9 +14,8 @@ from rig.importers.table.channels import to_samples
 from rig.importers.table.data import Layout
 from rig.importers.table.delimited import read_delimited
 from rig.importers.table.json_rows import read_json
-from rig.importers.table.mapping import Mapping as ColumnMapping
-from rig.importers.table.raw import Raw, Remark, is_number
-from rig.importers.table.raw import checked as with_samples
+from rig.importers.table.mapping import ColumnMapping
+from rig.importers.table.raw import Raw, Remark, is_number, with_samples
 from rig.importers.table.runs import recordings
 from rig.log.order import by_number
 

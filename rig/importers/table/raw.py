@@ -61,7 +61,7 @@ class Raw:
         return lower[near[0]] if near else ""
 
 
-def checked(raw: Raw) -> Raw:
+def with_samples(raw: Raw) -> Raw:
     """Return a file's content if it has samples, all columns as many.
 
     Raises:

@@ -11,7 +11,7 @@ from estimation.recording import Flag, FloatArray, Recording, RecordingError, St
 from rig.errors import DataError
 from rig.importers.table.arrays import TRIAL
 from rig.importers.table.channels import Samples, find
-from rig.importers.table.mapping import Mapping, worked_out
+from rig.importers.table.mapping import ColumnMapping, worked_out
 from rig.importers.table.raw import Remark, Values
 from rig.output.table import counted
 
@@ -210,7 +210,7 @@ def _check_clock(
 
 
 def _constant(
-    mapping: Mapping, key: str, value: float | str | Values, part: slice, run: str
+    mapping: ColumnMapping, key: str, value: float | str | Values, part: slice, run: str
 ) -> float | str:
     if not isinstance(value, np.ndarray):
         return value
@@ -226,7 +226,7 @@ def _constant(
     return str(inside[0]) if inside.dtype.kind in "US" else float(inside[0])
 
 
-def _without_invalid(run: Recording, mapping: Mapping) -> Recording:
+def _without_invalid(run: Recording, mapping: ColumnMapping) -> Recording:
     """Flag the samples for which a formula of the mapping is true."""
     known = {**run.conditions, **run.columns, "time_s": run.time_s}
     for number, invalid in enumerate(mapping.data.invalid):
@@ -246,7 +246,7 @@ def _without_invalid(run: Recording, mapping: Mapping) -> Recording:
     return run
 
 
-def _even(run: Recording, mapping: Mapping) -> Recording:
+def _even(run: Recording, mapping: ColumnMapping) -> Recording:
     """Interpolate a run onto an even clock, each channel from the samples that it has.
 
     A sample next to a flagged one, or in a gap of three usual steps of a channel, is flagged.
