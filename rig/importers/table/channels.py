@@ -90,11 +90,7 @@ def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:
     for name, formula in _in_order(mapping):
         known = {**conditions, **channels, TIME: time_s}
         where = mapping.where("formulas", name)
-        try:
-            values = np.asarray(worked_out(where, formula, known), dtype=np.float64)
-        except (ValueError, TypeError) as error:
-            raise DataError(f"{where}: {error}.", f"There are {', '.join(known)}.") from error
-        channels[name] = np.broadcast_to(values, time_s.shape).astype(np.float64)
+        channels[name] = worked_out(where, formula, known, time_s.shape, np.float64).copy()
     return Samples(raw, mapping, time_s, channels, conditions, started_at_ns)
 
 

@@ -8,12 +8,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
 from pydantic import ValidationError
 
 from estimation.channels import UNIT_BY_SUFFIX, UnknownUnitError, unit_of
 from estimation.derived import origin_of
 from rig.configuration.validation import explain, line_of
-from rig.errors import UsageError
+from rig.errors import DataError, UsageError
 from rig.importers.table.data import DATE, TIME, Data, Invalid, Runs, Section, Source
 from rig.importers.table.formula import FormulaError, evaluate, names_in
 from rig.importers.table.units import NotAUnitError, conversion
@@ -154,18 +156,23 @@ def _formula(where: str, formula: str) -> None:
         raise UsageError(f"{where}: {error}.") from error
 
 
-def worked_out(where: str, formula: str, known: Mapping[str, Any]) -> Any:
-    """Return the values of a formula of the mapping.
+def worked_out(
+    where: str, formula: str, known: Mapping[str, Any], shape: tuple[int, ...], kind: DTypeLike
+) -> NDArray[Any]:
+    """Return the values of a formula of the mapping, of this shape and type, not to be changed.
 
     Raises:
         UsageError: It reads a name that is neither a channel nor a condition, or is not a formula.
+        DataError: Its values are not of the type.
     """
     lacking = [name for name in names_in(formula) if name not in known]
     if not lacking:
         try:
-            return evaluate(formula, known)
+            return np.broadcast_to(np.asarray(evaluate(formula, known), dtype=kind), shape)
         except FormulaError as error:
             raise UsageError(f"{where}: {error}.", f"There are {', '.join(known)}.") from error
+        except (ValueError, TypeError) as error:
+            raise DataError(f"{where}: {error}.", f"There are {', '.join(known)}.") from error
     fix = ""
     if origin_of(lacking[0])[1]:
         fix = f"Let an effect of an [[equation]] read {lacking[0]}: it is differentiated there."

@@ -231,11 +231,8 @@ def _without_invalid(run: Recording, mapping: ColumnMapping) -> Recording:
     known = {**run.conditions, **run.columns, "time_s": run.time_s}
     for number, invalid in enumerate(mapping.data.invalid):
         where = mapping.where("invalid", number, "when")
-        try:
-            found = np.broadcast_to(worked_out(where, invalid.when, known), run.time_s.shape)
-        except ValueError as error:
-            raise DataError(f"{where}: {error}.", f"There are {', '.join(known)}.") from error
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], found.astype(bool), [False]])))
+        found = worked_out(where, invalid.when, known, run.time_s.shape, np.bool_)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], found, [False]])))
         for first, end in edges.reshape(-1, 2):
             start_s, stop_s = float(run.time_s[first]), float(run.time_s[end - 1])
             flag = Flag.MISSING if invalid.missing else Flag.SUSPECT
