@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rig.errors import ExitCode
 from rig.log.container import LIBRARY, MAGIC
+from rig.log.messages import not_finite
 from rig.log.order import by_number
 from rig.log.reader import LogFile, Topic, read_log
 from rig.log.scan import Damage
@@ -67,7 +68,7 @@ class TopicReport:
         expected_by_recorder: What the recorder had counted at the end; None if not recorded.
         repeats: Samples whose sequence number does not come after the one before.
         time_steps_back: Samples whose time does not come after the one before.
-        not_finite: Samples with a value that is not finite, all of them.
+        not_finite: Samples with a measurement that is not finite, all of them.
         not_finite_unflagged: Those of them that no flag explains.
         salvaged: Samples from the torn end of the file, which no checksum vouches for.
     """
@@ -183,7 +184,7 @@ def _topic_report(log: LogFile, name: str, topic: Topic) -> TopicReport:
     if log.run and log.run.duration_s is not None and topic.stream.rate_hz is not None:
         by_plan = round(log.run.duration_s * topic.stream.rate_hz)
     by_recorder = log.end.expected_samples.get(name) if log.end else None
-    bad = not_finite(topic)
+    bad = not_finite(topic.stream, topic.rows)
     flagged = topic.rows["flags"] != 0 if "flags" in topic.columns else np.zeros(len(topic), bool)
     backwards = np.diff(time_s) <= 0 if "time_s" in topic.columns else np.diff(time_s) < 0
     return TopicReport(
@@ -211,15 +212,6 @@ def stream_time_s(topic: Topic) -> NDArray[np.float64]:
         return np.empty(0)
     elapsed_ns: NDArray[np.uint64] = topic.log_time_ns - topic.log_time_ns.min()
     return elapsed_ns.astype(np.float64) * 1e-9
-
-
-def not_finite(topic: Topic) -> NDArray[np.bool_]:
-    """Return which messages hold a value that is not finite, shape (n,)."""
-    bad = np.zeros(len(topic), bool)
-    for field in topic.stream.fields:
-        if field.dtype.startswith("float"):
-            bad |= ~np.isfinite(topic.rows[field.name])
-    return bad
 
 
 def _sequence_findings(

@@ -64,12 +64,21 @@ def _refuse_out_of_range(stream: Stream, name: str, column: NDArray[np.generic])
         raise DataError(f"{name} of {stream.topic} does not fit in {kind}.")
 
 
-def _refuse_unflagged(stream: Stream, payload: NDArray[np.void]) -> None:
-    names = [field.name for field in stream.fields]
+def not_finite(stream: Stream, payload: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Return which messages hold a measurement that is not finite, shape (n,).
+
+    An estimate is none of them: it is not a number where its estimator has no answer.
+    """
     bad = np.zeros(payload.size, bool)
     for field in stream.fields:
         if field.dtype.startswith("float") and not field.name.startswith(ESTIMATED):
             bad |= ~np.isfinite(payload[field.name])
+    return bad
+
+
+def _refuse_unflagged(stream: Stream, payload: NDArray[np.void]) -> None:
+    names = [field.name for field in stream.fields]
+    bad = not_finite(stream, payload)
     if "flags" in names:
         bad &= payload["flags"] == 0
     if bad.any():

@@ -95,6 +95,13 @@ def test_a_value_that_is_not_a_number_survives_where_it_is_flagged(tmp_path):
     )
 
 
+def test_an_estimate_may_be_absent_from_a_whole_log(tmp_path):
+    estimate = np.full(50, np.nan)
+    columns = {"motor_current_a": np.ones(50), "estimated_distal_torque_n_m": estimate}
+    log = write_recording(tmp_path / "a.mcap", simple(columns=columns))
+    assert check_log(log).verdict is Verdict.COMPLETE
+
+
 @pytest.mark.parametrize(
     ("start_s", "started_at_ns", "fits"),
     [(-5.0, None, True), (-5.0, 10**18, True), (-5.0, 10**9, False), (1e12, None, False)],
