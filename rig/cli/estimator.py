@@ -1,11 +1,11 @@
 """`rig adapt | export | estimator`: make an estimator fit elsewhere, write it as C, compare two."""
 
-from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
+from estimation.channels import unit_of
 from estimation.errors import nearest
 from estimation.files import write_text_atomic
 from rig.cli import options
@@ -103,7 +103,9 @@ def adapt(
 
 
 def _errors(result: "Adaptation") -> "TextTable":
-    unit, scale = ("mN m", 1e3) if result.target.endswith("_n_m") else ("deg", degrees(1.0))
+    from rig.live.text import in_shown_unit
+
+    scale, unit, _ = in_shown_unit(unit_of(result.target))
     named = {
         "as it is": result.as_it_is,
         f"adapted with {', '.join(result.used)}": result.adapted,

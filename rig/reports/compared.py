@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimation.channels import unit_of
+from rig.live.text import in_shown_unit
 from rig.models.compared import Comparison, RunErrors, Side
 from rig.output.table import TextTable
 
@@ -45,9 +47,7 @@ def _origin(side: Side) -> str:
 
 def tables(found: Comparison) -> list[TextTable]:
     """Return the errors over all runs, by condition and by run."""
-    unit, scale = ("deg", float(np.degrees(1.0))) if found.target.endswith("_rad") else ("", 1.0)
-    if found.target.endswith("_n_m"):
-        unit, scale = "mN m", 1e3
+    scale, unit, _ = in_shown_unit(unit_of(found.target))
     names = [side.file for side in found.sides]
     columns = [f"{found.target}, {unit}", "runs", *names, "ratio"]
     rows = [_row("all", found.runs, scale)]
