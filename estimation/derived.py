@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from estimation.channels import ending_of
 from estimation.filters import PAPER, LowPass, fill_gaps, filter_recording, holoborodko_derivative
+from estimation.plant import ACCELERATION, POSITION, SPEED
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SPINDLE_SPEED, closing, in_motion
 from estimation.signals import Combination, Samples, Signals, reference
@@ -32,13 +33,14 @@ from estimation.signals import Combination, Samples, Signals, reference
 CAMPAIGN_TIME = "campaign_time_s"
 """Time since the campaign's first run began; a clock, so no filter touches it."""
 
-SLIDES = {"_velocity_m_s": 1, "_acceleration_m_s2": 2}
-"""Derivatives of a sliding joint's `_position_m`, and how many times."""
+MOTION = {POSITION[unit]: (SPEED[unit], ACCELERATION[unit]) for unit in POSITION}
+"""Ending of an angle or a position to those of its speed and its acceleration."""
 
-VELOCITY, ACCELERATION, TRAVEL = "_velocity_rad_s", "_acceleration_rad_s2", "_travel_rad"
-TURNED, FALL, RISE = "_turned_s", "_fall_", "_rise_"
+RATES = {**MOTION, "_n_m": ("_rate_n_m_s",)}
+"""Ending of a channel to those of its derivatives, the first one first."""
+
+TRAVEL, TURNED, FALL, RISE = "_travel_rad", "_turned_s", "_fall_", "_rise_"
 AGO = re.compile(r"^(?P<name>.+)_(?P<ms>\d+)ms_ago(?P<unit>_.+)$")
-RATE = "_rate_n_m_s"
 
 TURNING = "motor_angle_rad"
 """The angle whose lowest value is where the drive last turned."""
@@ -68,13 +70,13 @@ def measured_channels(names: Iterable[str], signals: Signals | None = None) -> t
             if combination.direction is not None:
                 needed.add(origin_of(combination.direction.speed)[0])
         elif name != "time_s":
-            now, kind = _now(name)
+            now, kind = now_of(name)
             needed.add(now if kind in (FALL, RISE) else origin_of(now)[0])
             needed |= {TURNING} if kind == RISE else set()
     return tuple(sorted(needed))
 
 
-def _now(name: str) -> tuple[str, str]:
+def now_of(name: str) -> tuple[str, str]:
     """Return the channel that a channel of the past is computed from, and of which kind it is.
 
     The kind is the part of its name that states it, or the milliseconds ago; empty of the present.
@@ -112,25 +114,18 @@ def _parted(channel: str) -> tuple[str, str]:
 
 def origin_of(name: str) -> tuple[str, int]:
     """Return the channel a channel is the derivative of, and how many times."""
-    for suffix, times in ((VELOCITY, 1), (ACCELERATION, 2)):
-        if name.endswith(suffix):
-            return name.removesuffix(suffix) + "_angle_rad", times
-    for suffix, times in SLIDES.items():
-        if name.endswith(suffix):
-            return name.removesuffix(suffix) + "_position_m", times
-    if name.endswith(RATE):
-        return name.removesuffix(RATE) + "_n_m", 1
+    for ending, rates in RATES.items():
+        for times, rate in enumerate(rates, start=1):
+            if name.endswith(rate):
+                return name.removesuffix(rate) + ending, times
     return name, 0
 
 
 def rates_of(position: str) -> tuple[str, ...]:
     """Return the names of the speed and the acceleration of an angle or a position; else none."""
-    if position.endswith("_angle_rad"):
-        return tuple(
-            position.removesuffix("_angle_rad") + rate for rate in (VELOCITY, ACCELERATION)
-        )
-    if position.endswith("_position_m"):
-        return tuple(position.removesuffix("_position_m") + rate for rate in SLIDES)
+    for ending, rates in MOTION.items():
+        if position.endswith(ending):
+            return tuple(position.removesuffix(ending) + rate for rate in rates)
     return ()
 
 
@@ -172,7 +167,7 @@ def derive(
 
     channels: dict[str, FloatArray] = {}
     for name in names:
-        now, kind = _now(name)
+        now, kind = now_of(name)
         if kind == TRAVEL:
             channels[name] = since_lowest(filtered[now], window)
         elif kind == TURNED:
@@ -285,12 +280,12 @@ def _on_time(values: FloatArray, name: str, recording: Recording, signals: Signa
 
 def looks_back(names: Iterable[str]) -> bool:
     """Whether a channel needs the samples of the last `TRAVEL_WINDOW_S`."""
-    return any(_now(name)[1] for name in names)
+    return any(now_of(name)[1] for name in names)
 
 
 def differentiated_from(names: Iterable[str]) -> set[str]:
     """Return the channels that the named channels, or those of their past, are derivatives of."""
-    origins = (origin_of(_now(name)[0]) for name in names)
+    origins = (origin_of(now_of(name)[0]) for name in names)
     return {source for source, times in origins if times}
 
 

@@ -25,10 +25,7 @@ from estimation.model import Model
 from estimation.recording import FloatArray
 from estimation.signals import Signals, reference
 
-TURNING_TRAVEL, TURNING_TURNED = (
-    derived.TURNING.replace("_angle_rad", suffix) for suffix in (derived.TRAVEL, derived.TURNED)
-)
-
+TURNING_TRAVEL = derived.TURNING.replace("_angle_rad", derived.TRAVEL)
 
 USUAL_HZ = 1000.0
 """Rate of a header whose estimator's file contains none."""
@@ -158,9 +155,9 @@ class _Program:
     def __init__(self, channels: Sequence[str], sample_rate_hz: float, signals: Signals) -> None:
         self._rate_hz, self._signals = sample_rate_hz, signals
         self.measured = derived.measured_channels(channels, signals)
-        self.windows = [c for c in channels if c.endswith(derived.TRAVEL) or derived.FALL in c]
-        pasts = [m["name"] + m["unit"] for m in map(derived.AGO.match, channels) if m is not None]
-        pasts += [c.replace(derived.RISE, "_") for c in channels if derived.RISE in c]
+        kinds = {channel: derived.now_of(channel) for channel in channels}
+        self.windows = [c for c, (_, k) in kinds.items() if k in (derived.TRAVEL, derived.FALL)]
+        pasts = [now for now, kind in kinds.values() if kind == derived.RISE or kind.isdigit()]
         self.pasts = list(dict.fromkeys(pasts))
 
     def keep(self, k: int, name: str) -> str:
@@ -169,19 +166,17 @@ class _Program:
 
     def fill(self, k: int, channel: str) -> str:
         """Return the statement that computes the channel at place k of a row."""
+        now, kind = derived.now_of(channel)
         if channel in self.windows:
-            rises = channel.endswith(derived.TRAVEL)
-            ending = (derived.TRAVEL, "_angle_rad") if rises else (derived.FALL, "_")
-            source = ("" if rises else "-") + self._measured(channel.replace(*ending))
-            value = f"name_travel(&s->window[{self.windows.index(channel)}], s->tick, {source})"
-        elif channel == TURNING_TURNED and TURNING_TRAVEL in self.windows:
+            sign = "-" if kind == derived.FALL else ""
+            window = self.windows.index(channel)
+            value = f"name_travel(&s->window[{window}], s->tick, {sign}{self._measured(now)})"
+        elif kind == derived.TURNED and now == derived.TURNING and TURNING_TRAVEL in self.windows:
             value = f"{self._turned()} / {self._rate_hz!r}"
-        elif derived.RISE in channel and TURNING_TRAVEL in self.windows:
-            source = channel.replace(derived.RISE, "_")
-            value = f"{self._measured(source)} - {self._ago(source, self._turned())}"
-        elif (past := derived.AGO.match(channel)) is not None:
-            ticks = round(1e-3 * int(past["ms"]) * self._rate_hz)
-            value = self._ago(past["name"] + past["unit"], str(ticks))
+        elif kind == derived.RISE and TURNING_TRAVEL in self.windows:
+            value = f"{self._measured(now)} - {self._ago(now, self._turned())}"
+        elif kind.isdigit():
+            value = self._ago(now, str(round(1e-3 * int(kind) * self._rate_hz)))
         else:
             value = self._value(channel)
         return f"    row[{k}] = (float)({value}); /* {channel} */"
