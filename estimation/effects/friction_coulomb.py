@@ -1,16 +1,13 @@
 """Coulomb friction: a constant torque against the direction of motion."""
 
-import math
-from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from estimation.effects.effect import LOSS, Effect, Parameter
-from estimation.recording import FloatArray
+from estimation.effects.effect import LOSS, Inputs, Parameter, Pointwise, Row, Shape
 
 
-class CoulombFriction(Effect):
+class CoulombFriction(Pointwise):
     """Coulomb friction with a smooth change of sign.
 
     Equation: torque = F tanh(speed / width), F in N m, width in rad/s. The width is fitted too: the
@@ -28,12 +25,6 @@ class CoulombFriction(Effect):
     shape = (Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-3, 1e2),)
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 
-    def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:
-        """Return the smooth sign of the speed, shape (n, 1)."""
-        return np.tanh(inputs["speed"] / shape[0])[:, None]
-
-    def step(
-        self, inputs: Mapping[str, float], shape: Sequence[float], state: list[float]
-    ) -> Sequence[float]:
-        """Return the smooth sign of the speed."""
-        return (math.tanh(inputs["speed"] / shape[0]),)
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        return (np.tanh(inputs["speed"] / shape[0]),)

@@ -51,12 +51,6 @@ class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
             raise NotInCError(f"The function {function.__name__} is not written as C.")
         return Symbol(form.format(*(text_of(value) for value in inputs)))
 
-    def __getitem__(self, _: object) -> "Symbol":
-        return self  # a column is the expression itself
-
-    def __len__(self) -> int:
-        return 1
-
 
 def text_of(value: Any) -> str:
     """Return an expression or a number as C."""
@@ -113,7 +107,9 @@ def _columns(effect: Effect, inputs: Mapping[str, Symbol], shape: Sequence[float
             "Take it out of the model, or export a state estimator.",
         )
     symbols: Any = inputs
-    if isinstance(effect, Pointwise):
-        return [text_of(value) for value in effect.row(symbols, shape)]
-    found: Any = effect.columns(symbols, shape)
-    return [found.text] if isinstance(found, Symbol) else [text_of(value) for value in found[0]]
+    row = (
+        effect.row(symbols, shape)
+        if isinstance(effect, Pointwise)
+        else effect.step(symbols, shape, [])
+    )
+    return [text_of(value) for value in row]
