@@ -4,7 +4,7 @@ An estimator is an immutable object. A recipe fits one: `ModelRecipe`, `BankReci
 `NetworkRecipe` and `ResidualRecipe` contain settings and fit an estimator on a campaign.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -39,6 +39,11 @@ class Stepper:
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples, one or many, and return their estimates, shape (n,)."""
         raise NotImplementedError
+
+
+def rows_of(channels: Mapping[str, FloatArray] | Recording, names: Sequence[str]) -> FloatArray:
+    """Return the named channels of each sample, shape (n, names)."""
+    return np.column_stack([channels[name] for name in names])
 
 
 class Estimator(Protocol):

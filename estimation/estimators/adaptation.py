@@ -26,6 +26,7 @@ from estimation.bank.fitting import Normal, pull
 from estimation.bank.interval import Interval, scaled, with_scores
 from estimation.bank.states import LAGS, Bank
 from estimation.closing import is_closing, processed
+from estimation.estimator import rows_of
 from estimation.estimators.bank import EVERY, BankEstimator, fit_runs
 from estimation.estimators.network import NetworkEstimator
 from estimation.estimators.run_evidence import RunEvidence, ranges_of
@@ -86,15 +87,11 @@ def evidence(estimator: Adaptable, recording: Recording) -> Evidence | None:
     Raises:
         MissingChannelError: The run lacks a channel.
     """
-    if isinstance(estimator, BankEstimator):
-        names = estimator.bank.channels
-    else:
-        names = estimator.network.inputs
-    run = processed(recording, [*names, estimator.target], estimator.low_pass)
+    run = processed(recording, [*estimator.channels, estimator.target], estimator.low_pass)
     kept = is_closing(run)
     if not (kept & run.valid).any():
         return None
-    rows = np.column_stack([run[name][kept] for name in names])
+    rows = rows_of(run, estimator.channels)[kept]
     return Evidence(rows, run[estimator.target][kept], run.valid[kept], recording.conditions)
 
 

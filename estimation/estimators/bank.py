@@ -17,7 +17,7 @@ from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
 from estimation.derived import zero_phase_channels
-from estimation.estimator import Stepper
+from estimation.estimator import Stepper, rows_of
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.estimators.origin import Origin
 from estimation.estimators.run_evidence import (
@@ -98,6 +98,11 @@ class BankEstimator:
                 )
             object.__setattr__(self, name, values)
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels that are read, measured or derived."""
+        return self.bank.channels
+
     def predict(self, recording: Recording, causal: bool = False) -> FloatArray:
         """Return the value of `estimate` for each sample, shape (n,)."""
         return self.estimate(recording, causal).value
@@ -111,12 +116,11 @@ class BankEstimator:
             FilterError: The run cannot be filtered.
         """
         require_own(self.instrument, recording)
-        names = self.bank.channels
         if causal:
-            channels = causal_channels(recording, names, self.low_pass, tracked=True)
+            channels = causal_channels(recording, self.channels, self.low_pass, tracked=True)
         else:
-            channels = zero_phase_channels(recording, names, self.low_pass)
-        return self.at(recording.conditions).of_rows(rows_of(channels, self.bank))
+            channels = zero_phase_channels(recording, self.channels, self.low_pass)
+        return self.at(recording.conditions).of_rows(rows_of(channels, self.channels))
 
     def of_rows(self, rows: FloatArray) -> Estimates:
         """Return the estimates for rows of filtered channels, shape (n, channels)."""
@@ -206,7 +210,7 @@ class BankStepper(Stepper):
     """A state estimator as it runs live; its interval differs from sample to sample."""
 
     def __init__(self, estimator: BankEstimator, sample_rate_hz: float) -> None:
-        names, low_pass = estimator.bank.channels, estimator.low_pass
+        names, low_pass = estimator.channels, estimator.low_pass
         super().__init__(CausalChannels(names, sample_rate_hz, low_pass, tracked=True))
         self.inside = np.empty(0, np.bool_)
         self._estimator = estimator
@@ -214,15 +218,10 @@ class BankStepper(Stepper):
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""
         channels = self._source.step(time_s, measured)
-        found = self._estimator.of_rows(rows_of(channels, self._estimator.bank))
+        found = self._estimator.of_rows(rows_of(channels, self._estimator.channels))
         self.inside, newest = found.inside, found.half_width[-1:]
         self.half_width = float(newest[0]) if np.isfinite(newest).any() else None
         return found.value
-
-
-def rows_of(channels: Mapping[str, FloatArray] | Recording, bank: Bank) -> FloatArray:
-    """Return the rows a bank reads, shape (n, channels)."""
-    return np.column_stack([channels[name] for name in bank.channels])
 
 
 def fit_runs(runs: Sequence[RunEvidence], bank: Bank, target: str) -> BankEstimator:
@@ -300,6 +299,6 @@ class BankRecipe:
         if self.causal:
             source = causal_channels(recording, bank.channels, self.low_pass, tracked=True)
         truths = run[self.target][kept, None]
-        rows = rows_of(source, bank)[kept]
+        rows = rows_of(source, bank.channels)[kept]
         (evidence,) = RunEvidence.of_rows(bank, rows, truths, recording.conditions)
         return evidence

@@ -60,11 +60,7 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         rests = bool(rest_speeds(estimator.model))
         low_pass, signals = estimator.model.low_pass, estimator.model.signals
     else:
-        low_pass = estimator.low_pass
-        if isinstance(estimator, BankEstimator):
-            channels = estimator.bank.channels
-        else:
-            channels = estimator.network.inputs
+        channels, low_pass = estimator.channels, estimator.low_pass
     program = _Program(channels, sample_rate_hz, signals)
     measured = program.measured
     integrated = [f"i == {k}" for k, c in enumerate(measured) if c in signals.integrals]

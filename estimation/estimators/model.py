@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.campaign import Campaign
-from estimation.estimator import Stepper
+from estimation.estimator import Stepper, rows_of
 from estimation.fitting import fit
 from estimation.live_channels import CausalChannels
 from estimation.model import Model, predict
@@ -50,7 +50,7 @@ class Stream(Stepper):
             stands = any(bool(abs(channels[k][-1]) < v) for k, v in self._rest.items())
             # the interval is of errors in motion: at rest friction takes any value
             self.half_width = None if stands else usual_half_width(self.model)
-        rows = np.column_stack([channels[name] for name in self.model.channels])
+        rows = rows_of(channels, self.model.channels)
         return np.array([self._one(row) for row in rows.tolist()])
 
     def _one(self, row: list[float]) -> float:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from estimation.campaign import Campaign
 from estimation.closing import closing_samples, processed
 from estimation.derived import zero_phase_channels
-from estimation.estimator import Stepper
+from estimation.estimator import Stepper, rows_of
 from estimation.estimators.bank import EVERY
 from estimation.estimators.instrument import instrument_of, only_one, require_own
 from estimation.estimators.origin import Origin
@@ -54,6 +54,11 @@ class NetworkEstimator:
         """Channel that is estimated."""
         return self.network.outputs[0]
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels that are read, measured or derived."""
+        return self.network.inputs
+
     def predict(self, recording: Recording, causal: bool = False) -> FloatArray:
         """Return the estimate for each sample, shape (n,).
 
@@ -63,17 +68,13 @@ class NetworkEstimator:
             FilterError: The run cannot be filtered.
         """
         require_own(self.instrument, recording)
-        return self.network(self.rows(recording, causal))[:, 0]
+        source = causal_channels if causal else zero_phase_channels
+        rows = rows_of(source(recording, self.channels, self.low_pass), self.channels)
+        return self.network(rows)[:, 0]
 
     def for_any_instrument(self) -> "NetworkEstimator":
         """Return the estimator for use on instruments it was not fitted on."""
         return replace(self, instrument="")
-
-    def rows(self, recording: Recording, causal: bool) -> FloatArray:
-        """Return the network's inputs for each sample, shape (n, inputs)."""
-        source = causal_channels if causal else zero_phase_channels
-        channels = source(recording, self.network.inputs, self.low_pass)
-        return np.column_stack([channels[name] for name in self.network.inputs])
 
     def stepper(self, sample_rate_hz: float) -> "NetworkStepper":
         """Return the network as it runs live."""
@@ -114,15 +115,13 @@ class NetworkStepper(Stepper):
     """A network as it runs live; it has no interval."""
 
     def __init__(self, estimator: NetworkEstimator, sample_rate_hz: float) -> None:
-        inputs, low_pass = estimator.network.inputs, estimator.low_pass
-        super().__init__(CausalChannels(inputs, sample_rate_hz, low_pass))
+        super().__init__(CausalChannels(estimator.channels, sample_rate_hz, estimator.low_pass))
         self.inside = np.empty(0, np.bool_)
         self._network = estimator.network
 
     def step(self, time_s: ArrayLike, measured: Mapping[str, ArrayLike]) -> FloatArray:
         """Take the next samples and return their estimates, shape (n,); NaN where one is lost."""
-        channels = self._source.step(time_s, measured)
-        rows = np.column_stack([channels[n] for n in self._network.inputs])
+        rows = rows_of(self._source.step(time_s, measured), self._network.inputs)
         self.inside = self._network.inside(rows)
         return self._network(rows)[:, 0]
 
@@ -163,7 +162,7 @@ class NetworkRecipe:
             run = processed(recording, [*self.inputs, self.target], self.low_pass)
             run = run.with_columns(**{self.target: run[self.target] - known(recording)})
             kept = closing_samples(run, keep_flagged=False)
-            rows.append(np.column_stack([kept[name] for name in self.inputs])[:: self.every])
+            rows.append(rows_of(kept, self.inputs)[:: self.every])
             rest.append(kept[self.target][:: self.every, None])
         if not rows:
             raise files.NetworkError("No runs to train the network on.")

@@ -12,6 +12,7 @@ from estimation import model_file
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.effects import effect
+from estimation.estimator import rows_of
 from estimation.estimators.bank import BankEstimator, BankRecipe
 from estimation.estimators.c_header import ExportError, header, refused
 from estimation.estimators.c_model import NotInCError
@@ -197,7 +198,7 @@ def test_the_compiled_network_gives_the_same(runs, tmp_path):
     found = compiled(estimator, runs[0], tmp_path)
     wanted = estimator.predict(runs[0], causal=True)
     assert np.abs(found[:, 0] - wanted).max() <= 1e-5 * np.abs(wanted).max()
-    inside = network.inside(estimator.rows(runs[0], causal=True))
+    inside = network.inside(rows_of(causal_channels(runs[0], network.inputs), network.inputs))
     assert np.mean(found[:, 2] == inside) > 0.999
 
 

@@ -10,8 +10,9 @@ from estimation.bank.interval import covered_share
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign, in_folds
 from estimation.closing import is_closing, processed
+from estimation.estimator import rows_of
 from estimation.estimators.adaptation import adapted_states, spread_out
-from estimation.estimators.bank import EVERY, BankEstimator, fit_runs, rows_of
+from estimation.estimators.bank import EVERY, BankEstimator, fit_runs
 from estimation.estimators.run_evidence import RunEvidence
 from rig.importers.jaw_steps import JAW, with_one_zero
 from rig.output.provenance import Provenance
@@ -125,8 +126,8 @@ def _reduced(campaign: Campaign) -> dict[str, list[RunEvidence]]:
         if (closing & ~run.valid).any() or not closing.any():
             continue
         kept = np.flatnonzero(closing)[::EVERY]
-        truths = np.column_stack([run[target][kept] for target in TARGETS])
-        parts = RunEvidence.of_rows(BANK, rows_of(run, BANK)[kept], truths, recording.conditions)
+        rows, truths = (rows_of(run, names)[kept] for names in (BANK.channels, TARGETS))
+        parts = RunEvidence.of_rows(BANK, rows, truths, recording.conditions)
         for target, part in zip(TARGETS, parts, strict=True):
             found[target].append(part)
     return found

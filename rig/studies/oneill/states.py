@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from estimation.bank.states import EFFECTS, Bank
 from estimation.campaign import Campaign
 from estimation.closing import is_closing, processed
-from estimation.estimators.bank import EVERY, BankEstimator, Estimates, fit_runs, rows_of
+from estimation.estimator import rows_of
+from estimation.estimators.bank import EVERY, BankEstimator, Estimates, fit_runs
 from estimation.estimators.run_evidence import RunEvidence
 from estimation.live_channels import causal_channels
 from estimation.recording import FloatArray, Recording
@@ -148,7 +149,7 @@ def _reduced(recording: Recording, pose: str, wanted: list[tuple[str, str]]) -> 
         recording.name,
         run.time_s[kept],
         {
-            (LOADS[surrogate], filters): rows_of(sources[filters], banks[surrogate])[kept]
+            (LOADS[surrogate], filters): rows_of(sources[filters], banks[surrogate].channels)[kept]
             for surrogate, filters in wanted
         },
         {target: run[target][kept] for target in TARGETS},
