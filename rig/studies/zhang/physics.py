@@ -166,17 +166,13 @@ def columns_of(arm: Arm, effects: Sequence[ArmEffect], run: PsmRun) -> FloatArra
 
 def prepared(name: str, arm: Arm, runs: Sequence[PsmRun], effects: Sequence[ArmEffect]) -> Prepared:
     """Return runs ready for fits and for the search."""
-    tables, torques, widths = [], [], []
-    for run in runs:
-        motion = motion_of_run(run)
-        kept = slice(SETTLE, None, EVERY)
-        parts = [base_columns(arm, run, motion)[kept]]
-        parts += [effect.columns(motion)[kept] for effect in effects]
-        widths = [part.shape[2] for part in parts[1:]]
-        tables.append(np.concatenate(parts, axis=2))
-        torques.append(run.torque[kept])
+    kept = slice(SETTLE, None, EVERY)
+    table = np.concatenate([columns_of(arm, effects, run)[kept] for run in runs])
+    torque = np.concatenate([run.torque[kept] for run in runs])
+    begun = motion_of_run(runs[0].part(0, WINDOW))
+    widths = [effect.columns(begun).shape[2] for effect in effects]
     blocks = blocks_of(base_block(DAMPING, GRIPPER_FRICTIONS), effects, widths)
-    return of_columns(name, np.concatenate(torques), np.concatenate(tables), blocks, JOINTS)
+    return of_columns(name, torque, table, blocks, JOINTS)
 
 
 def find_effects(arm: Arm, first: Sequence[PsmRun], second: Sequence[PsmRun]) -> list[ArmEffect]:
