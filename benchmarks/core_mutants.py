@@ -397,7 +397,6 @@ def main() -> int:
     state = json.loads(STATE.read_text()) if STATE.is_file() else {}
     sums = forget_changed(state)
     results = state.get("results", {}) if state.get("core") == core else {}
-    STATE.parent.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "firmware"
         for part in ("core", "boards", "host", "proofs", "tests"):

@@ -153,7 +153,6 @@ def main() -> int:
                 for seed, rule, events in more.found:
                     text = f"{kind}, seed {seed}: {rule}: {'; '.join(events[:MOST_EVENTS])}"
                     sys.stderr.write(f"{text}{' ...' if len(events) > MOST_EVENTS else ''}\n")
-            STATE.parent.mkdir(exist_ok=True)
             state = {"core": core, **{kind: asdict(s) for kind, s in searches.items()}}
             write_text_atomic(STATE, json.dumps(state) + "\n")
             said = ", ".join(f"{s.sequences} {kind}" for kind, s in searches.items())

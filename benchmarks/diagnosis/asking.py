@@ -12,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from estimation.files import write_text_atomic
 from rig.output.provenance import commit
 
 TIME_LIMIT_S = 3600.0
@@ -39,9 +40,7 @@ class Answer:
 
     def save(self, path: Path) -> None:
         """Write the answer; a reader never sees half of it."""
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps(asdict(self)))
-        part.replace(path)
+        write_text_atomic(path, json.dumps(asdict(self)))
 
     @classmethod
     def load(cls, path: Path) -> "Answer":

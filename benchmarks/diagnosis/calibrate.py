@@ -162,7 +162,6 @@ def _with(numbers: Numbers, name: str, value: float) -> Numbers:
 def _searched(out: Path, kind: str, seed: int, models: Sequence[Model]) -> Searched:
     path = out / commit(Path.cwd()) / f"{kind}-{seed}.json"
     if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
         campaign, families = _drawn(kind, seed)
         recordings = list(campaign.evidence)
         whole = answer(recordings, models, split(recordings))

@@ -73,7 +73,6 @@ def measure(
         ask: Whether to ask where an answer is missing; else such cases are left out.
         on_row: Called with each row as it is made.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     rows = []
     for row in _rows(cases, rig, folder, ask):
         rows.append(row)

@@ -280,7 +280,6 @@ def _case(kind: str, seed: int, folder_of_answers: Path) -> Case:
     kept = folder_of_answers / f"{name}.json"
 
     def write(folder: Path) -> None:
-        kept.parent.mkdir(parents=True, exist_ok=True)
         write_text_atomic(kept, json.dumps(draw(seed, kind, folder)))
 
     def judge(report: Mapping[str, object]) -> scoring.Judgement:

@@ -61,7 +61,6 @@ def _case(kind: str, seed: int, gear_ratio: float | None, folder_of_answers: Pat
 
     def judge(report: Report) -> Judgement:
         if not kept.exists():
-            kept.parent.mkdir(parents=True, exist_ok=True)
             write_text_atomic(kept, json.dumps(_described(drawn())))
         content = json.loads(kept.read_text())
         hidden = [scoring.Hidden(*effect) for effect in content["hidden"]]

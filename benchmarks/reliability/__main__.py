@@ -82,7 +82,6 @@ def main() -> int:
         sys.stderr.write(f"{name} ...\n")
         figures, now = part.measure(options), Provenance.now(SEED)
         made = {"made": f"{now.date}, {now.commit}, {now.seed}"}
-        state.parent.mkdir(exist_ok=True)
         write_text_atomic(
             state, json.dumps({**_kept(state), name: figures | made}, indent=1) + "\n"
         )

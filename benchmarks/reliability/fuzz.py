@@ -74,7 +74,6 @@ def load(path: Path) -> dict[str, Tally]:
 
 def save(path: Path, tallies: dict[str, Tally]) -> None:
     """Keep the tally, so that a later run goes on."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     kept = {name: asdict(tally) for name, tally in tallies.items()}
     write_text_atomic(path, json.dumps(kept, indent=1) + "\n")
 
