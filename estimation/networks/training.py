@@ -53,20 +53,14 @@ class Training:
     """Result of a training.
 
     Attributes:
-        iterations: Accepted steps.
         converged: Whether it stopped because nothing changed any more.
-        reason: Why it stopped.
         effective_parameters: gamma, the number of weights the data determines, of all parameters.
-        rmse: Error on the training rows in units of half the range of the outputs.
     """
 
     network: Network
-    iterations: int
     converged: bool
-    reason: str
     effective_parameters: float
     parameters: int
-    rmse: float
 
 
 def has_torch() -> bool:
@@ -126,16 +120,13 @@ def train(
         fit.start_from(start)
     if validation is not None:
         fit.hold_out(to_unit(validation[0], ranges[0]), to_unit(validation[1], ranges[1]))
-    reason, converged = fit.run()
+    converged = fit.run()
     hidden, output = fit.weights()
     return Training(
         network=Network(tuple(names[0]), tuple(names[1]), ranges[0], ranges[1], hidden, output),
-        iterations=fit.steps,
         converged=converged,
-        reason=reason,
         effective_parameters=fit.gamma,
         parameters=fit.count,
-        rmse=fit.rmse,
     )
 
 
@@ -219,7 +210,6 @@ class _Fit:
         first = _first_weights(*self._shapes, generator)
         self._w = torch.from_numpy(np.concatenate([weights.ravel() for weights in first]))
         self.count = len(self._w)
-        self.steps = 0
         self.gamma = float(self.count)
         self._held_out: tuple[Tensor, Tensor] | None = None
         self._best: tuple[float, Tensor] | None = None
@@ -255,27 +245,25 @@ class _Fit:
         hidden, output = self._parts(self._w if self._best is None else self._best[1])
         return hidden.numpy().copy(), output.numpy().copy()
 
-    def run(self) -> tuple[str, bool]:
-        """Train; return why it stopped and whether that is convergence."""
+    def run(self) -> bool:
+        """Train, and return whether nothing changed any more at the end."""
         self._compare()
         damping = self.FIRST_DAMPING
         history = [self.rmse]
         curvature, slope = self._normal()
-        while self.steps < self.settings.iterations:
+        for _ in range(self.settings.iterations):
             damping = self._step(curvature, slope, damping)
-            if damping > self.MOST_DAMPING:
-                return "no step lowers the objective any more", True
-            self.steps += 1
+            if damping > self.MOST_DAMPING:  # no step lowers the objective
+                return True
             curvature, slope = self._normal()
             self._update_evidence(curvature)
             self._compare()
             history.append(self.rmse)
-            if self.steps >= self.settings.patience:
+            if len(history) > self.settings.patience:
                 before = history[-1 - self.settings.patience]
                 if before - history[-1] < self.settings.tolerance * before:
-                    patience, tolerance = self.settings.patience, self.settings.tolerance
-                    return f"the error fell by less than {tolerance:g} in {patience} steps", True
-        return f"stopped after {self.steps} steps", False
+                    return True
+        return False
 
     def _compare(self) -> None:
         """Keep the weights if none before did better on the rows held out."""
