@@ -135,15 +135,12 @@ def check(
     """
     models = declared(plant)
     if campaign is None:
-        found = [_described(model) for model in models]
-        if recorded:
-            found = [
-                replace(
-                    one, trouble=_absent(model, recorded, "is not among the channels of [data]")
-                )
-                for one, model in zip(found, models, strict=True)
-            ]
-        return CheckedPlant(tuple(found), tuple(missing(plant)), tuple(unused(plant)))
+        what = "is not among the channels of [data]"
+        found = tuple(
+            replace(_described(model), trouble=_absent(model, recorded, what) if recorded else "")
+            for model in models
+        )
+        return CheckedPlant(found, tuple(missing(plant)), tuple(unused(plant)))
     recordings = list(campaign.evidence)
     columns = shared_columns(recordings) if recordings else []
     return CheckedPlant(
