@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from estimation.derived import zero_phase_channels
 from estimation.filters import PAPER, LowPass
 from estimation.recording import Recording
-from estimation.rest import closing
-
-SPEED = "spindle_velocity_rad_s"
+from estimation.rest import SPINDLE_SPEED, closing
 
 
 def processed(recording: Recording, names: Iterable[str], low_pass: LowPass = PAPER) -> Recording:
@@ -25,12 +23,12 @@ def processed(recording: Recording, names: Iterable[str], low_pass: LowPass = PA
         MissingChannelError: A measured channel is not in the recording.
         FilterError: The run cannot be filtered.
     """
-    return zero_phase_channels(recording, [*names, SPEED], low_pass)
+    return zero_phase_channels(recording, [*names, SPINDLE_SPEED], low_pass)
 
 
 def is_closing(run: Recording) -> NDArray[np.bool_]:
     """Return which samples of a processed run the paper keeps, shape (n,)."""
-    return closing(run[SPEED], run.sample_rate_hz)
+    return closing(run[SPINDLE_SPEED], run.sample_rate_hz)
 
 
 def closing_samples(run: Recording, keep_flagged: bool = True) -> Recording:

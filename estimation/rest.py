@@ -12,9 +12,6 @@ from scipy import ndimage
 
 from estimation.recording import FloatArray
 
-SPEED = "motor_velocity_rad_s"
-"""The cleanest speed there is."""
-
 SPINDLE_SPEED = "spindle_velocity_rad_s"
 
 CLOSING_RAD_S, TRIM_S = 0.25, 1.0
