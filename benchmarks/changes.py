@@ -18,8 +18,7 @@ from benchmarks.rigs.build import spread_over
 from estimation.changes.compare import compare
 from estimation.changes.difference import Change
 from estimation.files import write_text_atomic
-from estimation.plant_file import shipped_plant
-from estimation.plant_models import declared
+from estimation.model_file import reference_rig
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable, to_page
 
@@ -83,7 +82,7 @@ def _parameter(seed: int, kind: str) -> Pair:
     found = compare(
         [stage.record(k) for k in runs],
         [later.record(k) for k in runs],
-        declared(shipped_plant("reference")),
+        reference_rig(),
     )
     planted = f"{name} x {factor:.2f}" if moved else ""
     return _judged(seed, planted, kind, found.changes, MOVED[name] if moved else ())
@@ -97,7 +96,7 @@ def _effect(seed: int) -> Pair:
     found = compare(
         [case.stage.record(k) for k in runs],
         [later.record(k, case.switched) for k in runs],
-        declared(shipped_plant("reference")),
+        reference_rig(),
     )
     right = (hidden.family, *hidden.synonyms)
     return _judged(seed, f"{hidden.family} at the {hidden.place}", "effect", found.changes, right)

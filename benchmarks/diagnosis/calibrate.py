@@ -32,7 +32,6 @@ from estimation.files import write_text_atomic
 from estimation.model import Model
 from rig.output.provenance import commit
 
-REFERENCE_RIG = ("motor", "gearbox", "cable", "stretch")
 GEAR_RATIO = 35.0
 """Of all rigs: the derived channels of the reference rig are made for it."""
 
@@ -124,7 +123,7 @@ def main() -> int:
     options = parser.parse_args()
     if options.seed not in CALIBRATE:
         parser.error(f"seed {options.seed} is not one of {CALIBRATE.start} to {CALIBRATE.stop - 1}")
-    models = [model_file.read(Path(name)) for name in REFERENCE_RIG]
+    models = model_file.reference_rig()
     asked = [("clean" if k % 2 else SILENCED, k) for k in range(options.clean)]
     asked += [(kind, k) for k in range(options.cases) for kind in KINDS]
     done = []

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -632,8 +631,7 @@ def test_a_cause_that_comes_once_costs_less_than_one_that_comes_and_goes() -> No
 def test_a_cause_of_some_runs_is_found(seed: int, family: str) -> None:
     """The first one has an impossible sign in all runs; the second moves their means, too."""
     runs = list(draw(seed, "some_runs", gear_ratio=35.0).recordings)
-    models = [model_file.read(Path(name)) for name in ("motor", "gearbox", "cable", "stretch")]
-    (finding,) = diagnose(runs, models, split(runs)).findings
+    finding = _only(runs, *model_file.reference_rig())
     assert finding.family == family
 
 
@@ -838,5 +836,4 @@ def test_readings_have_noise_and_clocks_have_none() -> None:
 def test_nothing_stands_in_for_a_noisy_reading(seed: int) -> None:
     """The load is a spring or a ramp in time, so an angle or a clock has it without its noise."""
     runs = list(draw(seed, "confounded", gear_ratio=35.0).twin.evidence)
-    models = [model_file.read(Path(name)) for name in ("motor", "gearbox", "cable", "stretch")]
-    assert diagnose(runs, models, split(runs)).findings == ()
+    assert diagnose(runs, model_file.reference_rig(), split(runs)).findings == ()
