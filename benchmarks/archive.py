@@ -11,9 +11,9 @@ import multiprocessing
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +27,7 @@ from rig.campaigns.drift import changes
 from rig.campaigns.index import campaigns
 from rig.campaigns.refit import refit_all
 from rig.campaigns.search import search
-from rig.campaigns.work import engine
+from rig.campaigns.work import Start, engine
 from rig.log.convert import write_recording
 from rig.output.provenance import Provenance
 from rig.output.table import TextTable, to_page
@@ -91,7 +91,7 @@ def dask() -> Iterator[Executor | None]:
         yield executor
 
 
-def timed(root: Path, start: Callable[[], AbstractContextManager[Executor | None]]) -> float:
+def timed(root: Path, start: Start) -> float:
     """Return the seconds that a fit of every campaign takes."""
     clear(root)
     begun = time.monotonic()

@@ -49,7 +49,8 @@ def in_turn(
 
 
 def write_recordings(folder: Path, recordings: Iterable[Recording]) -> None:
-    """Write recordings into a folder, one log a run."""
+    """Write recordings into a folder, which is made, one log a run."""
+    folder.mkdir(parents=True, exist_ok=True)
     for recording in recordings:
         write_recording(folder / f"{recording.name}.mcap", recording)
 

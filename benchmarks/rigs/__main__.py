@@ -8,6 +8,7 @@ import json
 import sys
 from pathlib import Path
 
+from benchmarks.diagnosis.case import write_recordings
 from benchmarks.rigs import KINDS, draw
 from estimation.files import write_text_atomic
 from rig.errors import RigError
@@ -21,9 +22,10 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True, help="Folder; made if missing.")
     parser.add_argument("--gear-ratio", type=float, help="Instead of the drawn one.")
     asked = parser.parse_args()
+    runs = asked.out / "runs"
     try:
         case = draw(asked.seed, asked.kind, gear_ratio=asked.gear_ratio)
-        runs = case.write(asked.out / "runs")
+        write_recordings(runs, case.recordings)
     except RigError as error:
         sys.stderr.write(f"{error}\n")
         return int(error.exit_code)

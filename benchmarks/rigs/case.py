@@ -6,7 +6,6 @@ again, from the same seed.
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from benchmarks.rigs.structure import Truth
 from estimation.campaign import Campaign
 from estimation.recording import Recording
 from rig.errors import RigError, UsageError
-from rig.log.convert import write_recording
 
 ATTEMPTS = 40
 
@@ -58,13 +56,6 @@ class Case:
     def twin(self) -> Campaign:
         """The same runs, noise and all, without the effects."""
         return Campaign.of(self.stage.record(k) for k in self.stage.every)
-
-    def write(self, folder: Path) -> Path:
-        """Write one log a run into a folder, which is made; nothing in it gives the answer away."""
-        folder.mkdir(parents=True, exist_ok=True)
-        for recording in self.recordings:
-            write_recording(folder / f"{recording.name}.mcap", recording)
-        return folder
 
     def describe(self) -> dict[str, object]:
         """Return the answer and the rig as plain values."""

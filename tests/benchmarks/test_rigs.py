@@ -3,6 +3,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.diagnosis.case import write_recordings
 from benchmarks.rigs import CALIBRATE, DEVELOP, JUDGE, Case, draw, part_of
 from benchmarks.rigs.residual import EQUATIONS, Fitted, Prepared, declared, fit, prepare
 from benchmarks.rigs.stage import EPOCH_NS
@@ -125,7 +126,8 @@ def test_what_only_the_weighted_error_shows_is_no_finding():
 
 def test_written_logs_read_back_equal(tmp_path):
     case = case_of("clean", FIRST + 1)
-    read = list(open_campaign(case.write(tmp_path / "runs")))
+    write_recordings(tmp_path / "runs", case.recordings)
+    read = list(open_campaign(tmp_path / "runs"))
     assert [r.name for r in read] == [r.name for r in case.recordings]
     for one, other in zip(case.recordings, read, strict=True):
         assert one.conditions == other.conditions
