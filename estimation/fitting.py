@@ -161,7 +161,7 @@ def _with_numbers(
         | {p.name: next(shapes) for p in term.effect.shape}
         for term in problem.model.terms
     ]
-    return with_values(problem.model, values, None)
+    return with_values(problem.model, values)
 
 
 def _estimate(value: float, spreads: FloatArray | None, column: int) -> Estimate:

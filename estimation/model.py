@@ -318,9 +318,7 @@ def predict(model: Model, recording: Recording, causal: bool = False) -> FloatAr
     return estimate(model, _filtered(model, recording, model.channels, causal))
 
 
-def with_values(
-    model: Model, values: Sequence[Mapping[str, Estimate]], evidence: Evidence | None
-) -> Model:
-    """Return the model with new parameter values, one mapping a term."""
+def with_values(model: Model, values: Sequence[Mapping[str, Estimate]]) -> Model:
+    """Return the model with new parameter values, one mapping a term, and without evidence."""
     terms = tuple(replace(term, values=new) for term, new in zip(model.terms, values, strict=True))
-    return replace(model, terms=terms, evidence=evidence)
+    return replace(model, terms=terms, evidence=None)
