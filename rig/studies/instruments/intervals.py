@@ -16,9 +16,8 @@ from estimation.estimators.bank import EVERY, BankEstimator, fit_runs
 from estimation.estimators.run_evidence import RunEvidence
 from rig.importers.jaw_steps import JAW, with_one_zero
 from rig.output.provenance import Provenance
-from rig.studies.oneill.paper import CONDITIONS, DISTAL, FOLDS, PROXIMAL
+from rig.studies.oneill.paper import CONDITIONS, FOLDS, TARGETS
 
-TARGETS = (PROXIMAL, DISTAL, JAW)
 BANK = Bank("motor_current_a")
 INSTRUMENTS = (
     *("Tool_4_Maryland_L_4", "Tool_4_Maryland_L_2", "Tool_5_Maryland_L_2"),

@@ -23,12 +23,11 @@ from estimation.estimators.residual import ResidualRecipe
 from estimation.networks.training import Settings, has_torch
 from estimation.recording import FloatArray
 from estimation.scores import Score, score
-from rig.studies.oneill.paper import FOLDS, SURROGATES
+from rig.studies.oneill.paper import FILTERS, FOLDS, SURROGATES
 from rig.studies.oneill.paper import PROXIMAL as TARGET
 
 LOAD = SURROGATES["current"]
 PAPER_INPUTS = ("spindle_angle_rad", "spindle_velocity_rad_s", LOAD)
-FILTERS = ("zero-phase", "live")
 EVERY = 24
 """Networks are trained on every so many-th closing sample."""
 

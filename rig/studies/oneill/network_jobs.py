@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from rig.studies.oneill.data import CAUSAL
-from rig.studies.oneill.paper import DISTAL, JAW, POSES, PROXIMAL, SURROGATES
+from rig.studies.oneill.paper import DISTAL, JAW, POSES, PROXIMAL, SURROGATES, TARGETS
 
 BASE = ("spindle_angle_rad", "spindle_velocity_rad_s")
 
@@ -20,9 +20,6 @@ ACCELERATION, TRAVEL = "motor_acceleration_rad_s2", "motor_travel_rad"
 CHANNELS = (*BASE, *SURROGATES.values(), PROXIMAL, DISTAL, JAW, ACCELERATION, TRAVEL)
 
 STATE_NODES = 12
-
-ALONE = (PROXIMAL, DISTAL, JAW)
-"""Targets of the networks with physical states, one network each."""
 
 MOTOR = [("end-to-end", "command"), ("end-to-end", "current")]
 """The rows of the paper that the physical states are compared with."""
@@ -82,7 +79,7 @@ def jobs(poses: tuple[str, ...]) -> list[Job]:
     paper += [("neutral", "staged", s, both) for s in tuple(LOADS)[:4]]
     posed = [(p, "end-to-end", s, both) for p in ("pitch", "roll") for s in LOADS]
     ways = {
-        way: [("neutral", way, s, (t,)) for s in ("command", "current") for t in ALONE]
+        way: [("neutral", way, s, (t,)) for s in ("command", "current") for t in TARGETS]
         for way in ("+ travel", "causal", "+ acceleration")
     }
     motor = _motor(paper)

@@ -14,9 +14,9 @@ from rig.studies.coverage import coverage
 from rig.studies.oneill import goals
 from rig.studies.oneill import networks_page as networks
 from rig.studies.oneill import states_page as states
-from rig.studies.oneill.kinds import FILTERS, KindRow
+from rig.studies.oneill.kinds import KindRow
 from rig.studies.oneill.networks import NetworkStudy
-from rig.studies.oneill.paper import HELD_OUT, PROTOCOLS, SHOWN
+from rig.studies.oneill.paper import FILTERS, HELD_OUT, PROTOCOLS, SHOWN
 from rig.studies.oneill.states import Shown, StateStudy
 from rig.studies.oneill.study import Study
 

@@ -12,7 +12,10 @@ import numpy as np
 INSTRUMENT = "Tool_4_Maryland_L_4"
 """Folder of the measured data that the paper's first two experiments were made of."""
 
-PROXIMAL, DISTAL, JAW = "proximal_torque_n_m", "distal_torque_n_m", "jaw_angle_rad"
+PROXIMAL, DISTAL, JAW = TARGETS = ("proximal_torque_n_m", "distal_torque_n_m", "jaw_angle_rad")
+
+FILTERS = ("zero-phase", "live")
+"""How the channels of an estimate are filtered here."""
 
 SHOWN = {
     PROXIMAL: ("proximal torque", "mN m", 1e3),

@@ -21,12 +21,10 @@ from estimation.estimators.run_evidence import RunEvidence
 from estimation.live_channels import causal_channels
 from estimation.recording import FloatArray, Recording
 from rig.studies.oneill.data import held_out_runs, pose_runs
-from rig.studies.oneill.paper import CONDITIONS, DISTAL, JAW, POSES, PROXIMAL
+from rig.studies.oneill.paper import CONDITIONS, DISTAL, FILTERS, JAW, POSES, PROXIMAL, TARGETS
 from rig.studies.oneill.state_rows import LOADS, StateJob, StateRow, scored
 from rig.studies.oneill.study import fit_line
 
-FILTERS = ("zero-phase", "live")
-TARGETS = (PROXIMAL, DISTAL, JAW)
 DRAWN = (Bank(LOADS["command"]), "live")
 """Content of the figures."""
 
