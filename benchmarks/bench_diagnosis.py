@@ -18,10 +18,10 @@ from benchmarks.ratio import Ratio
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.candidates import every_claim, pool_of
-from estimation.causes.equations import lay_out
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
+from estimation.causes.layout import lay_out
 from estimation.causes.scoring import assessed
 from estimation.recording import Recording
 from rig.diagnosis.ledger import Ledger

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from estimation.causes.blocks import Products
 from estimation.causes.candidates import Candidate, Claim
-from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.functions import Function
 from estimation.causes.instruments import instrumented, signal
 from estimation.causes.joint import Joint
 from estimation.causes.laid import centred
+from estimation.causes.layout import Layout
 from estimation.causes.places import places_of
+from estimation.causes.run_signals import RunSignals
 from estimation.causes.scoring import is_possible
 from estimation.causes.sources import Source
 from estimation.effects import effect

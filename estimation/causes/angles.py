@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.causes.equations import ANGLES, Equation, Layout
+from estimation.causes.equations import Equation
+from estimation.causes.layout import Layout
+from estimation.causes.run_signals import ANGLES
 from estimation.derived import measured_channels
 from estimation.signals import Combination, Signals
 

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.causes.blocks import Block, block_of
-from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.functions import MOST_VARIABLES, Function, functions_at
 from estimation.causes.instruments import signal
 from estimation.causes.joint import Joint
 from estimation.causes.laid import NOTHING, Columns, Laid, Scale
+from estimation.causes.layout import Layout
 from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
+from estimation.causes.run_signals import RunSignals
 from estimation.causes.sources import Source
 from estimation.recording import FloatArray
 

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.causes.equations import Layout, LayoutError, laid_out_like
 from estimation.causes.findings import IN_SET, Kept
 from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
+from estimation.causes.layout import Layout, laid_out_like
 from estimation.causes.numbers import Numbers
+from estimation.causes.run_signals import LayoutError
 from estimation.causes.scoring import Scored, posterior
 from estimation.causes.sources import Source
 from estimation.causes.verdict import Answer

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.causes.equations import EFFORTS, Layout
+from estimation.causes.layout import Layout
+from estimation.causes.run_signals import EFFORTS
 from estimation.recording import FloatArray
 
 Folds = Sequence[Sequence[Sequence[int]]]

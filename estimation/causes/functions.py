@@ -9,9 +9,10 @@ import numba
 import numpy as np
 
 from estimation.causes.angles import travel_of
-from estimation.causes.equations import Layout, RunSignals
 from estimation.causes.instruments import signal
+from estimation.causes.layout import Layout
 from estimation.causes.places import Place, direction_width
+from estimation.causes.run_signals import RunSignals
 from estimation.derived import CAMPAIGN_TIME
 from estimation.recording import FloatArray
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimation.causes.angles import signals_of, travel_of
-from estimation.causes.equations import Layout
+from estimation.causes.layout import Layout
 from estimation.causes.places import Place, direction_width
 from estimation.causes.sources import TURNING
 from estimation.effects import Effect, Parameter

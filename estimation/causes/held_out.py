@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.causes.candidates import Candidate, Claim, laid_out
-from estimation.causes.equations import Layout
 from estimation.causes.joint import Joint
 from estimation.causes.laid import TINY, Part
+from estimation.causes.layout import Layout
 from estimation.causes.nuisances import with_skews
 from estimation.causes.numbers import Numbers
 from estimation.causes.sources import Source

@@ -11,7 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.causes.equations import ANGLES, RATES, Equation, Layout, RunSignals
+from estimation.causes.equations import Equation
+from estimation.causes.layout import Layout
+from estimation.causes.run_signals import ANGLES, RATES, RunSignals
 from estimation.filters import FilterError, zero_phase
 from estimation.recording import FloatArray
 

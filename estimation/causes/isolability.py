@@ -13,12 +13,12 @@ import numpy as np
 from estimation.causes.acting import solved
 from estimation.causes.blocks import block_of
 from estimation.causes.candidates import Candidate, Group, candidates
-from estimation.causes.equations import lay_out
 from estimation.causes.findings import family_probabilities
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
+from estimation.causes.layout import lay_out
 from estimation.causes.levels import with_levels
 from estimation.causes.nuisances import skews, with_skews
 from estimation.causes.scoring import assessed, best_of_each

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.causes.equations import SHAPE_STEP, Layout
+from estimation.causes.equations import SHAPE_STEP
 from estimation.causes.folds import Folds
 from estimation.causes.instruments import declared_of
 from estimation.causes.laid import TINY, Followed, Laid, Part, Projection, centred, inverse
+from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.recording import FloatArray
 

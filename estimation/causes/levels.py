@@ -11,8 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.causes.equations import Equation, Layout, equation_of
+from estimation.causes.equations import Equation, equation_of
 from estimation.causes.joint import Joint
+from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.model import Estimate
 from estimation.recording import FloatArray

@@ -8,10 +8,11 @@ from dataclasses import replace
 from scipy.signal import detrend
 
 from estimation.causes.angles import angles_of, travel_of
-from estimation.causes.equations import ANGLES, Layout
 from estimation.causes.grids import axis, last_order, least_order, turns
+from estimation.causes.layout import Layout
 from estimation.causes.orders import largest_orders, orders_elsewhere
 from estimation.causes.places import Place
+from estimation.causes.run_signals import ANGLES
 from estimation.causes.sources import Source
 from estimation.effects import Effect, catalogue
 

@@ -12,7 +12,8 @@ import numpy as np
 from scipy import fft
 
 from estimation.causes.angles import angles_of
-from estimation.causes.equations import Equation, Layout
+from estimation.causes.equations import Equation
+from estimation.causes.layout import Layout
 from estimation.recording import FloatArray
 
 WAVES = 6

@@ -12,7 +12,9 @@ from typing import Literal
 import numpy as np
 
 from estimation.causes.angles import angles_of, related, signals_of, unrelated
-from estimation.causes.equations import ANGLES, EFFORTS, Equation, Layout, sensitivity
+from estimation.causes.equations import Equation, sensitivity
+from estimation.causes.layout import Layout
+from estimation.causes.run_signals import ANGLES, EFFORTS
 from estimation.derived import CAMPAIGN_TIME, origin_of, rates_of
 
 CLOCKS: Mapping[str, tuple[str, ...]] = {

@@ -8,10 +8,12 @@ import numpy as np
 
 from estimation.causes.acting import Moved
 from estimation.causes.candidates import Candidate
-from estimation.causes.equations import Equation, Layout, RunSignals
+from estimation.causes.equations import Equation
 from estimation.causes.instruments import CLEAN, noise_share
+from estimation.causes.layout import Layout
 from estimation.causes.numbers import Numbers
 from estimation.causes.refit import MOVES, Addition, Errors, Refit, Solved
+from estimation.causes.run_signals import RunSignals
 from estimation.causes.sources import LATE, Source
 from estimation.derived import origin_of
 from estimation.diagnosis.result import Error

@@ -5,9 +5,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 
 import numpy as np
 
-from estimation.causes.equations import Equation, Layout
+from estimation.causes.equations import Equation
 from estimation.causes.folds import unvaried
 from estimation.causes.instruments import noise_share
+from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT
 from estimation.derived import origin_of
 from estimation.diagnosis.audit import audit

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from estimation.causes.blocks import Block, Outcome, Products, block_of, evaluate, rising
 from estimation.causes.candidates import Candidate, Group
-from estimation.causes.equations import EFFORTS
 from estimation.causes.folds import Folds
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
 from estimation.causes.laid import Part
 from estimation.causes.numbers import Numbers
+from estimation.causes.run_signals import EFFORTS
 from estimation.causes.sources import Source
 from estimation.derived import origin_of
 from estimation.recording import FloatArray

@@ -16,11 +16,11 @@ from estimation.causes.candidates import (
     groups_of,
     laid_out,
 )
-from estimation.causes.equations import Layout
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
 from estimation.causes.grids import RELATIVE, least_order
 from estimation.causes.joint import Joint
+from estimation.causes.layout import Layout
 from estimation.causes.nuisances import noticed, skews, with_skews
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.scoring import Scored, assessed, best_of_each, tried

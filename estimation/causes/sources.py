@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from estimation.causes.equations import ANGLES, RunSignals
 from estimation.causes.instruments import signal
 from estimation.causes.places import CLOCKS, Place
+from estimation.causes.run_signals import ANGLES, RunSignals
 from estimation.effects import Effect, Pointwise
 from estimation.filters import holoborodko_derivative
 from estimation.recording import FloatArray

@@ -15,7 +15,6 @@ from estimation.causes import remarks
 from estimation.causes.acting import Moved
 from estimation.causes.angles import signals_of
 from estimation.causes.candidates import Candidate
-from estimation.causes.equations import Layout, lay_out, on_one_clock
 from estimation.causes.findings import (
     Kept,
     family_probabilities,
@@ -27,6 +26,7 @@ from estimation.causes.findings import (
 from estimation.causes.functions import Function
 from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
+from estimation.causes.layout import Layout, lay_out, on_one_clock
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.refit import Addition, Errors

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from estimation.causes.acting import Moved, amplitudes_of
 from estimation.causes.candidates import Claim
-from estimation.causes.equations import Layout
+from estimation.causes.layout import Layout
 from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
 from estimation.causes.sources import Source

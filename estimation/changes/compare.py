@@ -16,10 +16,10 @@ from estimation.causes.candidates import (
     laid_out,
     pool_of,
 )
-from estimation.causes.equations import Layout, lay_out
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
+from estimation.causes.layout import Layout, lay_out
 from estimation.causes.levels import with_levels
 from estimation.causes.nuisances import skews, with_skews
 from estimation.causes.numbers import Numbers

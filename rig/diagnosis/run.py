@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation.arm.balances import declared_arm
 from estimation.arm.shared import laid_out
-from estimation.causes.equations import on_one_clock
+from estimation.causes.layout import on_one_clock
 from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.audit import steady

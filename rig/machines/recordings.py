@@ -99,7 +99,7 @@ def with_motion(campaign: Campaign, models: Sequence[Model]) -> Campaign:
 
 
 def _checked(recording: Recording, models: Sequence[Model]) -> Recording:
-    from estimation.causes.equations import LEAST, samples_in_motion  # a view needs none of it
+    from estimation.causes.run_signals import LEAST, samples_in_motion  # a view needs none of it
 
     if recording.excluded is not None:
         return recording

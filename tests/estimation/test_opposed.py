@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimation.campaign import Campaign
-from estimation.causes.equations import LayoutError
+from estimation.causes.run_signals import LayoutError
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.filters import LowPass

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from estimation.causes.equations import on_one_clock
 from estimation.causes.experiment import question
+from estimation.causes.layout import on_one_clock
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.split import split
 from estimation.recording import Recording

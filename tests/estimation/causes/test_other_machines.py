@@ -8,10 +8,10 @@ import pytest
 
 from estimation import plant_file
 from estimation.causes.candidates import candidates, every_claim
-from estimation.causes.equations import lay_out
 from estimation.causes.folds import folds_of, unvaried
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
+from estimation.causes.layout import lay_out
 from estimation.causes.search import competing
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.result import Finding

@@ -13,11 +13,11 @@ from scipy.ndimage import gaussian_filter1d
 from benchmarks.rigs import draw
 from estimation import model_file, plant_file
 from estimation.causes.candidates import Claim, groups_of
-from estimation.causes.equations import Layout, lay_out
 from estimation.causes.findings import family_probabilities
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
+from estimation.causes.layout import Layout, lay_out
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.offered import sources_at

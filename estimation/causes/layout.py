@@ -1,0 +1,173 @@
+"""The declared equations of a machine on its runs: fitted, and laid out to be regressed on."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from estimation.campaign import Campaign
+from estimation.causes.equations import Equation, equation_of
+from estimation.causes.run_signals import LEAST, LayoutError, RunSignals, signals_of_run
+from estimation.derived import CAMPAIGN_TIME, measured_channels
+from estimation.errors import EstimationError
+from estimation.filters import FilterError
+from estimation.fitting import fit
+from estimation.model import Model
+from estimation.opposed import FIX, opposed
+from estimation.recording import Recording, move_condition, shared_columns
+from estimation.travel import off_ratio
+
+MOST = 24_000
+"""Samples regressed on of all runs together, roughly: memory and time follow their number. A run
+counts as 40 samples that are independent of one another, so more of them show nothing new."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Equations and runs.
+
+    Attributes:
+        equations: Name to equation.
+        runs: The runs, in the order they were recorded.
+        measured: Channels that every run has.
+        shaken: The runs once more with each reading's noise added to it a second time, in the same
+            order, instruments included: how a column follows noise. Filled with the instruments.
+        independent: Pairs of an effort and an equation that has it from other sensors than its own.
+        undecided: Declared equation that is not laid out to the reason.
+        left_out: Run without enough samples of some equation to the reason.
+    """
+
+    equations: Mapping[str, Equation]
+    runs: Sequence[RunSignals]
+    measured: tuple[str, ...]
+    shaken: list[RunSignals] = field(default_factory=list)
+    independent: set[tuple[str, str]] = field(default_factory=set)
+    undecided: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def ranges(self) -> dict[object, tuple[float, float]]:
+        """Ranges of signals over the runs that were already worked out."""
+        return {}
+
+    def select(self, names: Sequence[str]) -> "Layout":
+        """Return the same equations on some of the runs."""
+        kept = set(names)
+        return replace(
+            self,
+            runs=[run for run in self.runs if run.name in kept],
+            shaken=[run for run in self.shaken if run.name in kept],
+        )
+
+
+def lay_out(
+    models: Sequence[Model], recordings: Sequence[Recording], train: Sequence[str]
+) -> Layout:
+    """Fit declared models, one an equation, on the training runs and lay out every run.
+
+    Raises:
+        LayoutError: No run has samples enough to regress on.
+        FitError: An equation cannot be identified.
+    """
+    timed = on_one_clock(recordings)
+    campaign = Campaign.of([r for r in timed if r.name in set(train)])
+    read = {c for m in models for c in measured_channels([*m.channels, m.target], m.signals)}
+    measured = tuple(
+        n
+        for n in shared_columns(timed)
+        if n != CAMPAIGN_TIME and (n in read or all(_is_whole(r, n) for r in timed))
+    )
+    equations: dict[str, Equation] = {}
+    undecided: dict[str, EstimationError] = {}
+    for model in models:
+        needed = set(measured_channels([*model.channels, model.target], model.signals))
+        try:
+            if lacking := needed - {*measured, "time_s", CAMPAIGN_TIME}:
+                raise LayoutError(
+                    f"Some run has no {', '.join(sorted(lacking))}.",
+                    f"The equation {model.balance} needs it. Every run has {', '.join(measured)}.",
+                    move_condition(lacking, timed)
+                    or "Record it, or declare an equation of channels that were recorded.",
+                )
+            if contradicted := off_ratio(model, list(campaign.evidence)):
+                raise LayoutError(
+                    contradicted,
+                    "A deflection from another ratio is mostly travel.",
+                    "Correct the ratio in the machine file, or the counts of one of the sensors.",
+                )
+            fitted = fit(model, campaign, bootstrap=0, every=None)
+            if contradicted := opposed(fitted, campaign):
+                raise LayoutError(
+                    contradicted,
+                    "A drive that seems to brake the motion has no equation with this friction.",
+                    FIX,
+                )
+            equations[model.balance] = equation_of(fitted)
+        except EstimationError as error:
+            undecided[model.balance] = error
+    if not equations:
+        raise next(iter(undecided.values()))
+    runs, lost = _laid_out(timed, equations, measured)
+    reasons = {name: str(error) for name, error in undecided.items()}
+    return Layout(equations, runs, measured, undecided=reasons, left_out=lost)
+
+
+def _is_whole(recording: Recording, channel: str) -> bool:
+    """Whether a channel has values, and each that is not finite has a flag."""
+    finite = np.isfinite(recording[channel])
+    return bool(finite.any() and finite[recording.valid].all())
+
+
+def laid_out_like(layout: Layout, recordings: Sequence[Recording]) -> Layout:
+    """Return other runs with the equations of a layout, for what a cause would do there.
+
+    A run without enough samples of some equation is left out.
+
+    Raises:
+        LayoutError: All of them are.
+    """
+    runs, lost = _laid_out(on_one_clock(recordings), layout.equations, layout.measured)
+    return Layout(layout.equations, runs, layout.measured, left_out=lost)
+
+
+def _laid_out(
+    recordings: Sequence[Recording], equations: Mapping[str, Equation], measured: Sequence[str]
+) -> tuple[list[RunSignals], dict[str, str]]:
+    """Return the runs, and those without enough samples of some equation with the reason."""
+    runs: list[RunSignals] = []
+    lost: dict[str, EstimationError] = {}
+    models = {name: equation.model for name, equation in equations.items()}
+    for recording in recordings:
+        try:
+            runs.append(signals_of_run(recording, models, measured))
+        except (LayoutError, FilterError) as error:
+            lost[recording.name] = error
+    if lost and not runs:
+        raise next(iter(lost.values()))
+    every = math.ceil(sum(len(run.grid) for run in runs) / MOST)
+    thinned = [_thinned(run, every) for run in runs]
+    return thinned, {name: error.what for name, error in lost.items()}
+
+
+def _thinned(run: RunSignals, every: int) -> RunSignals:
+    """Return a run with one of so many places of its grid; unchanged where it has few."""
+    used = {name: at[at % every == 0] // every for name, at in run.used.items()}
+    if every == 1 or min(map(len, used.values())) < LEAST:
+        return run
+    return replace(run, grid=run.grid[::every], used=used)
+
+
+def on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the runs with the campaign's time; where no start is known they follow one another."""
+    known = Campaign.of(recordings).timed()
+    timed = list(known.evidence)
+    if all(CAMPAIGN_TIME in r for r in timed):
+        return sorted(timed, key=lambda r: float(r[CAMPAIGN_TIME][0]))
+    out, start_s = [], 0.0
+    for recording in sorted(recordings, key=lambda r: r.name):
+        own_s = recording.time_s - recording.time_s[0]
+        out.append(recording.with_columns(**{CAMPAIGN_TIME: start_s + own_s}))
+        start_s += float(own_s[-1])
+    return out
