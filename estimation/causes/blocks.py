@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.causes.criterion import log_ratio
 from estimation.causes.folds import Folds
 from estimation.causes.joint import Joint, Next
 from estimation.causes.laid import Followed, Laid, Part, products
@@ -234,7 +235,7 @@ def _gain(
         products = Products(*(x.sum(axis=0)[None] for x in block.of[p])) if p in block.of else None
         (error,) = _residual(gram[None], products, base[None], amplitudes[None])
         before = float(usual @ gram @ usual)
-        total += joint.log_ratio(p, max(before, 0.0) / samples, error / samples)
+        total += log_ratio(joint, p, max(before, 0.0) / samples, error / samples)
     return total
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimation.causes.criterion import base_errors
 from estimation.causes.findings import IN_SET, Kept
 from estimation.causes.functions import Function, names
 from estimation.causes.instruments import add_instruments
@@ -67,7 +68,7 @@ def question(answer: Answer, place: int) -> Question | None:
         return None
     leading = likely[0][1].candidate
     best = joint.with_cause(leading.laid, leading.precision)
-    (errors,) = best.base_errors([[[k] for k in range(len(joint.runs))]])
+    (errors,) = base_errors(best, [[[k] for k in range(len(joint.runs))]])
     noise = {
         name: float(errors[name, "within"].sum() / joint.samples[name, "within"].sum())
         for name in joint.layout.equations

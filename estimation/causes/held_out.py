@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.causes.candidates import Candidate, Claim, laid_out
+from estimation.causes.criterion import base_errors, log_ratio
 from estimation.causes.joint import Joint
 from estimation.causes.laid import TINY, Part
 from estimation.causes.layout import Layout
@@ -175,7 +176,7 @@ class HeldOut:
         total = np.zeros(len(self.at))
         for p, samples in self.joint.samples.items():
             mean = [e[p] / samples[self.at] for e in (before, after)]
-            total += self.joint.log_ratio(p, mean[0], mean[1])
+            total += log_ratio(self.joint, p, mean[0], mean[1])
         return total
 
     def _next_to(self, causes: Sequence[Candidate]) -> tuple[Joint, Mapping[Part, FloatArray]]:
@@ -189,7 +190,7 @@ class HeldOut:
 
     def _squared(self, joint: Joint) -> Mapping[Part, FloatArray]:
         """Return the squared error of each test run, fitted on the training runs alone."""
-        (errors,) = joint.base_errors([[self.at]])
+        (errors,) = base_errors(joint, [[self.at]])
         return {p: values[self.at] for p, values in errors.items()}
 
     def _with(self, joint: Joint, candidate: Candidate, in_test: bool = True) -> Joint:

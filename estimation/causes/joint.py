@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.causes.equations import SHAPE_STEP
-from estimation.causes.folds import Folds
 from estimation.causes.instruments import declared_of
 from estimation.causes.laid import TINY, Followed, Laid, Part, Projection, centred, inverse
 from estimation.causes.layout import Layout
@@ -418,65 +417,6 @@ class Joint:
                 most = max(linear, key=lambda at: float(power[at]))
                 out[name] = most, linear[most]
         return out
-
-    # ---- errors
-
-    def base_errors(self, folds: Folds) -> Sequence[Mapping[Part, FloatArray]]:
-        """Return the squared errors of the base on what was left out, one mapping a family."""
-        out: list[Mapping[Part, FloatArray]] = []
-        for family in folds:
-            fits = self.left_out(family)
-            base = fits.base[fits.fold]
-            vector = np.column_stack([base, np.full(len(base), -1.0)])
-            found = {p: np.zeros(len(self.runs)) for p in self.parts}
-            for p in self.parts:
-                own = np.einsum("ri,rij,rj->r", vector, self.gram[p][fits.runs], vector)
-                avoided = self.avoided(p, fits.runs, base[:, None])[:, 0]
-                found[p][fits.runs] = np.maximum(own, 0.0) + avoided
-            out.append(found)
-        return out
-
-    def extrapolated(self, family: Family) -> Mapping[Part, float]:
-        """Return the squared error that the base's own uncertainty makes in what was left out."""
-        fits = self.left_out(family)
-        return {
-            p: float(np.sum(self.gram[p][fits.runs, :-1, :-1] * fits.inverse[fits.fold]))
-            for p in self.parts
-        }
-
-    def score(
-        self,
-        spreads: Sequence[Mapping[Part, float]],
-        before: Sequence[Mapping[Part, FloatArray]],
-        after: Sequence[Mapping[Part, FloatArray]],
-    ) -> FloatArray:
-        """Return the scores of candidates, shape (candidates,).
-
-        The score of a part is the mean over families, from the errors of each before and after. A
-        family counts by how well the base itself is known where it predicts, which is its spread,
-        and at most what the family of single runs shows: where the base extrapolates badly anything
-        seems to help.
-        """
-        total = np.zeros(())
-        for p in self.parts:
-            ratios, trusts = [], []
-            for spread, old, new in zip(spreads, before, after, strict=True):
-                pair = [(e[p].sum(axis=0) + spread[p]) / self.samples[p].sum() for e in (old, new)]
-                ratios.append(self.log_ratio(p, pair[0], pair[1]))
-                whole = float(old[p].sum()) + TINY
-                trusts.append(whole / (whole + spread[p]))
-            least = [t * np.minimum(r, ratios[0]) for t, r in zip(trusts, ratios, strict=True)]
-            total = total + np.sum(least, axis=0) / sum(trusts)
-        return np.asarray(total)
-
-    def log_ratio(self, part: Part, before: FloatArray | float, after: FloatArray) -> FloatArray:
-        """Return the weighted log ratio of mean squared errors of a part, above its floor."""
-        numbers, weight = self.numbers, 1.0
-        floor = numbers.form_floor * self.error[part]
-        if part[1] == "between":
-            weight = numbers.between
-            floor += numbers.between * self.error[part[0], "within"]
-        return np.asarray(weight * np.log((before + floor) / (after + floor)))
 
 
 def _at_most(noise: FloatArray, gram: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.causes.blocks import Block, Outcome, Products, block_of, evaluate, rising
 from estimation.causes.candidates import Candidate, Group
+from estimation.causes.criterion import base_errors, extrapolated, score
 from estimation.causes.folds import Folds
 from estimation.causes.functions import Function
 from estimation.causes.joint import Joint
@@ -124,8 +125,8 @@ class _Usual(NamedTuple):
 
     @classmethod
     def of(cls, joint: Joint, folds: Folds) -> "_Usual":
-        spreads = [joint.extrapolated(family) for family in folds]
-        return cls(joint.left_out([[]]).base[0], joint.base_errors(folds), spreads, folds)
+        spreads = [extrapolated(joint, family) for family in folds]
+        return cls(joint.left_out([[]]).base[0], base_errors(joint, folds), spreads, folds)
 
 
 class _Judged(NamedTuple):
@@ -170,7 +171,7 @@ def _judged(joint: Joint, group: Group, block: Block, usual: _Usual) -> _Judged:
     replaces = _in_readings(joint, group.candidates, outcome)
     gains = np.zeros(len(group.candidates))
     if outcome.errors:
-        gains[outcome.promising] = joint.score(usual.spreads, usual.errors, outcome.errors)
+        gains[outcome.promising] = score(joint, usual.spreads, usual.errors, outcome.errors)
     return _Judged(gains, outcome.amplitudes, replaces, outcome.declared, outcome.by_run)
 
 

@@ -16,6 +16,7 @@ from estimation.causes.candidates import (
     laid_out,
     pool_of,
 )
+from estimation.causes.criterion import base_errors, extrapolated, score
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
@@ -195,8 +196,8 @@ def _form_of_others(plain: Joint, joint: Joint, folds: Folds) -> float:
     Their forms deviate from the catalogue's by a share: the square of it, of the error that they
     remove, does not count as another change.
     """
-    spreads = [plain.extrapolated(family) for family in folds]
-    removed = plain.score(spreads, plain.base_errors(folds), joint.base_errors(folds))
+    spreads = [extrapolated(plain, family) for family in folds]
+    removed = score(plain, spreads, base_errors(plain, folds), base_errors(joint, folds))
     left = joint.numbers.bend_share**2 * float(np.expm1(max(0.0, float(removed))))
     return float(-np.log1p(-left)) if left < 1.0 else float("inf")
 
