@@ -97,14 +97,17 @@ class Ranking:
     ) -> None:
         self.joint, self.folds, self.pool = joint, folds, pool
         self._rank = rank or competing
-        self._known: dict[frozenset[int], list[Scored]] = {}
+        self._known: list[tuple[object, list[Scored]]] = []
 
     def next_to(self, causes: Sequence[Scored]) -> list[Scored]:
         """Return the best of each name next to causes."""
-        key = frozenset(id(c.candidate) for c in causes)
-        if key not in self._known:
-            self._known[key] = self._rank(self._with(causes), self.pool, self.folds)
-        return self._known[key]
+        claims = [(one.candidate.cause, one.candidate.acts) for one in causes]
+        for known, ranked in self._known:
+            if known == claims:
+                return ranked
+        ranked = self._rank(self._with(causes), self.pool, self.folds)
+        self._known.append((claims, ranked))
+        return ranked
 
     def _with(self, causes: Sequence[Scored]) -> Joint:
         joint = self.joint
@@ -145,7 +148,8 @@ def _settled(
 ) -> tuple[list[Scored], list[Sequence[Scored]]]:
     """Return causes, each the best next to the others, and what competes in the place of each.
 
-    A cause that is not worth its price next to the others goes, the least first.
+    A cause that is not worth its price next to the others goes, the least first. A cause whose
+    shape alone changes is settled: the others are next to much the same.
     """
     settled, conditional = list(causes), list[Sequence[Scored]]([[] for _ in causes])
     for _ in range(MOST_CAUSES):
@@ -154,12 +158,17 @@ def _settled(
             # next to the others every candidate may be dropped: the cause then stands as it was
             conditional[k] = ranking.next_to([c for c in settled if c is not settled[k]]) or [cause]
             settled[k] = conditional[k][0]
-        if all(one is other for one, other in zip(before, settled, strict=True)):
+        if all(_is_as(one, other) for one, other in zip(before, settled, strict=True)):
             break
     least = min(settled, key=lambda c: c.score)
     if least.score < 0.0 and len(settled) > 1:
         return _settled(ranking, [c for c in settled if c is not least])
     return settled, conditional
+
+
+def _is_as(one: Scored, other: Scored) -> bool:
+    """Whether a cause is the same as another but for its shape."""
+    return (one.candidate.name, one.candidate.acts) == (other.candidate.name, other.candidate.acts)
 
 
 def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
