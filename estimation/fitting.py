@@ -15,7 +15,7 @@ from estimation.campaign import Campaign
 from estimation.fit_problem import FitRun, Problem, prepared, problem_of, solve
 from estimation.model import Estimate, Evidence, Model, estimate, with_values
 from estimation.recording import FloatArray
-from estimation.shape_search import scaled, search_shape, unscaled
+from estimation.shape_search import range_of, scaled, search_shape, unscaled
 from estimation.within_bounds import determined, solve_within
 
 SLOPE_STEP = 1e-3  # On the scale that a shape is searched on
@@ -108,10 +108,9 @@ def _bootstrap(
     shapes = problem.shape_parameters
     start = np.concatenate([free, [scaled(p, x) for p, x in zip(shapes, shape, strict=True)]])
     values = np.full((count, len(start) + 1), np.nan)
-    # a shape that was given may be beyond those that are searched
-    low = np.concatenate([problem.lower, [scaled(p, p.lower) for p in shapes]]) - start
-    high = np.concatenate([problem.upper, [scaled(p, p.upper) for p in shapes]]) - start
-    low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+    ranges = np.reshape([range_of(p, x) for p, x in zip(shapes, shape, strict=True)], (-1, 2))
+    low = np.concatenate([problem.lower, ranges[:, 0]]) - start
+    high = np.concatenate([problem.upper, ranges[:, 1]]) - start
 
     def step_of(total: FloatArray) -> FloatArray:
         step, inner = np.zeros(len(start)), total[np.ix_(moving, moving)]

@@ -11,6 +11,9 @@ from estimation.recording import FloatArray
 
 MOST_DESCENTS = 20
 
+BEYOND, NEAR = 2.0, 0.01
+"""A value beyond those that are searched: by how much it may change, and in one descent."""
+
 
 def scaled(parameter: Parameter, value: float) -> float:
     """Return a shape parameter's value on the scale it is searched on."""
@@ -20,6 +23,30 @@ def scaled(parameter: Parameter, value: float) -> float:
 def unscaled(parameter: Parameter, value: float) -> float:
     """Return a shape parameter's value from the scale it is searched on."""
     return float(value) if parameter.linear else float(np.exp(value))
+
+
+def range_of(parameter: Parameter, known: float | None) -> tuple[float, float]:
+    """Return the least and the largest value, on the scale that a shape parameter is searched on.
+
+    A known value may be beyond those that are searched, as the period of a screw in metres is: the
+    range then reaches a factor further than it.
+    """
+    low, high = scaled(parameter, parameter.lower), scaled(parameter, parameter.upper)
+    if known is None or _is_searched(parameter, known):
+        return low, high
+    ends = [scaled(parameter, known * factor) for factor in (1.0 / BEYOND, BEYOND)]
+    return min(low, *ends), max(high, *ends)
+
+
+def _is_searched(parameter: Parameter, value: float) -> bool:
+    return parameter.lower <= value <= parameter.upper
+
+
+def _tried(parameter: Parameter, known: float | None) -> list[float]:
+    """Return the values that a search tries first, of which two are a descent apart."""
+    if known is None or _is_searched(parameter, known):
+        return [float(x) for x in parameter.grid()]
+    return [known, (1.0 + NEAR) * known]
 
 
 def _error_share(problem: Problem, shape: Sequence[float]) -> float:
@@ -32,16 +59,18 @@ def _error_share(problem: Problem, shape: Sequence[float]) -> float:
 def search_shape(problem: Problem, everywhere: bool = True) -> list[float]:
     """Return the shape parameters: a grid along each, twice round, then a bounded descent.
 
-    Unless everywhere, the descent alone, from the known values.
+    Unless everywhere, the descent alone, from the known values. Of a known value beyond the grid
+    the descent alone, too.
     """
     parameters = problem.shape_parameters
     if not parameters:
         return []
-    bounds = [(scaled(p, p.lower), scaled(p, p.upper)) for p in parameters]
-    known = [term.values.get(p.name) for term in problem.model.terms for p in term.effect.shape]
+    estimates = [term.values.get(p.name) for term in problem.model.terms for p in term.effect.shape]
+    known = [None if one is None else one.value for one in estimates]
+    bounds = [range_of(p, value) for p, value in zip(parameters, known, strict=True)]
     point = [
-        float(np.clip(scaled(p, start.value), *bound)) if start else float(np.mean(bound))
-        for start, bound, p in zip(known, bounds, parameters, strict=True)
+        float(np.mean(bound)) if value is None else scaled(p, value)
+        for value, bound, p in zip(known, bounds, parameters, strict=True)
     ]
 
     def values(candidate: Sequence[float] | FloatArray) -> list[float]:
@@ -53,13 +82,15 @@ def search_shape(problem: Problem, everywhere: bool = True) -> list[float]:
         except FitError:  # a shape with collinear columns, such as a width far too wide
             return 1.0
 
-    grids = [[scaled(p, float(x)) for x in p.grid()] for p in parameters]
+    grids = [
+        [scaled(p, x) for x in _tried(p, value)] for p, value in zip(parameters, known, strict=True)
+    ]
     rounds = (2 if len(parameters) > 1 else 1) if everywhere else 0
     for _ in range(rounds):
         for k, grid in enumerate(grids):
             tried = [[*point[:k], x, *point[k + 1 :]] for x in grid]
             point = min([point, *tried], key=error)
-    reach = [grid[1] - grid[0] for grid in grids]
+    reach = [abs(grid[1] - grid[0]) for grid in grids]
     return values(descended(error, point, reach, bounds))
 
 

@@ -133,6 +133,16 @@ def _orders(layout: Layout, effect: Effect, angle: str) -> list[float]:
     return [float(k) for k in range(first, last + 1, max(1, round(resolved / 3)))]
 
 
+def order_step(layout: Layout, position: str) -> float:
+    """Return the least step between orders: a whole one of a shaft, else what the travel resolves.
+
+    Where nothing turns, a twelfth of an order that the travel resolves: a wave of the next order is
+    at most by an eighth of a period apart at the ends of the travel.
+    """
+    turns = position.endswith("_angle_rad")
+    return 1.0 if turns else math.pi / (6.0 * travel_of(layout, position))
+
+
 def last_order(layout: Layout, effect: Effect, angle: str) -> int:
     """Return the largest order that a search tries: more where the travel resolves few."""
     resolved = 2 * math.pi / travel_of(layout, angle)

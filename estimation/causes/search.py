@@ -18,7 +18,7 @@ from estimation.causes.candidates import (
 )
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
-from estimation.causes.grids import RELATIVE, least_order
+from estimation.causes.grids import RELATIVE, least_order, order_step
 from estimation.causes.joint import Joint
 from estimation.causes.layout import Layout
 from estimation.causes.nuisances import noticed, skews, with_skews
@@ -280,9 +280,10 @@ def _nearby(layout: Layout, cause: Source, k: int, parameter: Parameter) -> list
     if cause.tried:
         return []  # the largest between the points of its grid already
     if parameter.name == "order":
-        near = [cause.shape[k] + step for step in (-2.0, -1.0, 1.0, 2.0)]  # whole: of its shaft
-        least = least_order(layout, dict(cause.channels)[cause.turning])
-        return [order for order in near if order >= least]
+        position = dict(cause.channels)[cause.turning]
+        step = order_step(layout, position)
+        near = [cause.shape[k] + part * step for part in (-2.0, -1.0, 1.0, 2.0)]
+        return [order for order in near if order >= least_order(layout, position)]
     values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
     if parameter.name in ("width", "settled") or values is None or len(values) < 2:
         return []

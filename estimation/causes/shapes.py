@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.causes.sources import LATE
+from estimation.causes.sources import LATE, TURNING
 from estimation.effects import Parameter
 from estimation.model import Estimate, Term
 from estimation.recording import FloatArray
@@ -33,9 +33,9 @@ Moving = Sequence[Parameter]
 def moving(term: Term, is_declared: bool) -> Moving:
     """Return the shapes of a term that move.
 
-    The number of waves in a turn does not, it is a whole one; nor does what a reading is late by,
-    of which slow motion shows the product with its amplitude alone. Where friction changes its sign
-    is part of what is declared: with another width a cause has the form of another one.
+    A whole number of waves in a turn does not; nor does what a reading is late by, of which slow
+    motion shows the product with its amplitude alone. Where friction changes its sign is part of
+    what is declared: with another width a cause has the form of another one.
     """
     if term.effect.id in LATE:
         return []
@@ -43,8 +43,20 @@ def moving(term: Term, is_declared: bool) -> Moving:
         p
         for p in term.effect.shape
         if (is_declared or p.name != "width")
-        and (p.unit in term.channels if p.linear else term.values[p.name].value > 0.0)
+        and (_channel(term, p) if p.linear else term.values[p.name].value > 0.0)
     ]
+
+
+def _channel(term: Term, shape: Parameter) -> str:
+    """Return the channel whose range a shape that may be zero is moved by; empty where none is.
+
+    Of a number of waves it is the angle or the position, unless the number is a whole one.
+    """
+    if shape.name != "order":
+        return term.channels.get(shape.unit, "")
+    turning = next(channel for role, channel in term.channels.items() if role in TURNING)
+    is_whole = turning.endswith("_angle_rad") and term.values[shape.name].value.is_integer()
+    return "" if is_whole else turning
 
 
 def slopes(
@@ -87,7 +99,8 @@ def moved(
 def _with(term: Term, shape: Parameter, step: float, sizes: Sizes) -> Term:
     known = term.values[shape.name].value
     if shape.linear:
-        value = known + step * sizes[term.channels[shape.unit]]
+        size = sizes[_channel(term, shape)]
+        value = known + step * (1.0 / size if shape.name == "order" else size)
     else:  # one that was found beyond the values that are searched comes no further
         ends = min(shape.lower, known), max(shape.upper, known)
         value = float(np.clip(unscaled(shape, scaled(shape, known) + step), *ends))

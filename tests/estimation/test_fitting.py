@@ -179,6 +179,36 @@ def test_the_change_of_sign_of_friction_is_narrow_next_to_the_speeds_of_the_axis
     assert values["width"] < 0.06 * speed_m_s
 
 
+PERIOD_M = 0.005
+
+
+@pytest.mark.parametrize("start_m", [0.00508, 0.00492])
+def test_a_period_that_is_shorter_than_those_searched_is_fitted_from_its_value(start_m: float):
+    random = np.random.default_rng(3)
+    time_s = np.arange(4000) / 200
+    recordings = []
+    for k in range(6):
+        position_m = 0.012 * np.sin(2 * np.pi * (0.1 + 0.05 * k) * time_s)
+        speed_m_s = np.gradient(position_m, time_s)
+        force_n = 20 * np.tanh(speed_m_s / 0.001) + 6 * np.sin(2 * np.pi * position_m / PERIOD_M)
+        columns = {
+            "carriage_position_m": position_m,
+            "drive_force_n": force_n + random.normal(0.0, 2.0, len(time_s)),
+        }
+        recordings.append(Recording(f"{k}", time_s, columns))
+    (model,) = declared(SLIDE)
+    wave = Term(
+        effect("ripple.motor"),
+        channels={"motor_angle": "carriage_position_m"},
+        values={"order": Estimate(2 * np.pi / start_m)},
+    )
+    model = replace(model, terms=(*model.terms, wave))
+    found = fit(model, Campaign.of(recordings)).terms[-1].values["order"]
+    low, high = found.ci95
+    assert found.value == pytest.approx(2 * np.pi / PERIOD_M, rel=2e-3)
+    assert low < 2 * np.pi / PERIOD_M < high < 1.01 * low
+
+
 def test_friction_has_the_form_of_its_change_of_sign_where_no_viscous_friction_is_declared():
     time_s = np.arange(4000) / 500
     position = np.cumsum(1.5 + np.sin(0.7 * 2 * np.pi * time_s)) / 500

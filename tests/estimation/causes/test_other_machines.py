@@ -52,6 +52,17 @@ sensor = [
 ]
 """
 
+PRESS = """
+schema = "rig.machine/1"
+machine = { name = "press", cutoff_hz = 20.0 }
+axis = [{ name = "ram", unit = "m" }]
+actuator = [{ name = "motor_current_a", axis = "ram" }]
+sensor = [
+  { name = "ram_position_m", axis = "ram", reads = "position" },
+  { name = "load_force_n", axis = "ram", reads = "effort" },
+]
+"""
+
 BELT = """
 schema = "rig.machine/1"
 machine = { name = "belt", cutoff_hz = 20.0 }
@@ -159,6 +170,29 @@ def test_play_of_a_carriage_follows_the_pull_of_its_own_mass():
     (finding,) = found_in(BELT, recorded(columns))
     assert finding.family == "transmission.backlash"
     assert finding.parameters["gap"].value == pytest.approx(4e-5, rel=0.2)
+
+
+def test_the_wave_of_a_screw_has_its_period_with_an_interval():
+    lead = 0.005
+
+    def columns(k, random, position, speed, acceleration):
+        travel_m, speed_m_s = 0.01 * position, 0.01 * speed
+        load = 100.0 * np.sin(0.6 * position + k)
+        wave = 9.0 * np.sin(2 * np.pi * travel_m / lead + 0.7)
+        pull = load + 30.0 * np.tanh(speed_m_s / 0.001) + 1.8 * acceleration + wave
+        current = pull / 400.0 + random.normal(0.0, 2e-3, len(position))
+        return {
+            "motor_current_a": current,
+            "ram_position_m": travel_m + random.normal(0.0, 1e-6, len(position)),
+            "load_force_n": load + random.normal(0.0, 1.5, len(position)),
+        }
+
+    (finding,) = found_in(PRESS, recorded(columns))
+    assert finding.family == "ripple.motor"
+    order = finding.parameters["order"]
+    low, high = order.ci95
+    assert order.value == pytest.approx(2 * np.pi / lead, rel=3e-3)
+    assert low < 2 * np.pi / lead < high < 1.02 * low
 
 
 def test_a_torque_cell_of_another_gain_in_some_runs_is_named_by_that_gain():
