@@ -32,7 +32,7 @@ def grip(
     """
     from rig.bench.logger import open_logger
     from rig.bench.session import Session
-    from rig.live.estimator import estimators_of, require_channels
+    from rig.live.estimator import channels_of, estimators_of, require_channels
     from rig.live.grip import SHARE, hold_grip
     from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
@@ -43,7 +43,7 @@ def grip(
     if path is None:
         raise UsageError("No model estimates the torque.", fix="Name one with --model FILE.")
     estimator = estimators_of(path, SAMPLE_RATE_HZ)[0]
-    require_channels([estimator], settings, path)
+    require_channels(channels_of([estimator]), settings, path)
     screen = results(json)
     held = []
     with Session(settings, open_logger(settings)) as session:

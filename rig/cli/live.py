@@ -73,6 +73,7 @@ def live(
     from rig.configuration.check import refuse_problems
     from rig.live.block import Sink, through
     from rig.live.estimator import (
+        channels_of,
         estimators_of,
         half_widths,
         require_channels,
@@ -102,7 +103,7 @@ def live(
     model_path = model or settings.model_path
     estimators = estimators_of(model_path, machine.profile.rate_hz) if model_path else []
     if model_path:
-        require_channels(estimators, settings, model_path)
+        require_channels(channels_of(estimators), settings, model_path)
         for line in without_interval((e.model for e in estimators), model_path):
             remarks().print(line)
     wanted = ShowOptions(

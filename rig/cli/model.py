@@ -70,7 +70,12 @@ def use(
     for recordings of this rig. --model of a command goes before it.
     """
     from rig.configuration.chosen import choose_rig
-    from rig.live.estimator import estimators_of, require_channels, require_measured
+    from rig.live.estimator import (
+        channels_of,
+        estimators_of,
+        require_channels,
+        require_measured,
+    )
 
     settings = choose_rig(config, sim)
     file = Path(model)
@@ -83,7 +88,7 @@ def use(
             "Write one with `rig fit LOGS --out FILE` or `rig diagnose LOGS --model-out FILE`.",
         )
     estimators = estimators_of(source, 1000.0)  # refuses what is not a fitted model
-    require_channels(estimators, settings, source)
+    require_channels(channels_of(estimators), settings, source)
     if not from_simulation:
         require_measured(estimators, settings, source)
     _choose(settings, source, [one.target_channel for one in estimators], json)

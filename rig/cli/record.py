@@ -49,6 +49,8 @@ def record(
     """
     from calibration.rules import refuse_errors
     from rig.configuration.check import refuse_problems
+    from rig.live.estimator import require_channels
+    from rig.log.devices import channel_of
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
     from rig.recording.campaign import open_campaign_folder, read_manifest
@@ -77,6 +79,10 @@ def record(
     for verdict in refuse_errors(settings.calibration_verdicts()):
         screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})")
     watch = watch_runs(model) if model else None
+    if watch is not None and model is not None:
+        of_devices = tuple(channel_of(name, "") for name in settings.devices)
+        of_logger = {name for name in watch.channels if not name.startswith(of_devices)}
+        require_channels(of_logger, settings, model)
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {counted(len(todo), 'run')} on {settings.name} into {folder}")
     recorded = _recorded(settings, todo, folder, notes, watch)

@@ -172,7 +172,12 @@ def shown_channels(estimators: Sequence[LiveEstimator], usual: tuple[str, ...]) 
     return JOINTS if set(targets) & set(AXES) else targets or usual
 
 
-def require_channels(estimators: Sequence[LiveEstimator], config: Config, path: Path) -> None:
+def channels_of(estimators: Iterable[LiveEstimator]) -> set[str]:
+    """Return the measured channels that estimators read."""
+    return {name for one in estimators for name in one.stream.channels}
+
+
+def require_channels(needed: Iterable[str], config: Config, path: Path) -> None:
     """Refuse a model that reads channels which the configured rig does not have.
 
     Of a rig without a logger board the channels are known only once its device is connected.
@@ -183,7 +188,7 @@ def require_channels(estimators: Sequence[LiveEstimator], config: Config, path: 
     if config.logger.driver != "teensy":
         return
     there = config.calibration_set().channels
-    absent = sorted({name for one in estimators for name in one.stream.channels} - set(there))
+    absent = sorted(set(needed) - set(there))
     if not absent:
         return
     fix = "Choose a model of this rig."

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from estimation import model_file
+from estimation.derived import CLOCKS, measured_channels
 from estimation.model import NotFittedError
 from estimation.watch import ResidualWatch, Sight
 from rig.importers.registry import open_campaign
@@ -20,6 +21,16 @@ class RunWatch:
     """
 
     watches: list[tuple[ResidualWatch, list[Sight]]]
+
+    @property
+    def channels(self) -> set[str]:
+        """The measured channels that the models and their targets are computed from."""
+        found = set[str]()
+        for watch, _ in self.watches:
+            model = watch.model
+            names = {*model.channels, model.target} - {*CLOCKS}
+            found |= {*measured_channels(names, model.signals)}
+        return found
 
     def after(self, path: Path) -> str:
         """Read a finished run's log; return what is new to a person, empty when nothing is.

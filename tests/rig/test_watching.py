@@ -64,6 +64,14 @@ def test_record_reports_the_result_of_the_monitor(model, tmp_path, answered):
     assert len(watched["runs"]) == 2
 
 
+def test_a_model_of_another_machine_is_refused_before_anything_moves(model, tmp_path, said):
+    foreign = tmp_path / "foreign.model.toml"
+    foreign.write_text(model.read_text().replace("motor_current_a", "crosshead_current_a"))
+    words = ("record --sim --protocol quick --model", foreign, "-o", tmp_path / "logs")
+    assert "crosshead_current_a, which simulated rig does not measure" in said(*words, code=2).err
+    assert not (tmp_path / "logs").exists()
+
+
 def test_a_file_of_several_balances_is_watched_whole_and_its_first_runs_live(model, tmp_path):
     logs = open_campaign(model.parent / "logs")
     gearbox = fit(model_file.read(Path("gearbox")), logs, bootstrap=0)
