@@ -2,11 +2,13 @@
 
 import os
 import shlex
+import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from io import TextIOWrapper
+from types import FrameType
 from typing import Annotated, Any
 
 import typer
@@ -124,6 +126,9 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stderr.write("Interrupted.\n")
         return 130
     except Exception as error:
+        if _is_of_interrupt(error):
+            sys.stderr.write("Interrupted.\n")
+            return 130
         return _report(error, words)
     if result == 130:  # what typer makes of Ctrl-C
         sys.stderr.write("Interrupted.\n")
@@ -188,8 +193,28 @@ def _report(error: Exception, words: list[str]) -> int:
     return code
 
 
+_interrupted = False
+"""Whether Ctrl-C was pressed outside a session with a rig, which hears it in its own way."""
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    global _interrupted
+    _interrupted = True
+    raise KeyboardInterrupt
+
+
+def _is_of_interrupt(error: Exception) -> bool:
+    """Whether an error is what a compiled library made of a Ctrl-C while it was loaded."""
+    from rig.errors import KNOWN_ERRORS, MissingExtraError
+
+    is_known = isinstance(error, KNOWN_ERRORS) and not isinstance(error, MissingExtraError)
+    return _interrupted and not is_known
+
+
 def run() -> None:
     """Run the command line and exit with its exit code."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
     if isinstance(sys.stdout, TextIOWrapper):  # as stderr does: a missing letter is not an error
         sys.stdout.reconfigure(errors="backslashreplace")
     sys.exit(main())
