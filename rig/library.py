@@ -189,23 +189,33 @@ def held_out(campaign: Campaign, model: Model, folds: int = 5, seed: int = 0) ->
     return held_out_error(model, campaign, min(folds, len(campaign.evidence)), seed)
 
 
-def diagnose(campaign: Campaign, models: Sequence[Model], seed: int = 0) -> Diagnosis:
+def diagnose(
+    campaign: Campaign, models: Sequence[Model], seed: int = 0, ledger: Path | None = None
+) -> Diagnosis:
     """Identify what declared models lack, and test it on runs that took no part in the search.
 
+    The runs are entered in the access log as by `rig diagnose`, and the result is `exploratory`
+    where a test run was used before. No next experiment is proposed.
+
     Args:
-        campaign: Eight runs or more.
+        campaign: Seven runs or more to name an effect; fewer are cut into parts.
         models: Declared models, one an equation.
         seed: Seed of the choice of test runs.
+        ledger: The access log; the one of `rig diagnose` if none.
 
     Raises:
         SplitError: Too few runs, or runs of several machines.
         LayoutError: No equation can be written with these channels.
+        LedgerError: The access log cannot be read or written.
     """
-    from estimation.causes.verdict import diagnose as identify
-    from estimation.diagnosis.split import split
+    from rig.diagnosis.ledger import Ledger, default_ledger
+    from rig.diagnosis.run import run_diagnosis
+    from rig.diagnosis.subject import Subject
 
-    recordings = list(campaign.evidence)
-    return identify(recordings, models, split(recordings, seed))
+    looks = Ledger(ledger or default_ledger())
+    done, look = run_diagnosis(Subject(campaign, models), looks, seed=seed, quick=True)
+    looks.enter(look)
+    return done.diagnosis
 
 
 def compare(

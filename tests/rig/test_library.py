@@ -96,6 +96,18 @@ def test_a_table_is_read_by_a_mapping_and_written_as_logs(tmp_path, campaign):
     np.testing.assert_allclose(first["axis_position_m"], run["axis_position_m"][:400])
 
 
+@pytest.mark.integration
+def test_a_diagnosis_enters_the_access_log_as_the_command_does(model, tmp_path, monkeypatch):
+    monkeypatch.setenv("RIG_STATE_DIR", str(tmp_path / "state"))
+    runs = Campaign.of(axis_run(f"{k}", 0.7 * k) for k in range(8))
+    first, second = (rig.diagnose(runs, [model]) for _ in range(2))
+    assert (first.exploratory, second.exploratory) == (False, True)
+    assert "Exploratory: " in " ".join(second.notes)
+    assert len((tmp_path / "state" / "looks.jsonl").read_text().splitlines()) == 2
+    apart = rig.diagnose(runs, [model], ledger=tmp_path / "own.jsonl")
+    assert not apart.exploratory
+
+
 def test_two_campaigns_are_compared(campaign, model):
     assert rig.compare(campaign, campaign, [model]).changes == ()
 
