@@ -5,6 +5,7 @@ Which equations of motion can be written follows from it, see `estimation.plant_
 are SI, and their names end in the unit.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -196,6 +197,7 @@ class Plant:
     run_offsets: bool = True
 
     def __post_init__(self) -> None:
+        _check_filter(self)
         _check_names(self)
         _check_axes(self)
         for number, sensor in enumerate(self.sensors, start=1):
@@ -245,6 +247,23 @@ class Plant:
         return speed.name.removesuffix(SPEED[unit]) + ending[unit] if speed else ""
 
 
+def _check_filter(plant: Plant) -> None:
+    """Refuse a filter that suits no sample rate; that of recordings is compared when they are."""
+    if not 0 < plant.cutoff_hz < math.inf:
+        raise PlantError(
+            ("machine", 1, "cutoff_hz"),
+            f"cutoff_hz = {plant.cutoff_hz:g} is not a cutoff.",
+            "It must lie between 0 and half the sample rate, Hz.",
+            "Omit it for 50 Hz.",
+        )
+    if plant.order < 1:
+        raise PlantError(
+            ("machine", 1, "order"),
+            f"order = {plant.order} is not the order of a filter.",
+            fix="Write 1 or more; omit it for 3.",
+        )
+
+
 def _check_names(plant: Plant) -> None:
     for table, names in (
         ("axis", [axis.name for axis in plant.axes]),
@@ -285,8 +304,9 @@ def _check_axes(plant: Plant) -> None:
             )
     for place, axis_name in _named_axes(plant):
         if axis_name not in names:
-            why = nearest(axis_name, names) if names else "The file has no [[axis]]."
-            raise PlantError(place, f"There is no axis {axis_name!r}.", why)
+            why = "" if names else "The file has no [[axis]]."
+            fix = nearest(axis_name, names) if names else "Add one."
+            raise PlantError(place, f"There is no axis {axis_name!r}.", why, fix)
 
 
 def _named_axes(plant: Plant) -> Iterable[tuple[Place, str]]:

@@ -72,6 +72,8 @@ def diagnose(
     outputs = {json_out: DIAGNOSIS, page_file: HTML, model_out: MODEL, protocol_out: PROTOCOL}
     for output, kind in outputs.items():
         check_output(output, kind)
+    for made in (model_out, protocol_out):
+        options.require_new(made)
     looks = Ledger(ledger or default_ledger())
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_, machine, skip_bad)

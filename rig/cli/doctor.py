@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from typer import Option
 
-from rig.cli.options import ConfigOption, SimFlag, chosen_rig, group, require_yes
+from rig.cli.options import ConfigOption, SimFlag, chosen_rig, group, require_new, require_yes
 from rig.output.console import JsonFlag, emit_json, present, results
 
 firmware_app = group("firmware", "Show firmware versions, build the firmware, flash it.")
@@ -38,6 +38,7 @@ def doctor(
     from rig.doctor.examine import examine
     from rig.doctor.finding import Level, worst
 
+    require_new(bundle)
     screen = results(json)
     found = []
     settings = chosen_rig(config, sim)

@@ -16,6 +16,9 @@ from rig.output.table import TextTable
 if TYPE_CHECKING:
     from rig.models.adapt import Adaptation
 
+LEAST_HZ = 1.0
+"""Least rate of calls of an exported estimator."""
+
 estimator_app = options.group("estimator", "Compare estimators.")
 
 
@@ -151,6 +154,8 @@ def export(
     from estimation.estimators.network import NetworkEstimator
     from rig.live.estimator import without_interval
 
+    options.require_new(out)
+    options.require_number("--rate", rate, LEAST_HZ)
     estimator = load(model)
     if equation is not None and model.suffix == ".toml":
         models = {one.balance: one for one in model_file.read_all(model)}

@@ -24,7 +24,12 @@ def export(
     topic: Annotated[str | None, Option(help="Only this topic.")] = None,
     out: Annotated[
         Path | None,
-        Option("--out", "-o", help="File with --topic, else folder; by default by the log."),
+        Option(
+            "--out",
+            "-o",
+            help="Folder; or, with its ending, the file of one topic or of a campaign's table. By"
+            " default next to the recordings.",
+        ),
     ] = None,
     force: Annotated[bool, Option("--force", help="Overwrite files.")] = False,
     calibration: Annotated[
@@ -64,7 +69,8 @@ def export(
             known = _known(format_name, "A campaign", (ExportFormat.CSV, ExportFormat.PARQUET))
             name = f"{path.resolve().name}.{format_name}"
             target = out or path.resolve().with_name(name)
-            target = target / name if target.is_dir() else target
+            is_folder = target.is_dir() or not target.suffix
+            target = target / name if is_folder else target
             written = [write_tidy(campaign, target, known, force)]
         where = written[0] if len(written) == 1 else written[0].parent
         data = {"written": written, "runs": campaign.names}

@@ -224,7 +224,10 @@ def require_number(option: str, value: float | None, least: float) -> None:
 
 
 def require_new(path: Path | None) -> None:
-    """Refuse to write over a file that is there, None for no file."""
+    """Refuse to write over a file that is there, None for no file.
+
+    Pages, figures and results as JSON are replaced, see `estimation.files`; nothing else is.
+    """
     if path is not None and path.exists():
         raise UsageError(f"{path} is there already.", fix="Name another file.")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Option
 
-from rig.cli.options import FiguresFolder, TablesFile, WorkersOption
+from rig.cli.options import FiguresFolder, TablesFile, WorkersOption, require_new
 from rig.configuration.folders import cache_folder
 from rig.output.console import JsonFlag, counted, counting, described
 
@@ -82,6 +82,7 @@ def excitation(
     """Design an arm's excitation within its limits at every instant, compared with the thesis'."""
     from rig.arm.excitation import page, run_excitation, write_trajectory
 
+    require_new(trajectory)
     with counted("starts") as on_start:
         study, best = run_excitation(starts, evaluations, on_start)
     if trajectory is not None:

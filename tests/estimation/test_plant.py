@@ -133,6 +133,8 @@ def test_a_declared_model_of_any_machine_survives_its_file(plant):
             r"line \d+.*ends in _angle_rad",
         ),
         ('deflection = "stretch"', 'deflection = "motor"', "Two equations are called 'motor'"),
+        ("cutoff_hz = 50.0", "cutoff_hz = -5.0", r"line \d+: cutoff_hz = -5 is not a cutoff"),
+        ("order = 3", "order = 0", r"line \d+: order = 0 is not the order of a filter"),
         ("[machine]", "[machine", "is not TOML"),
         ("rig.machine/1", "rig.machine/9", r"line 1: the schema is not"),
         ("[[actuator]]", "[[actuater]]", r"line \d+ has an unknown key 'actuater'.*'actuator'"),

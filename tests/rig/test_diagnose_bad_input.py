@@ -128,6 +128,14 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(option, tmp
     assert not ledger.exists()
 
 
+@pytest.mark.parametrize("option", ["--model-out", "--protocol-out"])
+def test_a_model_or_a_protocol_is_never_written_over(option, tmp_path, said):
+    there = tmp_path / "mine.toml"
+    there.write_text('schema = "rig.model/1"\n' if option == "--model-out" else "[[runs]]\n")
+    words = ("diagnose", tmp_path / "no such recordings", option, there)
+    assert "is there already" in said(*words, code=2).err
+
+
 def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(diagnose, tmp_path):
     printed = diagnose(runs(spring, count=9, seconds=2.0), "--ledger /dev/null/x")
     assert "reading the recordings" not in printed

@@ -90,11 +90,20 @@ def test_a_table_in_millimetres_and_volts_is_fitted_in_metres_and_newtons(
     assert "500 calls a second" in said("export", model, "--out", header).out
     assert "then every 1 / 500.0 s" in header.read_text()
     assert "opening" not in header.read_text()
-    said("export", model, "--out", header, "--rate 1000")
-    assert "then every 1 / 1000.0 s" in header.read_text()
+    exported = header.read_text()
+    assert "is there already" in said("export", model, "--out", header, code=2).err
+    assert header.read_text() == exported
+    faster = tmp_path / "faster.h"
+    said("export", model, "--out", faster, "--rate 1000")
+    assert "then every 1 / 1000.0 s" in faster.read_text()
+    refused = said("export", model, "--out", tmp_path / "negative.h", "--rate -5", code=2).err
+    assert "--rate" in refused
+    assert "cutoff_hz" not in refused
     model.write_text(re.sub("half_width = .*", "", model.read_text()))
     assert "No interval: slide.model.toml" in said(*words, "--speed 0 --plain").err
-    assert "No interval: slide.model.toml" in said("export", model, "--out", header).out
+    assert (
+        "No interval: slide.model.toml" in said("export", model, "--out", tmp_path / "third.h").out
+    )
 
 
 def test_a_diagnosis_ends_with_the_replay_of_its_model(slide, tmp_path, said, monkeypatch):

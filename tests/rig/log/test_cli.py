@@ -146,6 +146,8 @@ def test_a_campaign_is_exported_as_one_table_with_units_and_conditions(rig, tmp_
         assert beside["units"]["motor_current_a"] == "A"
     assert "already" in rig("export", folder, "--format", format_name, code=2).err
     rig("export", folder, "--force --format", format_name)
+    rig("export", folder, "--format", format_name, "--out", tmp_path / "tables")
+    assert (tmp_path / "tables" / f"{folder.name}.{format_name}").is_file()
     log = folder / "a.mcap"
     before = log.read_bytes()
     for source, more in ((folder, ""), (log, "--topic /rig/sample")):
