@@ -5,6 +5,7 @@ a float angle into more than the acceleration. All else, weights, products and n
 The result is that of `predict(recording, causal=True)` for gap-free samples.
 """
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -18,7 +19,7 @@ from estimation.bank.beyond import STANDING_RAD_S
 from estimation.errors import EstimationError
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.c_model import model_text
-from estimation.estimators.model import ModelEstimator, fitted_range, rest_speeds
+from estimation.estimators.model import ModelEstimator, fitted_range, rest_speeds, settles_s
 from estimation.estimators.network import NetworkEstimator
 from estimation.kalman import tracker
 from estimation.model import Model
@@ -29,6 +30,10 @@ TURNING_TRAVEL = derived.TURNING.replace("_angle_rad", derived.TRAVEL)
 
 USUAL_HZ = 1000.0
 """Rate of a header whose estimator's file contains none."""
+
+
+ROUNDING = 1e-6
+"""Samples by which a number of samples may be above a whole one by rounding."""
 
 
 class ExportError(EstimationError):
@@ -52,12 +57,14 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
             f"{name!r} cannot name things in C.", fix="Use small letters, digits and underscores."
         )
     model, ranged, rests, signals = "", False, False, reference()
+    settles, window = 0, derived.window_samples(sample_rate_hz)
     channels: Sequence[str]
     if isinstance(estimator, ModelEstimator):
         channels = [c for c in estimator.model.channels if c != "time_s"]
         model = model_text(estimator.model, channels.index)
         ranged = fitted_range(estimator.model) is not None
         rests = bool(rest_speeds(estimator.model))
+        settles = math.ceil(settles_s(estimator.model) * sample_rate_hz - ROUNDING)
         low_pass, signals = estimator.model.low_pass, estimator.model.signals
     else:
         channels, low_pass = estimator.channels, estimator.low_pass
@@ -78,7 +85,9 @@ def header(estimator: Exported, name: str, sample_rate_hz: float) -> str:
         windows=program.windows,
         pasts=program.pasts,
         rate_hz=sample_rate_hz,
-        window=derived.window_samples(sample_rate_hz),
+        settles=settles,
+        window=window,
+        wrapped=window * (1 + settles // window),
         sections=np.delete(low_pass.sections(sample_rate_hz), 3, axis=1),
         tracker=tracker(sample_rate_hz),
         keep="\n".join(program.keep(k, name) for k, name in enumerate(program.pasts)),

@@ -70,6 +70,14 @@ def usual_half_width(model: Model) -> float | None:
     return model.evidence.half_width if model.evidence else None
 
 
+def settles_s(model: Model) -> float:
+    """Return the time from the first sample on in which a live estimate is not valid, s.
+
+    It is that which a fit leaves out at either end of a run.
+    """
+    return 2.0 * model.low_pass.reach_s
+
+
 def rest_speeds(model: Model) -> dict[str, float]:
     """Return the speeds below which a part that the model reads is at rest, where one is stated."""
     rest = model.signals.rest.items()

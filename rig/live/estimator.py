@@ -14,7 +14,7 @@ from estimation.channels import ESTIMATED
 from estimation.estimator import Estimator, Stepper, load
 from estimation.estimators.bank import BankEstimator
 from estimation.estimators.instrument import require_own
-from estimation.estimators.model import ModelEstimator, usual_half_width
+from estimation.estimators.model import ModelEstimator, settles_s, usual_half_width
 from estimation.estimators.network import NetworkEstimator
 from estimation.estimators.origin import Origin
 from estimation.model import Evidence, Model
@@ -56,7 +56,7 @@ class LiveEstimator:
         if isinstance(estimator, ModelEstimator):
             self.model = estimator.model
             self.usual_half_width = usual_half_width(self.model)
-            self._settles_s = 2.0 * self.model.low_pass.reach_s  # as offline, at either end
+            self._settles_s = settles_s(self.model)
             origin = self.model.evidence
         elif isinstance(estimator, BankEstimator | NetworkEstimator):
             self.instrument, origin = estimator.instrument, estimator.origin

@@ -26,6 +26,7 @@ from estimation.plant import Sensor
 from estimation.plant_models import declared
 from estimation.predicted import predicted_of, with_prediction
 from estimation.recording import Recording
+from rig.live.estimator import LiveEstimator
 from rig.live.status import ModelStatus
 from rig.machines.recordings import with_positions
 from tests.estimation.test_plant import SLIDE, slide
@@ -109,10 +110,13 @@ def test_a_compiled_model_of_any_machine_gives_the_same(tmp_path):
     at_rest = np.isnan(found[:, 1])
     assert 0 < at_rest.sum() == np.sum(np.abs(live) < slowest)
     assert np.all(found[~at_rest, 1] == 3.0)
+    shown = LiveEstimator(ModelEstimator(model), run.sample_rate_hz).push(run.columns, run.time_s)
+    settled = np.isfinite(shown)  # as the live display, which has no value before
+    assert 0 < np.sum(~settled) < 100
     inside = found[:, 2] == 1
     assert 0.9 < inside.mean() < 1
     low, high = model.evidence.target_range
-    assert np.all(inside == ((wanted > low - 3.0) & (wanted < high + 3.0)))
+    assert np.all(inside == settled & (wanted > low - 3.0) & (wanted < high + 3.0))
     status = ModelStatus([model])
     assert status.of({model.target: wanted[inside]}).state == "ok"
     assert status.of({model.target: wanted[wanted > high + 3.0]}).state == "suspect"
