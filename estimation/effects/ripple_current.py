@@ -14,7 +14,8 @@ class CurrentRipple(Waves):
     Equation: torque = current (a sin(order angle) + b cos(order angle)), current in A, angle in
     rad, a and b in N m/A, order in periods per turn.
 
-    Check: turn slowly at two currents; the ripple grows in proportion to the current.
+    Check: move slowly at two currents; the ripple grows in proportion to the current. Of a carriage
+    on a linear motor, compare the period with its pole pitch.
 
     Source: Piccoli and Yim 2016 (mutual torque ripple).
     """

@@ -12,8 +12,9 @@ class MotorRipple(Waves):
     Equation: torque = a sin(order angle) + b cos(order angle), a and b in N m, angle in rad, order
     in periods per turn.
 
-    Check: turn the shaft slowly without current and feel the cogging; compare the order with the
-    numbers of poles, slots and commutator segments.
+    Check: move it slowly without current and feel the cogging. Of a shaft, compare the periods per
+    turn with the numbers of poles, slots and commutator segments; of a carriage, compare the period
+    with the lead of the screw, the pitch of the belt and the pole pitch of a linear motor.
 
     Source: Piccoli and Yim 2016 (cogging maps of motors).
     """

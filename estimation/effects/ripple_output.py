@@ -13,7 +13,8 @@ class OutputRipple(Waves):
     unit (N m or rad), angle in rad, order in periods per turn. The order need not be an integer. It
     is below the gear ratio: a period of one motor turn or less belongs to the motor.
 
-    Check: measure the runout of the output shaft and pulley; inspect the last gear stage.
+    Check: measure the runout of the output shaft and pulley; inspect the last gear stage. Of a
+    carriage, compare the period with the lead of the screw and the pitch of the belt or the rack.
 
     Source: order tracking of rotating machines; Randall 2011, "Vibration-based Condition
     Monitoring", section 3.6.
@@ -33,7 +34,8 @@ class OutputHarmonics(OutputRipple):
     Equation: torque or angle = sum over n = 1, 2, 3 of a_n sin(n order angle) + b_n cos(n order
     angle), a_n and b_n in the target's unit (N m or rad), angle in rad, order in periods per turn.
 
-    Check: compare the order with the number of teeth; inspect the last gear stage.
+    Check: compare the periods per turn with the number of teeth; inspect the last gear stage. Of a
+    carriage, compare the period with the lead of the screw and the pitch of the belt or the rack.
 
     Source: harmonics of the meshing frequency; Randall 2011, "Vibration-based Condition
     Monitoring", section 2.2.

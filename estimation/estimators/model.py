@@ -73,7 +73,7 @@ def usual_half_width(model: Model) -> float | None:
 def settles_s(model: Model) -> float:
     """Return the time from the first sample on in which a live estimate is not valid, s.
 
-    It is that which a fit leaves out at either end of a run.
+    A fit omits as much at either end of a run.
     """
     return 2.0 * model.low_pass.reach_s
 

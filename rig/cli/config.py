@@ -1,5 +1,6 @@
 """`rig config`: is a configuration sound, and what does it come to."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -63,7 +64,12 @@ def init(
     said = [f"Wrote {out}. Boards plugged in: {found or 'none'}."]
     if len(boards) != 1:
         said.append(f"Write the board's address into `url` of {out}; `rig devices` shows it.")
-    said.append("Then: rig config check, rig doctor. Check limits and gains before it moves.")
+    file = shlex.quote(str(out))
+    said += [
+        "Check limits and gains before it moves. Then:",
+        f"  rig config check {file}",
+        f"  rig doctor --config {file}",
+    ]
     present(json, {"written": out, "boards": boards}, *said)
 
 

@@ -1,5 +1,6 @@
 """`rig record`: run a protocol and write one log per run."""
 
+import shlex
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -8,7 +9,7 @@ from typer import Option
 
 from rig.cli import options
 from rig.errors import KNOWN_ERRORS, UsageError
-from rig.output.console import JsonFlag, present, progress, remarks
+from rig.output.console import JsonFlag, emit_json, present, progress, remarks
 from rig.output.table import counted
 
 if TYPE_CHECKING:
@@ -45,7 +46,8 @@ def record(
 ) -> int:
     """Run a protocol on the rig and write one log per run to logs/.
 
-    Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit.
+    Exit code 1 when a run is incomplete or a sensor's zero drifted beyond its limit. Interrupted
+    with --json, the object has the runs so far and the command that goes on.
     """
     from calibration.rules import refuse_errors
     from rig.configuration.check import refuse_problems
@@ -85,7 +87,7 @@ def record(
         require_channels(of_logger, settings, model)
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {counted(len(todo), 'run')} on {settings.name} into {folder}")
-    recorded = _recorded(settings, todo, folder, notes, watch)
+    recorded = _recorded(settings, todo, folder, notes, watch, json)
     bad = [result.name for result in recorded if result.drifted or not result.complete]
     wrong = f"drifted or not complete: {', '.join(bad)}" if bad else "all complete"
     found = {"folder": folder, "runs": recorded, "look_at": bad}
@@ -96,7 +98,12 @@ def record(
 
 
 def _recorded(
-    settings: "Config", todo: "list[Plan]", folder: Path, notes: str, watch: "RunWatch | None"
+    settings: "Config",
+    todo: "list[Plan]",
+    folder: Path,
+    notes: str,
+    watch: "RunWatch | None",
+    json: bool,
 ) -> "list[RunResult]":
     """Record the runs and show how they go; state how to go on if not all are."""
     from rig.bench.logger import open_logger
@@ -105,6 +112,7 @@ def _recorded(
 
     screen = remarks()
     recorded: list[RunResult] = []
+    resume = f"rig record --resume {shlex.quote(str(folder))}"
     try:
         with Session(settings, open_logger(settings)) as session, progress() as bar:
             task = bar.add_task("recording", total=sum(run.samples for run in todo))
@@ -123,12 +131,15 @@ def _recorded(
                 if result.drifted or not result.complete:
                     bar.console.print(f"{result.name}: {result.remark}", style="yellow")
     except KeyboardInterrupt:
-        screen.print(f"Stopped; the rig is safe. Go on with: rig record --resume {folder}")
+        screen.print(f"Stopped; the rig is safe. Go on with: {resume}")
+        if json:
+            stopped = {"interrupted": True, "resume": resume}
+            emit_json({"folder": folder, "runs": recorded, **stopped})
         raise
     except KNOWN_ERRORS:
         screen.print(
             f"{len(recorded)} of {len(todo)} runs are recorded. Go on, once it is put right, with: "
-            f"rig record --resume {folder}"
+            f"{resume}"
         )
         raise
     return recorded

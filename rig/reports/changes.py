@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from estimation.changes.difference import Change, Difference
 from rig.output.table import TextTable
-from rig.reports.diagnosis_words import wave
+from rig.reports.diagnosis_words import confidence, wave
 
 
 def lines(found: Difference) -> Iterator[str]:
@@ -18,7 +18,7 @@ def lines(found: Difference) -> Iterator[str]:
 
 
 def _sentence(change: Change) -> str:
-    sure, how, set_of = f"confidence {100 * change.confidence:.0f} %", change.how, ""
+    sure, how, set_of = f"confidence {confidence(change.confidence)}", change.how, ""
     if change.verdict == "one_of":
         names = ", ".join([change.name, *change.alternatives])
         set_of = f"One of these changed, not distinguishable on these runs: {names}. "

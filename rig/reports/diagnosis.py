@@ -58,7 +58,7 @@ def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
             "runs": sealed.confirm,
             "tables": [
                 _probabilities(diagnosis.findings),
-                _parameters(diagnosis.findings),
+                parameter_table(diagnosis.findings),
                 *_moved(diagnosis, signals),
             ],
             "others": words.other_sentences(diagnosis),
@@ -131,7 +131,7 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
     if 0 < len(finding.runs_affected) < whole:
         facts.append(("Acts in", f"{len(finding.runs_affected)} of {whole} runs"))
     if finding.confidence is not None:
-        facts.append(("Confidence", f"{finding.confidence:.0%}"))
+        facts.append(("Confidence", words.confidence(finding.confidence)))
     if finding.alternatives:
         alternatives = "; ".join(
             f"{words.meaning(a) or a} [{words.placed(finding, a)}]" for a in finding.alternatives
@@ -175,11 +175,12 @@ def error_table(diagnosis: Diagnosis) -> TextTable:
     )
 
 
-def _parameters(findings: Sequence[Finding]) -> TextTable | None:
+def parameter_table(findings: Sequence[Finding]) -> TextTable | None:
+    """Return the parameters of the findings with their intervals; None where there are none."""
     rows = [
         [f"{finding.balance}, {finding.family}, {name}", *_with_interval(known)]
         for finding in findings
-        for name, known in finding.parameters.items()
+        for name, known in words.with_period(finding).items()
     ]
     if not rows:
         return None

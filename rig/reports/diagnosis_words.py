@@ -5,7 +5,7 @@ import math
 import sys
 from collections.abc import Sequence
 
-from estimation.diagnosis.result import Diagnosis, Finding, is_unexplained
+from estimation.diagnosis.result import Diagnosis, Finding, Value, is_unexplained
 from estimation.effects import catalogue
 from estimation.plant_models import WORDS
 from rig.output.table import counted
@@ -101,7 +101,7 @@ def placed(finding: Finding, alternative: str) -> str:
 def _named(finding: Finding) -> str:
     sizes = [f"{name} {text}".strip() for name, text in sizes_of(finding).items()]
     if finding.confidence is not None:
-        sizes.append(f"confidence {finding.confidence:.0%}")
+        sizes.append(f"confidence {confidence(finding.confidence)}")
     plain = meaning_of(finding)
     size = f", {', '.join(sizes)}" if sizes else ""
     if finding.family in WORDS:
@@ -174,12 +174,36 @@ def sizes_of(finding: Finding) -> dict[str, str]:
     return sizes
 
 
+def confidence(share: float) -> str:
+    """Return a confidence in per cent; one that would round to all is stated as more than 99%."""
+    return "more than 99%" if share >= 0.995 else f"{share:.0%}"
+
+
+def with_period(finding: Finding) -> dict[str, Value]:
+    """Return the parameters of a finding; the order of a wave along a travel as its period."""
+    found = dict(finding.parameters)
+    if "order" not in found or not _along(finding.depends_on).endswith("_position"):
+        return found
+    order = found["order"]
+    low, high = order.ci95 or (math.nan, math.nan)
+    turn = 2.0 * math.pi
+    interval = (turn / high, turn / low) if 0 < low < high else None
+    period = Value(turn / order.value, "m", interval)
+    named = {k: ("period", period) if k == "order" else (k, v) for k, v in found.items()}
+    return dict(named.values())
+
+
+def _along(depends_on: Sequence[str]) -> str:
+    """Return the variable that a wave repeats along; empty where it is not known."""
+    return next((v for v in depends_on if v.endswith(("_angle", "_position"))), "")
+
+
 def wave(order: float, depends_on: Sequence[str]) -> dict[str, str]:
     """Return how often a wave repeats, by name.
 
     So many times per turn of a shaft, which needs no name, or a period of a position.
     """
-    along = next((v for v in depends_on if v.endswith(("_angle", "_position"))), "")
+    along = _along(depends_on)
     if along.endswith("_position"):
         return {"period": f"{2.0 * math.pi / order:.3g} m"}
     if along:

@@ -13,10 +13,10 @@ def parameter_table(model: Model) -> TextTable:
         for parameter in term.parameters:
             known = term.values[parameter.name]
             unit = term.unit(parameter, model.target)
-            side = "+" if term.sign == 1 else "-"
+            sign = "+" if term.sign == 1 else "-"
             name = f"{term.effect.id}, {parameter.name}"
-            spread = "" if known.spread is None else f"{known.spread:.2g}"
-            rows.append([name, side, f"{known.value:.4g}", spread, unit])
+            interval = "" if known.ci95 is None else "{:.4g} to {:.4g}".format(*known.ci95)
+            rows.append([name, sign, f"{known.value:.4g}", interval, unit])
     evidence = model.evidence
     note = ""
     if evidence is not None:
@@ -24,10 +24,11 @@ def parameter_table(model: Model) -> TextTable:
         note = (
             f"Fitted on {counted(len(evidence.runs), 'run')}, {evidence.samples:,} samples. RMSE"
             f" {in_unit(scale * evidence.rmse, unit)} with each run's mean removed,"
-            f" {in_unit(scale * evidence.rmse_with_means, unit)} with means. Spread: standard"
-            " deviation over a bootstrap of runs; empty at a bound or with one run."
+            f" {in_unit(scale * evidence.rmse_with_means, unit)} with means. Sign: + adds to the"
+            " target, - subtracts from it. 95 %: interval of a bootstrap over runs; empty at a"
+            " bound or with one run."
         )
-    return TextTable("Fitted model", ["parameter", "side", "value", "spread", "unit"], rows, note)
+    return TextTable("Fitted model", ["parameter", "sign", "value", "95 %", "unit"], rows, note)
 
 
 def held_out_sentence(model: Model, error: HeldOutError) -> str:

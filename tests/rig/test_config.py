@@ -140,7 +140,9 @@ def test_a_configuration_is_begun_for_the_board_that_is_plugged_in(tmp_path, mon
     board = Port("/dev/ttyACM0", "16c0:0483:1234567", "USB Serial")
     monkeypatch.setattr("rig.doctor.ports.serial_ports", lambda: [board])
     path = tmp_path / "rig.toml"
-    said("config init", path)
+    printed = said("config init", path).out
+    assert f"rig config check {path}" in " ".join(printed.split())
+    assert f"rig doctor --config {path}" in " ".join(printed.split())
     assert load_config(path).logger.url == "usb:16c0:0483:1234567"
     said("config check", path)
     assert "already" in said("config init", path, code=ExitCode.USAGE).err

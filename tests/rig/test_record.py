@@ -1,5 +1,6 @@
 """Recording a campaign: whole logs, resumable, nothing overwritten."""
 
+import itertools
 import json
 import re
 import subprocess
@@ -220,6 +221,21 @@ def test_a_drifting_sensor_is_reported(tmp_path):
     assert result.drifted == ("proximal_torque_n_m",)
     assert "zero of proximal_torque_n_m moved" in result.remark
     assert "drifted" in read_log(result.path).end.drift_verdict
+
+
+def test_an_interrupted_command_states_its_runs_and_how_to_go_on_as_json(
+    tmp_path, answered, monkeypatch
+):
+    def interrupted(*words, **more):
+        yield from itertools.islice(record_campaign(*words, **more), 1)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rig.recording.campaign.record_campaign", interrupted)
+    protocol, out = protocol_file(tmp_path, runs=2, duration_s=0.5), tmp_path / "out"
+    found = answered("record -p", protocol, "-o", out, code=130)
+    assert [run["samples"] for run in found["runs"]] == [500]
+    assert found["interrupted"]
+    assert found["resume"] == f"rig record --resume {out}"
 
 
 def test_the_command_records_and_reports_what_next(tmp_path, said, answered):

@@ -19,7 +19,8 @@ from rig.log.convert import write_recording
 from rig.output import figures
 from rig.output.provenance import Provenance, commit
 from rig.output.table import TextTable, to_markdown, to_rich
-from rig.reports.diagnosis_words import meaning, meaning_of, sentences, sizes_of
+from rig.reports.diagnosis import card, parameter_table
+from rig.reports.diagnosis_words import check_of, meaning, meaning_of, sentences, sizes_of
 from tests.rig.browser import Opened, chromium
 
 pytestmark = pytest.mark.integration
@@ -124,6 +125,24 @@ def test_sizes_are_those_of_the_wave_and_in_readable_units(along, repeats):
         parameters=wave,
     )
     assert sizes_of(finding) == {"amplitude": "5 mN m", "time": "0.25 s"} | repeats
+    assert "lead of the screw, the pitch of the belt" in check_of(finding)
+
+
+def test_the_page_has_the_period_of_a_wave_along_a_travel():
+    finding = Finding(
+        balance="carriage",
+        error_of="carriage",
+        family="ripple.motor",
+        verdict="identified",
+        confidence=0.9999,
+        depends_on=("table_position",),
+        parameters={"order": Value(1250.0, "1", (1200.0, 1300.0))},
+    )
+    (row,) = parameter_table([finding]).rows
+    assert row == ["carriage, ripple.motor, period", "0.00503", "0.00483 to 0.00524", "m"]
+    diagnosis = Diagnosis((finding,), {}, {"carriage": "N"}, {}, {}, Sealed((), ("a",), 0, "", ""))
+    assert "confidence more than 99%" in sentences(diagnosis)[0]
+    assert ("Confidence", "more than 99%") in card(finding, diagnosis)["facts"]
 
 
 def test_a_finding_whose_own_equation_gains_nothing_states_the_error_of_another():
