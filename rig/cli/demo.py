@@ -38,6 +38,10 @@ PLAIN_BOARD = (
     "The simulated board was the plain one. The compiled firmware takes its place in a checkout of"
     " the sources, after make -C firmware."
 )
+PLANTED = (
+    "What the simulated rig contained, and its logs do not name: {name}, amplitude {mean:.3g} mN m"
+    " at the spindle on average over a turn, {periods_per_turn:g} per turn of the motor angle."
+)
 NEXT = """
 This was one equation. With all four the same test runs are used again, so the result is
 marked as exploratory:
@@ -104,19 +108,36 @@ def demo(
     kept = logs / DIAGNOSIS
     report = write(done, number, kept.with_suffix(".html"), kept)
     looks.enter(look)
+    planted = _planted()
     files = {"folder": folder, "report": kept.with_suffix(".html"), "model": model}
     found = {"runs": runs, "held_out": held_out, "diagnosis": done.diagnosis.to_json()}
     present(
         json,
-        {**files, "ledger": ledger, **found, "firmware": firmware},
+        {**files, "ledger": ledger, **found, "planted": planted, "firmware": firmware},
         f"{len(runs)} runs, {sum(run.samples for run in runs)} samples.",
         *([] if firmware else [PLAIN_BOARD]),
         "",
         *sentences(done.diagnosis),
+        PLANTED.format(mean=1e3 * planted["amplitude_n_m"], **planted),
         "",
         report[0],
         NEXT.format(ledger=ledger, **files),
     )
+
+
+def _planted() -> dict[str, Any]:
+    """Return the ripple that was hidden in the simulated rig, at the spindle."""
+    from rig.simulation.fitted import DECLARED_PLANT
+    from rig.simulation.hidden import draw
+    from rig.simulation.hidden_drive import RIPPLE_N_M
+
+    hidden = draw(DRAW)
+    amplitude_n_m = hidden.strength * RIPPLE_N_M * DECLARED_PLANT.gear_ratio
+    return {
+        "name": hidden.name,
+        "amplitude_n_m": amplitude_n_m,
+        "periods_per_turn": hidden.shape[0],
+    }
 
 
 def _record(

@@ -4,6 +4,7 @@
 tables and of logs. Samples that are flagged do not count. Nothing is corrected here.
 """
 
+import re
 from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
@@ -40,6 +41,9 @@ CLIPPED = 0.005
 
 WHOLE = 0.75
 """Share of its range that no position crosses between two samples while it moves."""
+
+COMMAND = re.compile(r"(^|_)(command|target)_")
+"""In the name of a channel that was commanded, not measured: it may be held constant."""
 
 ALIKE, MOST = 2.0, 0.75
 """Factor within which a channel varies alike in runs, and the share of runs that must agree."""
@@ -121,6 +125,8 @@ def of_channel(name: str, recordings: Sequence[Recording]) -> list[str]:
     least, greatest = float(values.min()), float(values.max())
     wrong = [*_implausible(unit, least, greatest)]
     if least == greatest:
+        if COMMAND.search(name):
+            return wrong
         return [*wrong, f"it is constant at {with_unit(least, unit)}; is the sensor connected?"]
     wrong += _clipped(parts, least, greatest, unit)
     if unit in ("rad", "m"):

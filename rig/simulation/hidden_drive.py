@@ -7,6 +7,9 @@ import numba
 
 from rig.simulation.hidden import FIRST, SECOND, STRENGTH, Row
 
+RIPPLE_N_M = 0.08e-3
+"""Amplitude of the ripple of the motor's torque at strength 1."""
+
 
 @numba.njit()
 def motor_friction_n_m(
@@ -36,7 +39,7 @@ def gear_friction_n_m(effects: Any, motor_speed_rad_s: float, twist_n_m: float) 
 def motor_ripple_n_m(row: Row, motor_angle_rad: float) -> float:
     """Ripple at the motor shaft: A sin(k q + p) (1 + 0.35 sin q), A = 0.08 mN m at strength 1."""
     carrier = math.sin(row[FIRST] * motor_angle_rad + row[SECOND])
-    return row[STRENGTH] * 0.08e-3 * carrier * (1.0 + 0.35 * math.sin(motor_angle_rad))
+    return row[STRENGTH] * RIPPLE_N_M * carrier * (1.0 + 0.35 * math.sin(motor_angle_rad))
 
 
 @numba.njit()

@@ -5,6 +5,7 @@ import json
 from contextlib import redirect_stdout
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from estimation import model_file
@@ -48,6 +49,15 @@ def test_the_demo_finds_what_it_hid_on_runs_not_touched(told):
     assert "ripple.motor" in {t.effect.id for t in model_file.read(Path(told["model"])).terms}
     # the declared model's error is of training runs alone
     assert told["held_out"]["runs"] == 14 - len(found["runs"]["confirm"])
+
+
+def test_what_was_planted_is_stated_and_is_what_was_found(told):
+    planted, (finding,) = told["planted"], told["diagnosis"]["findings"]
+    found = {name: value["value"] for name, value in finding["parameters"].items()}
+    assert planted["name"] == "motor_ripple"
+    assert found["order"] == pytest.approx(planted["periods_per_turn"], rel=0.01)
+    amplitude = np.hypot(found["sine"], found["cosine"])
+    assert amplitude == pytest.approx(planted["amplitude_n_m"], rel=0.1)
 
 
 def test_the_page_has_all_that_was_found_and_what_is_not_decided(told):

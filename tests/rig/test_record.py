@@ -15,6 +15,7 @@ from drivers.transport.simulated import SimulatedTransport
 from rig.bench.session import Session
 from rig.configuration.config import SHIPPED
 from rig.errors import UsageError
+from rig.importers.questions import questions
 from rig.importers.registry import open_campaign
 from rig.log.check import Verdict, check_log
 from rig.log.reader import read_log
@@ -83,6 +84,14 @@ def test_the_hidden_effect_is_not_in_the_recording(tmp_path):
     # and yet another hidden effect is another campaign
     with pytest.raises(UsageError, match="another protocol or configuration"):
         record(tmp_path, simulated(hidden={"motor_drag": 1.0}), short_protocol(1), resume=True)
+
+
+def test_a_command_that_the_protocol_holds_constant_is_not_asked_about(folder):
+    run = next(iter(open_campaign(folder).evidence))
+    assert np.ptp(run["load_command_a"]) == 0
+    assert [text for text in questions([run]) if "is the sensor connected?" in text] == []
+    dead = run.with_columns(motor_current_a=np.zeros(len(run)))
+    assert any(text.startswith("motor_current_a: it is constant") for text in questions([dead]))
 
 
 def test_one_seed_gives_one_campaign(folder, tmp_path):
