@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any, cast, get_args
 
 from estimation.effects import effect
-from estimation.errors import EstimationError, UnknownNameError
+from estimation.errors import EstimationError, UnknownNameError, nearest
 from estimation.files import write_text_atomic
 from estimation.filters import LowPass
 from estimation.model import Estimate, Evidence, Model, ModelError, Term
@@ -48,6 +48,12 @@ from estimation.toml_table import Table, entries, value_text
 
 SCHEMA = "rig.model/1"
 SEVERAL = "rig.models/1"
+
+OF_PARAMETER = ("value", "unit", "spread", "ci95")
+"""Keys of a parameter."""
+
+SAME_UNIT = {"kg": "N s^2/m", "kg m^2": "N m s^2/rad"}
+"""Unit that a file may state for a parameter, to how it follows from the channels."""
 
 
 class ModelFileError(ModelError):
@@ -241,6 +247,12 @@ def _term(entry: Table, target: str) -> Term:
     values, units = {}, {}
     for name in parameters.content:
         known = parameters.table(name)
+        if unknown := [key for key in known.content if key not in OF_PARAMETER]:
+            raise ModelFileError(
+                f"{known.at(unknown[0])} has an unknown key {unknown[0]!r}.",
+                f"Bounds and meaning are those of the effect: rig effects {kind.id}.",
+                nearest(unknown[0], OF_PARAMETER),
+            )
         units[name] = known.take("unit", str)
         values[name] = known.made(Estimate, ci95=_two(known, "ci95"))
     entry.finish()
@@ -254,7 +266,8 @@ def _check_units(term: Term, target: str, stated: Mapping[str, str]) -> None:
     """Raise when a parameter's stated unit is not the one its channels give it."""
     for parameter in term.parameters:
         unit = term.unit(parameter, target)
-        if stated.get(parameter.name, unit) != unit:
+        written = stated.get(parameter.name, unit)
+        if SAME_UNIT.get(written, written) != unit:
             raise ModelError(
                 f"{term.effect.id}: {parameter.name} is stated in {stated[parameter.name]!r},"
                 f" not in {unit!r}.",

@@ -71,6 +71,10 @@ class Instrument:
     mounting: str | None = None
 
 
+OTHER = "Name a model or a machine file of these recordings, with --model or --machine."
+"""What to do where recordings have no channel of a similar name."""
+
+
 class MissingChannelError(EstimationError):
     """A recording lacks a channel that the work needs."""
 
@@ -188,11 +192,14 @@ class Recording:
         try:
             return self.columns[name]
         except KeyError:
-            near = difflib.get_close_matches(name, self.columns, n=1)
+            from estimation.derived import rates_of  # it is made of recordings
+
+            known = [n for column in self.columns for n in (column, *rates_of(column))]
+            near = difflib.get_close_matches(name, known, n=1)
             raise MissingChannelError(
                 f"Run {self.name!r} has no channel {name!r}.",
                 f"It has: {', '.join(self.columns) or 'none'}.",
-                move_condition([name], [self]) or (f"Did you mean {near[0]!r}?" if near else ""),
+                move_condition([name], [self]) or (f"Did you mean {near[0]!r}?" if near else OTHER),
             ) from None
 
     @property

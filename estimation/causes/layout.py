@@ -16,7 +16,7 @@ from estimation.filters import FilterError
 from estimation.fitting import fit
 from estimation.model import Model
 from estimation.opposed import FIX, opposed
-from estimation.recording import Recording, move_condition, shared_columns
+from estimation.recording import OTHER, Recording, move_condition, shared_columns
 from estimation.travel import off_ratio
 
 MOST = 24_000
@@ -88,8 +88,7 @@ def lay_out(
                 raise LayoutError(
                     f"Some run has no {', '.join(sorted(lacking))}.",
                     f"The equation {model.balance} needs it. Every run has {', '.join(measured)}.",
-                    move_condition(lacking, timed)
-                    or "Record it, or declare an equation of channels that were recorded.",
+                    move_condition(lacking, timed) or f"Record it. {OTHER}",
                 )
             if contradicted := off_ratio(model, list(campaign.evidence)):
                 raise LayoutError(

@@ -94,11 +94,33 @@ DECLARED = to_toml(read(Path("motor")))
             'parameters.dampng = { value = 1.0, unit = "N m" }',
             "no parameter 'dampng'.*Did you mean 'damping'",
         ),
+        (
+            'channels.speed = "motor_velocity_rad_s"',
+            "parameters.damping = { bounds = [0.0, 1.0] }",
+            "unknown key 'bounds'.*rig effects friction.viscous.*value, unit, spread, ci95",
+        ),
     ],
 )
 def test_what_is_wrong_is_named(old, new, message):
     with pytest.raises(ModelFileError, match=message):
         parse(DECLARED.replace(old, new, 1), "mine.toml")
+
+
+def test_a_mass_may_be_stated_in_kilograms():
+    text = """
+schema = "rig.model/1"
+name = "axis"
+balance = "axis"
+target = "drive_force_n"
+[processing]
+[[effects]]
+id = "inertia.missing"
+channels.acceleration = "axis_acceleration_m_s2"
+parameters.inertia = { value = 180.0, unit = "kg" }
+"""
+    (term,) = parse(text).terms
+    assert term.values["inertia"].value == 180.0
+    assert 'unit = "N s^2/m"' in to_toml(parse(text))
 
 
 def test_a_missing_file_names_the_shipped_ones_and_one_without_a_model_is_refused(tmp_path):

@@ -52,6 +52,18 @@ def test_what_is_no_recording_is_refused(changes, error, match):
         make(**changes)
 
 
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("jaw_accel_rad_s2", "Did you mean 'jaw_acceleration_rad_s2'"),
+        ("crosshead_position_m", "--machine"),
+    ],
+)
+def test_a_missing_channel_is_answered_with_what_is_near_or_with_another_machine(name, advice):
+    with pytest.raises(MissingChannelError, match=advice):
+        make()[name]
+
+
 def test_a_stretch_flags_its_samples_and_keeps_its_reason():
     recording = make().with_stretch(Stretch(0.010, 0.019, Flag.SATURATED, "current clipped"))
     assert recording.valid.sum() == 90

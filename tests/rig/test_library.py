@@ -199,6 +199,17 @@ def test_a_change_is_stated_in_words_and_as_json(tmp_path, axis, said):
 
 
 @pytest.mark.integration
+@pytest.mark.parametrize("command", ["diagnose --quick", "diff"])
+def test_recordings_of_another_machine_are_answered_with_the_option_that_names_it(
+    command, tmp_path, said
+):
+    own = recorded(tmp_path / "a", 5.0, 100)
+    paths = (own, own) if command == "diff" else (own,)
+    printed = " ".join(said(command, *paths, code=5).err.split())
+    assert "machine file of these recordings, with --model or --machine" in printed
+
+
+@pytest.mark.integration
 def test_too_few_runs_are_refused(tmp_path, axis, said):
     words = (
         "diff",
