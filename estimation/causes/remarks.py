@@ -10,6 +10,7 @@ from estimation.causes.folds import unvaried
 from estimation.causes.instruments import noise_share
 from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT
+from estimation.causes.run_signals import EFFORTS
 from estimation.derived import origin_of
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import is_unexplained
@@ -118,8 +119,9 @@ def limits(
         )
     found += [f"Left out: {reason}" for reason in layout.left_out.values()]
     found += [
-        f"All training runs are at one level of {condition}: an effect that depends on it cannot"
-        " be distinguished from one that does not."
+        f"The {'mean' if condition.endswith(EFFORTS) else 'highest'} {condition} is about the same"
+        " in all training runs: what depends on it shows only within runs, and may be taken for"
+        " what depends on something else that varies there."
         for condition in unvaried(layout.select(sealed.discover))
     ]
     return found + _noisy(layout)

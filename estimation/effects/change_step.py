@@ -42,7 +42,7 @@ class FrictionStep(Remembering):
     amplitudes = (Parameter("friction", "target", "loss after the change minus before"),)
     shape = (
         Parameter("since", "clock", "time of the change in its run", 1.0, 30.0, points=10),
-        Parameter("width", "speed", "speed at which the tanh reaches 76 %", 1e-2, 50.0, points=4),
+        Parameter("width", "speed", "speed at which 76 % of it acts", 1e-2, 50.0, points=4),
     )
     walk = _walk
     rest = BEGINNING
@@ -69,7 +69,7 @@ class CampaignFrictionStep(Pointwise):
     amplitudes = (Parameter("friction", "target", "loss after the change minus before"),)
     shape = (
         Parameter("since", "campaign_clock", "time of the change", 20.0, 2e4, points=20),
-        Parameter("width", "speed", "speed at which the tanh reaches 76 %", 0.1, 10.0, points=2),
+        Parameter("width", "speed", "speed at which 76 % of it acts", 0.1, 10.0, points=2),
     )
     told_apart_by = "the first run repeated at the end"
 

@@ -27,7 +27,7 @@ class Backlash(Pointwise):
     roles: ClassVar = {"load": "proximal_torque_n_m"}
     amplitudes = (Parameter("gap", "target", "half the free travel", lower=0.0),)
     shape = (
-        Parameter("width", "load", "load at which the tanh reaches 76 %", 5e-4, 0.015, points=6),
+        Parameter("width", "load", "load at which 76 % of it acts", 5e-4, 0.015, points=6),
         Parameter("middle", "load", "load in the middle", -0.1, 0.1, True, points=7),
     )
     told_apart_by = "a load that passes slowly through zero, in both directions"

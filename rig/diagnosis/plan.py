@@ -89,6 +89,11 @@ def sentences(plan: Plan) -> list[str]:
         f"{len(named)} of {len(plan.effects)} would be named; {len(vague)} would be one of several;"
         f" {len(unseen)} would not be seen.",
     ]
+    if vague:
+        lines.append(
+            "One of several: each effect that acts, the probability that it would be named, and"
+            " those of what would be named in its place (nothing: no finding); its place."
+        )
     for one in vague:
         others = ", ".join(f"{name} {p:.2f}" for name, p in _listed(one).items())
         lines.append(f"  {one.equation}: {one.family} {one.share:.2f} or {others} ({one.place})")

@@ -6,6 +6,9 @@ from estimation.changes.difference import Change, Difference
 from rig.output.table import TextTable
 from rig.reports.diagnosis_words import confidence, wave
 
+PLAIN = {"came": "new effect", "went": "effect that is gone", "moved": "changed parameter"}
+"""How something changed, as in the JSON, to the words of a sentence."""
+
 
 def lines(found: Difference) -> Iterator[str]:
     """Yield what changed, a sentence each, and the limits of the answer."""
@@ -27,6 +30,8 @@ def _sentence(change: Change) -> str:
     if "order" in change.shape:
         repeats = wave(change.shape["order"], change.depends_on)
         sizes += [f"{name} {text}".strip() for name, text in repeats.items()]
+    for word, plain in PLAIN.items():
+        how = how.replace(word, plain)
     return f"{set_of}{how.capitalize()}: {change.name}, {', '.join(sizes)} ({sure})."
 
 

@@ -37,11 +37,8 @@ def _above_noise(diagnosis: Diagnosis) -> str:
     above = {name: r for name, r in diagnosis.over_noise.items() if is_unexplained(r)}
     if not above:
         return ""
-    errors = ", ".join(f"{name} ({ratio:.2g} times)" for name, ratio in above.items())
-    return (
-        f" Noise of the readings does not explain the error of {errors}; in brackets the error over"
-        " that noise."
-    )
+    errors = ", ".join(f"{ratio:.2g} times that noise in {name}" for name, ratio in above.items())
+    return f" Noise of the readings does not explain the error, which is {errors}."
 
 
 def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:

@@ -133,7 +133,7 @@ def test_an_effect_that_came_and_one_that_went(before, after, verdict, family):
 def test_a_ripple_that_came_is_stated_with_its_period():
     found = compare(record(1), record(2, ripple=0.5), [axis()])
     sentence = next(lines(found))
-    assert sentence.startswith("Came: ripple.motor at motor, ")
+    assert sentence.startswith("New effect: ripple.motor at motor, ")
     period = re.search(r", period (\S+) m \(confidence", sentence)
     assert float(period[1]) == pytest.approx(0.02, rel=0.02)
 
@@ -219,6 +219,6 @@ def test_a_torque_constant_that_moved_is_named_where_friction_could_stand_in_for
     difference = compare(held_loads(1, 0.02), held_loads(2, 0.011), [motor()])
     (found,) = difference.changes
     assert found.name == "motor.torque_constant gain of motor"
-    assert "oved: motor.torque_constant gain of motor, gain -0.00" in next(lines(difference))
+    assert "arameter: motor.torque_constant gain of motor, gain -0.00" in next(lines(difference))
     assert found.parameters["gain"] == pytest.approx(-0.009, rel=0.2)
     assert not compare(held_loads(1, 0.02), held_loads(2, 0.02), [motor()]).changes

@@ -69,4 +69,4 @@ def test_runs_at_one_load_do_not_distinguish_what_depends_on_it_and_a_note_state
         for k in range(9)
     ]
     notes = diagnosed(same).diagnosis.notes
-    assert any("one level of" in note for note in notes)
+    assert any("is about the same in all training runs" in note for note in notes)

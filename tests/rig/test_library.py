@@ -195,7 +195,7 @@ def test_a_change_is_stated_in_words_and_as_json(tmp_path, axis, said):
     assert change["verdict"] == "moved"
     assert change["parameters"]["damping"] == pytest.approx(1.5, rel=0.1)
     assert answer["predicted"]["motor"]["as_b"] < answer["predicted"]["motor"]["with_a"]
-    assert "Moved: friction.viscous damping of motor" in printed.err
+    assert "Changed parameter: friction.viscous damping of motor" in printed.err
 
 
 @pytest.mark.integration
