@@ -10,11 +10,13 @@ from io import StringIO
 import numpy as np
 import pytest
 
+from estimation.causes.isolability import Isolable
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.split import Sealed
 from estimation.effects import catalogue
 from estimation.model import Estimate, Term
 from estimation.recording import Flag, Mark, Recording
+from rig.diagnosis import plan
 from rig.log.convert import write_recording
 from rig.output import figures
 from rig.output.provenance import Provenance, commit
@@ -143,6 +145,13 @@ def test_the_page_has_the_period_of_a_wave_along_a_travel():
     diagnosis = Diagnosis((finding,), {}, {"carriage": "N"}, {}, {}, Sealed((), ("a",), 0, "", ""))
     assert "confidence more than 99%" in sentences(diagnosis)[0]
     assert ("Confidence", "more than 99%") in card(finding, diagnosis)["facts"]
+
+
+def test_a_plan_states_what_its_numbers_are():
+    vague = Isolable("motor", "ripple.motor", "motor", 0.4, {"sensor.crosstalk": 0.5})
+    said = plan.sentences(plan.Plan("quick", 12, (vague,)))
+    assert "the probability that it would be named" in said[2]
+    assert said[3] == "  motor: ripple.motor 0.40 or sensor.crosstalk 0.50 (motor)"
 
 
 def test_a_finding_whose_own_equation_gains_nothing_states_the_error_of_another():
