@@ -117,6 +117,7 @@ class Recording:
         source: File it was read from.
         excluded: Reason for excluding the run, or None when it counts.
         is_simulated: Whether it was recorded on a simulated rig, as far as its file states that.
+        doubts: What is doubtful about its file, questions in words. A log does not keep them.
     """
 
     name: str
@@ -134,6 +135,7 @@ class Recording:
     source: str = ""
     excluded: str | None = None
     is_simulated: bool = False
+    doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         time_s = read_only(self.time_s)

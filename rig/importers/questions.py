@@ -64,7 +64,17 @@ def questions(recordings: Sequence[Recording], derived: Collection[str] = ()) ->
     """
     names = dict.fromkeys(name for r in recordings for name in r.columns if name not in derived)
     found = [f"{n}: {text}" for n in names for text in of_channel(n, recordings)]
-    return [*found, *apart(recordings), *(zero.sentence for zero in moved_zeros(recordings))]
+    return [*found, *of_runs(recordings)]
+
+
+def of_runs(recordings: Sequence[Recording]) -> Iterator[str]:
+    """Yield the doubts about runs and their files, and about runs next to one another."""
+    doubts = dict.fromkeys(doubt for r in recordings for doubt in r.doubts)
+    for doubt in doubts:
+        runs = [r.name for r in recordings if doubt in r.doubts]
+        yield doubt if len(runs) == len(recordings) else f"{doubt} This is in {', '.join(runs)}."
+    yield from apart(recordings)
+    yield from (zero.sentence for zero in moved_zeros(recordings))
 
 
 def apart(recordings: Sequence[Recording]) -> Iterator[str]:

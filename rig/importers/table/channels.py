@@ -1,5 +1,6 @@
 """From the columns of a file to channels and conditions in SI units."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
@@ -13,7 +14,7 @@ from rig.importers.table.delimited import bad_cell
 from rig.importers.table.formula import names_in
 from rig.importers.table.mapping import ColumnMapping, worked_out
 from rig.importers.table.raw import Raw, Values
-from rig.importers.table.units import BASE, conversion, stated_in_name
+from rig.importers.table.units import BASE, agree, conversion, stated_in_name
 
 DAY_S, NO_DATE = 86_400.0, date(1970, 1, 1)
 
@@ -46,6 +47,7 @@ class Samples:
         channels: Name to values, shape (n,) each; not finite where a cell is empty.
         conditions: Name to one value, or to values that must be constant in each run.
         started_at_ns: Time of the first sample where the file holds dates, ns since 1970.
+        doubts: What is doubtful about the file, questions in words.
     """
 
     raw: Raw
@@ -54,6 +56,7 @@ class Samples:
     channels: dict[str, FloatArray]
     conditions: dict[str, float | str | Values]
     started_at_ns: int | None = None
+    doubts: tuple[str, ...] = ()
 
 
 def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:
@@ -91,7 +94,9 @@ def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:
         known = {**conditions, **channels, TIME: time_s}
         where = mapping.where("formulas", name)
         channels[name] = worked_out(where, formula, known, time_s.shape, np.float64).copy()
-    return Samples(raw, mapping, time_s, channels, conditions, started_at_ns)
+    mapped = {**sources, **data.conditions}.items()
+    doubts = tuple(text for name, source in mapped for text in _doubts(raw, name, source))
+    return Samples(raw, mapping, time_s, channels, conditions, started_at_ns, doubts)
 
 
 def find(raw: Raw, where: str, key: str, column: str) -> Values | float | str:
@@ -169,6 +174,7 @@ def _in_si(raw: Raw, where: str, name: str, source: Source, values: FloatArray) 
     unit = conversion(source.unit, name) if source.unit else None
     if unit is None and gain == 1.0:
         _check_name(where, name, source.column)
+        _check_row_of_units(raw, where, name, source.column)
     if unit is None:
         return np.asarray(gain * (values - source.zero))
     return np.asarray(unit.factor * gain * (values - source.zero) + unit.shift)
@@ -188,6 +194,41 @@ def _check_name(where: str, name: str, column: str) -> None:
         else f"Correct the name {name}; if they are in SI units, write {name} ="
         f" '{column}:{unit_of(name)}'.",
     )
+
+
+def _check_row_of_units(raw: Raw, where: str, name: str, column: str) -> None:
+    """Refuse a column of which the line below the head states another unit, where none is stated.
+
+    A text there that is not a unit is asked about instead.
+    """
+    stated, own = raw.units.get(column, ""), unit_or_none(name)
+    if not stated or own is None or agree(stated, "", 1.0, name) is not False:
+        return
+    fits = conversion(stated, name) is not None
+    raise DataError(
+        f"{where}: line {raw.units_line} of {raw.path.name} states {stated} for the column"
+        f" {column!r}, and the mapping states no unit for {name}.",
+        "Without one, values are taken as SI units.",
+        f"Write {name} = '{column}:{stated}'; if they are in SI units, {name} = '{column}:{own}'."
+        if fits
+        else f"Write a gain, {name} = {{ column = '{column}', gain = SIZE }}; if they are in SI"
+        f" units, {name} = '{column}:{own}'.",
+    )
+
+
+def _doubts(raw: Raw, name: str, source: Source) -> Iterator[str]:
+    """Yield that the line below the head and the mapping state two units of a column."""
+    stated, own = raw.units.get(source.column, ""), unit_or_none(name)
+    if not stated or own is None or source.unit == DATE or isinstance(source.gain, str):
+        return
+    agreed = agree(stated, source.unit, source.gain, name)
+    row = f"{name}: line {raw.units_line} of the file states {stated} for the column"
+    if agreed is False:
+        gain = "" if source.gain == 1.0 else f" times {source.gain:g}"
+        used = f"{source.unit or own}{gain}"
+        yield f"{row} {source.column!r}, and the mapping {used}; which one is right?"
+    elif agreed is None and not source.unit and source.gain == 1.0:
+        yield f"{row} {source.column!r}, which is not a unit that is known; is it in {own}?"
 
 
 def _condition(raw: Raw, where: str, name: str, source: Source) -> float | str | Values:

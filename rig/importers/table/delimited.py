@@ -21,6 +21,9 @@ MARKS = ("#", "%")
 LEAST_LINES, MOST_NOTES = 4, 200
 """Lines from which notes above a head are distinguished from samples, and the most notes."""
 
+BRACKETS = " []()"
+"""What a unit below the head may stand in."""
+
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "space"}
 TRUTHS = {"true": "1", "false": "0"}
 
@@ -70,10 +73,13 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
     first = [cell.strip() for cell in rows[0][1]]
     names = _unique(first) if has_head else [str(k + 1) for k in range(len(first))]
     body = rows[1:] if has_head else rows
+    units, units_line = dict[str, str](), 0
     if has_head and _holds_units(body, decimal):
-        line, cells = body.pop(0)
+        units_line, cells = body.pop(0)
         held = ", ".join(cell.strip() or "nothing" for cell in cells)
-        remarks.append(f"line {line} below the head is left out: it holds {held}")
+        remarks.append(f"line {units_line} below the head is taken as units: it holds {held}")
+        stated = [cell.strip(BRACKETS) for cell in cells]
+        units = {name: unit for name, unit in zip(names, stated, strict=False) if unit.strip("-")}
     _check_widths(path, body, len(names))
     columns = {}
     for place, name in enumerate(names):
@@ -82,7 +88,7 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
             cells = [cell.replace(decimal, ".") for cell in cells]
         columns[name] = numbers_or_text(cells)
     first_line = body[0][0] if body else 0
-    return Raw(path, columns, remarks=tuple(remarks), first_line=first_line)
+    return Raw(path, columns, {}, tuple(remarks), first_line, units, units_line)
 
 
 def _text(path: Path) -> str:

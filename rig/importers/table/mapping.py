@@ -215,7 +215,7 @@ def _check_source(mapping: ColumnMapping, part: str, name: str, source: Source) 
         raise UsageError(
             f"{where}: {source.unit!r} is not a unit of {name}, which is in {own}.",
             fix=f"Write a unit of {own}, or the name {_renamed(name, source.unit)}."
-            if source.unit != "count"
+            if source.unit not in ("count", "counts")
             else "Write the size of a count, such as rev/4096, 0.01 mm or 0.4/255 A.",
         )
 

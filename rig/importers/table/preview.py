@@ -12,7 +12,7 @@ import numpy as np
 from estimation.channels import unit_of
 from estimation.recording import FloatArray, Recording
 from rig.importers.derivatives import fault, pairs
-from rig.importers.questions import apart, of_channel
+from rig.importers.questions import of_channel, of_runs
 from rig.importers.table.raw import Remark
 from rig.output.table import counted
 
@@ -108,7 +108,7 @@ def preview(recordings: Sequence[Recording], remarks: Sequence[Remark]) -> Previ
         tuple(_run(recording) for recording in recordings),
         tuple(_channel(name, recordings) for name in names),
         shown,
-        (*_grouped(together, "runs"), *apart(recordings)),
+        (*_grouped(together, "runs"), *of_runs(recordings)),
         tuple(_grouped(remarks, "files")),
     )
 

@@ -30,6 +30,8 @@ class Raw:
         fields: Name to a value that holds for the whole file.
         remarks: What was found out about the layout, in words.
         first_line: Line of the file that holds the first sample; 0 where it has no lines.
+        units: Column to what a line of units below the head states of it; nothing where none does.
+        units_line: That line.
     """
 
     path: Path
@@ -37,6 +39,8 @@ class Raw:
     fields: dict[str, float | str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     first_line: int = 0
+    units: Mapping[str, str] = field(default_factory=dict)
+    units_line: int = 0
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))

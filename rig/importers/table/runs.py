@@ -127,6 +127,7 @@ def _run(samples: Samples, part: slice, name: str, remarks: list[Remark]) -> Rec
             rig=mapping.name,
             started_at_ns=start_ns,
             source=str(samples.raw.path),
+            doubts=samples.doubts,
         )
     except RecordingError as error:
         raise DataError(f"{samples.raw.path}: {error.what}", error.why, error.fix) from error

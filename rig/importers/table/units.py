@@ -22,6 +22,7 @@ BASE: dict[str, tuple[float, dict[str, int]]] = {
     "ratio": (1.0, {}),
     "%": (0.01, {}),
     "count": (1.0, {"count": 1}),
+    "counts": (1.0, {"count": 1}),
     "rad": (1.0, {"rad": 1}),
     "deg": (math.radians(1), {"rad": 1}),
     "°": (math.radians(1), {"rad": 1}),
@@ -86,6 +87,9 @@ ALONE = ("deg", "°", "rpm", "mNm", "degC", "°C")
 
 PLAIN = {"rad": "rad", "s": "s", "m": "m", "min": "min", "n": "N"}
 """What may stand with one of them: `v_mm_s`, `speed deg/s`."""
+
+ALIKE = 1e-3
+"""Relative difference of two factors that are one, such as 9.81 and 9.80665."""
 
 IN_WORDS = {unit.lower(): unit for unit in UNMISTAKABLE} | PLAIN
 
@@ -158,6 +162,31 @@ def conversion(unit: str, name: str) -> Unit | None:
     wanted = read_unit(unit_of(name))
     same = given.powers == wanted.powers
     return Unit(given.factor / wanted.factor, given.powers, given.shift) if same else None
+
+
+def agree(stated: str, unit: str, gain: float, name: str) -> bool | None:
+    """Return whether a file and a mapping state the same unit of a column; None if unreadable.
+
+    A gain may turn one unit into the other, and any unit into one of another dimension.
+
+    Args:
+        stated: What the file states.
+        unit: What the mapping states; nothing means the SI unit of the channel.
+        gain: Factor of the mapping.
+        name: The channel.
+    """
+    try:
+        given = read_unit(IN_WORDS.get(stated.lower(), stated))
+    except NotAUnitError:
+        return None
+    wanted, used = read_unit(unit_of(name)), read_unit(unit or unit_of(name))
+    if given.powers != wanted.powers:
+        sized = bool(unit) and "count" in given.powers  # such as rev/4096
+        return sized or gain != 1.0
+    sizes = (used.factor, abs(gain) * used.factor)
+    return given.shift == used.shift and any(
+        math.isclose(given.factor, s, rel_tol=ALIKE) for s in sizes
+    )
 
 
 def stated_in_name(column: str, name: str) -> str:

@@ -9,8 +9,10 @@ import pytest
 from scipy.io import savemat
 
 from rig.errors import RigError, UsageError
+from rig.importers.questions import questions
 from rig.importers.table.mapping import read_mapping
-from rig.importers.table.open import open_table
+from rig.importers.table.open import open_table, read_runs
+from rig.importers.table.preview import preview
 
 TABLE = "time,angle,current\n" + "".join(f"{k / 100},{k},{2 * k}\n" for k in range(20))
 GOOD = """[machine]
@@ -194,3 +196,70 @@ def test_a_unit_of_another_quantity_in_the_name_of_a_column(tmp_path):
     )
     assert "the name of the column 'angle_rpm' states rpm" in said
     assert "if they are in SI units, write motor_angle_rad = 'angle_rpm:rad'" in said
+
+
+GERMAN = "Zeit;Weg;Kraft\n[ISO];[mm];[kgf]\n" + "".join(
+    f"2026-03-12T09:43:{k // 10:02d}.{k % 10}00;{np.sin(k / 3):.3f};{np.cos(k / 4):.3f}\n".replace(
+        ".", ","
+    )
+    for k in range(100)
+)
+MAPPED = """[data.columns]
+time_s = "Zeit:iso8601"
+slide_position_m = "Weg:mm"
+load_force_n = "Kraft:kgf"
+"""
+"""A table with a row of units, and the mapping that agrees with it."""
+
+
+@pytest.mark.parametrize(
+    ("row", "stated"),
+    [
+        ("kgf", "kgf"),
+        ("(kgf)", "kgf"),
+        ("counts", "counts"),  # another quantity
+    ],
+)
+def test_a_row_of_units_below_the_head_is_not_passed_over(tmp_path, row, stated):
+    table = GERMAN.replace("[kgf]", row)
+    said = refused(tmp_path, table, MAPPED.replace("Kraft:kgf", "Kraft"))
+    assert f"line 2 of run.csv states {stated} for the column 'Kraft'" in said
+    assert "bench.toml, line 4" in said
+    assert "load_force_n = 'Kraft:kgf'" in said or "load_force_n = 'Kraft:N'" in said
+
+
+def asked_of(folder, table, mapping):
+    """Return the questions about the runs of a table, of a preview and of any other command."""
+    path, file = folder / "run.csv", folder / "bench.toml"
+    path.write_text(table, encoding="utf-8")
+    file.write_text(mapping)
+    shown = preview(list(read_runs(path, read_mapping(file, []), [])), []).questions
+    assert shown == questions(list(open_table(path, read_mapping(file, []))))
+    return shown
+
+
+def test_a_row_of_units_that_contradicts_the_mapping_is_asked_about(tmp_path):
+    (said,) = asked_of(tmp_path, GERMAN, MAPPED.replace("kgf", "N"))
+    assert "line 2 of the file states kgf for the column 'Kraft', and the mapping N" in said
+    assert said.startswith("load_force_n: ")
+    (said,) = asked_of(tmp_path, GERMAN.replace("[kgf]", "[Lbs]"), MAPPED.replace(":kgf", ""))
+    assert "states Lbs for the column 'Kraft', which is not a unit" in said
+    assert said.endswith("is it in N?")
+
+
+AGREES = {
+    "as mapped": ("kgf", '"Kraft:kgf"'),
+    "in SI units": ("N", '"Kraft"'),
+    "nothing": ("-", '"Kraft"'),
+    "a gain of that size": ("kgf", '{ column = "Kraft", gain = -9.80665 }'),
+    "a lever": ("kgf", '{ column = "Kraft", unit = "kgf", gain = 2.0 }'),
+    "an amplifier": ("mV", '{ column = "Kraft", unit = "N", gain = 1.7 }'),
+    "counts of a known size": ("counts", '"Kraft:0.4/255 N"'),
+}
+
+
+@pytest.mark.parametrize("case", AGREES.values(), ids=AGREES)
+def test_a_row_of_units_that_agrees_with_the_mapping(tmp_path, case):
+    row, source = case
+    mapping = MAPPED.replace('"Kraft:kgf"', source)
+    assert asked_of(tmp_path, GERMAN.replace("[kgf]", f"[{row}]"), mapping) == []

@@ -58,6 +58,17 @@ def test_a_position_that_switches_to_and_fro_does_not_wrap(tmp_path):
     assert questions(tmp_path, time_s=TIME, motor_angle_rad=angle) == []
 
 
+def test_a_run_whose_zero_moved_is_asked_about(tmp_path):
+    for number in range(8):
+        zero = np.full(TIME.size, 3.0 if number == 5 else 1 + 0.01 * number)
+        wave = (1 + 0.01 * number) * WAVE
+        columns = {"time_s": TIME, "motor_angle_rad": wave, "zero": zero}
+        text_table(tmp_path / f"run{number}.csv", columns)
+    mapping = read_mapping(None, [(("conditions", "motor_zero_offset_rad"), "zero", "")])
+    (found,) = preview(list(read_runs(tmp_path, mapping, [])), []).questions
+    assert found.startswith("motor_zero_offset_rad: run5 has its zero at 3")
+
+
 def of_runs(tmp_path, angles, currents):
     """Return the questions about runs of these sizes of an angle and a current."""
     for number, (angle, current) in enumerate(zip(angles, currents, strict=True)):
