@@ -9,6 +9,7 @@ from typing import Any
 
 from rig.campaigns.index import IndexedCampaign, IndexedRun
 from rig.errors import UsageError
+from rig.importers.table.raw import is_number
 
 COMPARISONS: Mapping[str, Callable[[Any, Any], bool]] = {
     "<=": operator.le,
@@ -37,11 +38,13 @@ def search(campaigns: Sequence[IndexedCampaign], terms: Sequence[str]) -> list[I
     the campaign's folder, fields, notes and findings.
 
     Raises:
-        UsageError: A name that no run has.
+        UsageError: A name that no run has, or a word that is compared with numbers alone.
     """
     comparisons = [(p[1], p[2], p[3]) for term in terms if (p := TERM.fullmatch(term))]
     words = [term.lower() for term in terms if not TERM.fullmatch(term)]
     _check_names(campaigns, [name for name, _, _ in comparisons])
+    for one in comparisons:
+        _check_value(campaigns, *one)
     found = []
     for campaign in campaigns:
         of_all = " ".join([str(campaign.folder), verdict(campaign), *families(campaign)]).lower()
@@ -75,8 +78,7 @@ def _text(run: IndexedRun) -> str:
 
 def _meets(run: IndexedRun, campaign: IndexedCampaign, one: Comparison) -> bool:
     name, sign, text = one
-    known = {**run.conditions, **{field: getattr(run, field) for field in FIELDS}}
-    value: Any = verdict(campaign) if name == VERDICT else known.get(name)
+    value = _value(run, campaign, name)
     if value is None:
         return False
     if isinstance(value, str):
@@ -87,6 +89,25 @@ def _meets(run: IndexedRun, campaign: IndexedCampaign, one: Comparison) -> bool:
         return COMPARISONS[sign](value, float(text))
     except ValueError:
         return False
+
+
+def _value(run: IndexedRun, campaign: IndexedCampaign, name: str) -> Any:
+    """Return a field or a condition of a run; None where it has none of this name."""
+    known = {**run.conditions, **{field: getattr(run, field) for field in FIELDS}}
+    return verdict(campaign) if name == VERDICT else known.get(name)
+
+
+def _check_value(campaigns: Sequence[IndexedCampaign], name: str, sign: str, text: str) -> None:
+    """Refuse a word where every run has a number."""
+    values = [_value(run, campaign, name) for campaign in campaigns for run in campaign.runs]
+    there = [value for value in values if value is not None]
+    if is_number(text) or not there or any(isinstance(value, str) for value in there):
+        return
+    raise UsageError(
+        f"{name}{sign}{text}: {text!r} is not a number.",
+        f"{name} is a number in every run, from {min(there):g} to {max(there):g}.",
+        f"Write a number with a point, such as '{name}{sign}{min(there):g}'.",
+    )
 
 
 def _check_names(campaigns: Sequence[IndexedCampaign], asked: Sequence[str]) -> None:

@@ -165,6 +165,14 @@ def test_a_condition_that_no_run_has_is_an_error_with_the_nearest_name(root, sai
     assert "'load_command_a'" in said("campaigns load_comand_a=1 --root", root, code=2).err
 
 
+@pytest.mark.parametrize("value", ["abc", "0,5", ""])
+def test_a_word_is_not_compared_with_a_number(root, said, value):
+    """It found nothing, which looks as if nothing were recorded."""
+    err = said(f"campaigns load_command_a>={value} --root", root, code=2).err
+    assert f"{value!r} is not a number" in err
+    assert "Write a number with a point, such as 'load_command_a>=" in err
+
+
 def test_a_diagnosis_appears_when_it_is_written(rig, root):
     assert [c["diagnosis"] for c in rig()["campaigns"]] == [None, None]
     diagnosed(root / "tuesday")
