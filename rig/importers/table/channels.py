@@ -10,7 +10,7 @@ from estimation.channels import UnknownUnitError, unit_of, unit_or_none
 from estimation.recording import FloatArray
 from rig.errors import DataError, UsageError
 from rig.importers.table.data import DATE, TIME, Source
-from rig.importers.table.delimited import bad_cell
+from rig.importers.table.delimited import after_samples, bad_cell
 from rig.importers.table.formula import names_in
 from rig.importers.table.mapping import ColumnMapping, worked_out
 from rig.importers.table.raw import Raw, Values
@@ -141,12 +141,13 @@ def _channel(raw: Raw, where: str, name: str, source: Source) -> FloatArray:
     if not isinstance(found, np.ndarray):
         found = np.full(len(raw), found)
     if found.dtype.kind not in "fiub":
+        what, fix = str(found[0]), "Correct the file, or map another column."
+        if source.column in raw.columns:
+            what, fix = bad_cell(raw, source.column)
+        if name == TIME and _date(str(found[0])) is not None:
+            fix = f"Write {TIME} = '{source.column}:{DATE}'."
         raise DataError(
-            f"{where}: column {source.column!r} of {raw.path.name} is not numbers:"
-            f" {bad_cell(raw, source.column) if source.column in raw.columns else found[0]}.",
-            fix=f"Write {TIME} = '{source.column}:{DATE}'."
-            if name == TIME and _date(str(found[0])) is not None
-            else "Correct the file, or map another column.",
+            f"{where}: column {source.column!r} of {raw.path.name} is not numbers: {what}.", fix=fix
         )
     values = _in_si(raw, where, name, source, found.astype(np.float64))
     if not np.isfinite(values).any():
@@ -255,15 +256,16 @@ def _condition(raw: Raw, where: str, name: str, source: Source) -> float | str |
 def _dates(raw: Raw, where: str, source: Source) -> tuple[FloatArray, int | None]:
     cells = find(raw, where, TIME, source.column)
     assert isinstance(cells, np.ndarray)  # noqa: S101  a single value has no clock
-    at = []
-    for index, cell in enumerate(cells):
-        found = _date(str(cell))
-        if found is None:
-            raise DataError(
-                f"{raw.path}, {raw.row(index)}: {str(cell)!r} is not a date.",
-                "The time is mapped with the unit iso8601, such as 2024-05-01T12:00:00.25.",
-            )
-        at.append(found)
+    read = [_date(str(cell)) for cell in cells]
+    at = [one for one in read if one is not None]
+    if len(at) < len(read):
+        index = read.index(None)
+        raise DataError(
+            f"{raw.path}, {raw.row(index)}: {str(cells[index])!r} is not a date.",
+            "The time is mapped with the unit iso8601, such as 2024-05-01T12:00:00.25.",
+            after_samples(raw, [one is not None for one in read], index)
+            or "Correct the file, or map another column.",
+        )
     since = np.array([(one - at[0]).total_seconds() for one in at])
     if at[0].date() == NO_DATE:  # a time of the day alone: a run may go past midnight
         return since + DAY_S * np.cumsum(np.diff(since, prepend=0.0) < -0.5 * DAY_S), None

@@ -117,6 +117,11 @@ class Runs(Section):
     least_s: Annotated[FiniteFloat, Field(ge=0)] | None = None
 
 
+def _several(value: Any) -> Any:
+    """Return one text as several, such as the command line states it."""
+    return (value,) if isinstance(value, str) else value
+
+
 class Layout(Section):
     """How a file is laid out, as far as it is stated.
 
@@ -127,6 +132,8 @@ class Layout(Section):
         decimal: Decimal sign of a text table; None follows the first numbers.
         comment: What a line to be skipped begins with.
         skip_lines: Lines before the head.
+        skip_last_lines: Lines after the samples of a text table; empty ones do not count.
+        missing: Texts in a cell of a text table that mean that nothing was read.
         rows: Key of a JSON object that holds the samples.
         trials: Pattern of the variables of a `.mat` or `.npz` that hold one run each.
     """
@@ -137,6 +144,8 @@ class Layout(Section):
     decimal: Literal[".", ","] | None = None
     comment: str = ""
     skip_lines: Annotated[int, Field(ge=0)] = 0
+    skip_last_lines: Annotated[int, Field(ge=0)] = 0
+    missing: Annotated[tuple[str, ...], BeforeValidator(_several)] = ()
     rows: str = ""
     trials: str = ""
 

@@ -2,11 +2,11 @@
 
 import csv
 import gzip
+import re
 import zlib
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-
-import numpy as np
 
 from rig.errors import DataError
 from rig.importers.table.data import Layout
@@ -25,6 +25,11 @@ BRACKETS = " []()"
 """What a unit below the head may stand in."""
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "space"}
+THOUSANDS = re.compile(
+    r"[-+]?\d{1,3}(?:(?P<sign>[.,' ])\d{3})(?:(?P=sign)\d{3})*(?:(?!(?P=sign))[.,]\d*)?"
+)
+"""A number with signs between thousands: 1.234,50 or 1,234.50 or 1'234."""
+
 TRUTHS = {"true": "1", "false": "0"}
 
 
@@ -37,7 +42,7 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
         DataError: It is not text, is empty, or a line has another number of fields than the first.
     """
     text = _text(path)
-    lines = text.splitlines()
+    lines = _without_last(text.splitlines(), layout)
     start = layout.skip_lines
     while start < len(lines) and _is_blank(lines[start], layout.comment):
         start += 1
@@ -60,7 +65,8 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
         ]
     except csv.Error as error:
         raise DataError(f"{path} cannot be read as a text table: {error}.") from error
-    if not text.endswith(("\n", "\r")):
+    is_cut = not text.endswith(("\n", "\r"))
+    if is_cut and not layout.skip_last_lines:
         remarks.append("the last line has no line end, so it may be cut off")
     decimal = layout.decimal or _decimal(rows, separator)
     if decimal == "," and not layout.decimal:
@@ -80,15 +86,24 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
         remarks.append(f"line {units_line} below the head is taken as units: it holds {held}")
         stated = [cell.strip(BRACKETS) for cell in cells]
         units = {name: unit for name, unit in zip(names, stated, strict=False) if unit.strip("-")}
-    _check_widths(path, body, len(names))
-    columns = {}
-    for place, name in enumerate(names):
-        cells = [TRUTHS.get(cells[place].strip().lower(), cells[place]) for _, cells in body]
-        if decimal != ".":
-            cells = [cell.replace(decimal, ".") for cell in cells]
-        columns[name] = numbers_or_text(cells)
+    _check_widths(path, body, len(names), is_cut)
+    words = TRUTHS | dict.fromkeys((text.strip().lower() for text in layout.missing), "")
+    columns = {
+        name: numbers_or_text(
+            [words.get(cells[place].strip().lower(), cells[place]) for _, cells in body], decimal
+        )
+        for place, name in enumerate(names)
+    }
     first_line = body[0][0] if body else 0
-    return Raw(path, columns, {}, tuple(remarks), first_line, units, units_line)
+    return Raw(path, columns, {}, tuple(remarks), first_line, units, units_line, decimal)
+
+
+def _without_last(lines: list[str], layout: Layout) -> list[str]:
+    """Return the lines up to the last sample."""
+    if not layout.skip_last_lines:
+        return lines
+    own = [k for k, line in enumerate(lines) if not _is_blank(line, layout.comment)]
+    return lines[: own[-layout.skip_last_lines]] if layout.skip_last_lines <= len(own) else []
 
 
 def _text(path: Path) -> str:
@@ -251,22 +266,57 @@ def _unique(names: list[str]) -> list[str]:
     ]
 
 
-def _check_widths(path: Path, body: list[tuple[int, list[str]]], width: int) -> None:
-    for place, (line, cells) in enumerate(body):
-        if len(cells) == width:
-            continue
-        last = place == len(body) - 1
-        raise DataError(
-            f"{path}, line {line}: {len(cells)} fields, not {width} as in the first line.",
-            "The file ends in the middle of this line." if last and len(cells) < width else "",
-            f"Delete line {line} or save the file again." if last else f"Correct line {line}.",
-        )
+def _check_widths(path: Path, body: list[tuple[int, list[str]]], width: int, is_cut: bool) -> None:
+    wrong = [place for place, (_, cells) in enumerate(body) if len(cells) != width]
+    if not wrong:
+        return
+    place, count = wrong[0], len(body) - wrong[0]
+    line, cells = body[place]
+    fix = f"Delete line {line} or save the file again." if count == 1 else f"Correct line {line}."
+    raise DataError(
+        f"{path}, line {line}: {len(cells)} fields, not {width} as in the first line.",
+        "The file ends in the middle of this line."
+        if is_cut and count == 1 and len(cells) < width
+        else "",
+        f"{fix} {_not_samples(count)}" if count == len(wrong) <= MOST_NOTES else fix,
+    )
 
 
-def bad_cell(raw: Raw, name: str) -> str:
-    """Return where a text column's first cell that is not a number stands, and what it holds."""
-    cells = [str(cell) for cell in raw.columns[name]]
-    for index, cell in enumerate(cells):
-        if cell.strip() and not is_number(cell):
-            return f"{raw.row(index)} holds {cell[:30]!r}"
-    return f"{raw.row(int(np.argmin([bool(cell) for cell in cells])))} is empty"
+def _not_samples(count: int) -> str:
+    lines = (
+        "the last line is not a sample" if count == 1 else f"the last {count} lines are not samples"
+    )
+    return f"If {lines}, write skip_last_lines = {count} under [data]."
+
+
+def after_samples(raw: Raw, fits: Sequence[bool], first: int) -> str:
+    """Return the remedy where no cell of a column from one on fits; nothing where one does.
+
+    These are probably lines after the samples.
+    """
+    count = len(fits) - first
+    if not raw.decimal or not first or count > MOST_NOTES or any(fits[first:]):
+        return ""
+    return _not_samples(count)
+
+
+def bad_cell(raw: Raw, name: str) -> tuple[str, str]:
+    """Return where a text column's first cell that is not a number is, with it, and the remedy."""
+    cells = [str(cell).strip() for cell in raw.columns[name]]
+    fits = [_is_number(cell, raw.decimal or ".") for cell in cells]
+    index = next((k for k, cell in enumerate(cells) if cell and not fits[k]), None)
+    if index is None:
+        return f"{raw.row(cells.index(''))} is empty", "Map another column."
+    cell = cells[index]
+    what = f"{raw.row(index)} holds {cell[:30]!r}"
+    if sign := THOUSANDS.fullmatch(cell):
+        bare = cell.replace(sign["sign"], "")
+        return what, f"Save the file without the sign between thousands, such as {bare}."
+    if len(raw) == 1:
+        return what, "It is the only line below the head: name a file with samples."
+    if not raw.decimal:
+        return what, "Correct the file, or map another column."
+    if _is_number(cell, ","):
+        return what, "If numbers have a decimal comma, write decimal = ',' under [data]."
+    meant = f"If {cell!r} means that nothing was read, write missing = [{cell!r}] under [data]."
+    return what, " ".join(filter(None, (after_samples(raw, fits, index), meant)))

@@ -32,6 +32,7 @@ class Raw:
         first_line: Line of the file that holds the first sample; 0 where it has no lines.
         units: Column to what a line of units below the head states of it; nothing where none does.
         units_line: That line.
+        decimal: Decimal sign of a text table; empty for any other file.
     """
 
     path: Path
@@ -41,6 +42,7 @@ class Raw:
     first_line: int = 0
     units: Mapping[str, str] = field(default_factory=dict)
     units_line: int = 0
+    decimal: str = ""
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -101,9 +103,10 @@ def is_number(text: str) -> bool:
     return "_" not in text
 
 
-def numbers_or_text(cells: list[str]) -> Values:
-    """Return cells as float64; an empty one is not a number; text if any is neither."""
+def numbers_or_text(cells: list[str], decimal: str = ".") -> Values:
+    """Return cells as float64; an empty one is not a number; text, as it is, if any is neither."""
     with suppress(ValueError):
         if not any("_" in cell for cell in cells):
-            return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+            numbers = cells if decimal == "." else [cell.replace(decimal, ".") for cell in cells]
+            return np.array([float(cell) if cell.strip() else np.nan for cell in numbers])
     return np.array([cell.strip() for cell in cells])

@@ -127,6 +127,8 @@ TABLES = {
     "an empty file": ("", "run.csv is empty"),
     "nothing but a head": (ROWS[0], "no samples"),
     "a picture": (PICTURE, "is not a text table"),
+    "a head and units": (ROWS[0] + "s,deg,A\n", "line 2", "name a file with samples"),
+    "a decimal comma in one line": ("time;angle\n1;2\n2;3\n3;4\n4;4,5\n", "decimal = ','"),
     "half a file": (TABLE[:-4], "line 21", "ends in the middle of this line"),
     "no file": (None, "There is no file"),
     "compressed and cut": (gzip.compress(TABLE.encode())[:-9], "cannot be decompressed"),
@@ -263,3 +265,50 @@ def test_a_row_of_units_that_agrees_with_the_mapping(tmp_path, case):
     row, source = case
     mapping = MAPPED.replace('"Kraft:kgf"', source)
     assert asked_of(tmp_path, GERMAN.replace("[kgf]", f"[{row}]"), mapping) == []
+
+
+LAST = GERMAN.splitlines()[-1]
+IN_A_CELL = {
+    "a sign between thousands": ("1.234,50", "'1.234,50'", "sign between thousands"),
+    "a text for no value": ("OVERLOAD", "'OVERLOAD'", "missing = ['OVERLOAD'] under [data]"),
+}
+
+
+@pytest.mark.parametrize("case", IN_A_CELL.values(), ids=IN_A_CELL)
+def test_a_cell_that_is_not_a_number_is_quoted_with_its_remedy(tmp_path, case):
+    cell, *words = case
+    lines = GERMAN.splitlines()
+    lines[49] = ";".join([*lines[49].split(";")[:2], cell])
+    said = refused(tmp_path, "\n".join(lines) + "\n", MAPPED)
+    assert "line 50 holds" in said
+    assert all(word in said for word in words), said
+
+
+def test_a_text_that_means_no_value_is_flagged_as_an_empty_cell(tmp_path):
+    lines = GERMAN.splitlines()
+    lines[49] = ";".join([*lines[49].split(";")[:2], "OVERLOAD"])
+    (tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
+    flags = [(("missing",), ["OVERLOAD"], "")]
+    (tmp_path / "bench.toml").write_text(MAPPED)
+    (run,) = open_table(tmp_path / "run.csv", read_mapping(tmp_path / "bench.toml", flags))
+    assert np.flatnonzero(~run.valid).tolist() == [47]
+
+
+FOOTERS = {
+    "where a date is": "Ende der Messung;;\nMax;20;100\n",
+    "where a number is": LAST + "\n" + LAST.replace(LAST.split(";")[1], "Weg") + "\n",
+    "of another width": "Ende der Messung\n\nMax;100\n",
+}
+
+
+@pytest.mark.parametrize("footer", FOOTERS.values(), ids=FOOTERS)
+def test_lines_after_the_samples_are_left_out_where_the_error_states_how(tmp_path, footer):
+    said = refused(tmp_path, GERMAN + footer, MAPPED)
+    assert "line 103" in said or "line 104" in said
+    found = re.search(r"skip_last_lines = (\d+) under \[data\]", said)
+    assert found, said
+    flags = [(("skip_last_lines",), int(found[1]), "")]
+    mapping = read_mapping(tmp_path / "bench.toml", flags)
+    (run,) = open_table(tmp_path / "run.csv", mapping)
+    assert len(run) == 100
+    assert run.valid.all()
