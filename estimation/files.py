@@ -17,6 +17,13 @@ class OutputError(EstimationError):
     """An output cannot be written where it was asked for."""
 
 
+def not_utf8(error: UnicodeDecodeError) -> tuple[str, str]:
+    """Return why a text file cannot be read, with the line, and the remedy."""
+    line = error.object.count(b"\n", 0, error.start) + 1
+    why = f"Line {line} holds a character that is not UTF-8, such as an umlaut in Latin-1."
+    return why, "Save the file as UTF-8."
+
+
 def write_text_atomic(path: Path, text: str) -> None:
     """Write a text file as UTF-8, see `write_bytes_atomic`."""
     write_bytes_atomic(path, text.encode("utf-8"))

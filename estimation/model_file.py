@@ -23,7 +23,7 @@ import difflib
 import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
@@ -31,7 +31,7 @@ from typing import Any, cast, get_args
 
 from estimation.effects import effect
 from estimation.errors import EstimationError, UnknownNameError, nearest
-from estimation.files import write_text_atomic
+from estimation.files import not_utf8, write_text_atomic
 from estimation.filters import LowPass
 from estimation.model import Estimate, Evidence, Model, ModelError, Term
 from estimation.plant_file import shipped_plant
@@ -106,7 +106,9 @@ def read_all(path: Path) -> list[Model]:
         )
     try:
         text = place.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise ModelFileError(f"{path} is not a model file.", *not_utf8(error)) from error
+    except OSError as error:
         raise ModelFileError(
             f"The model file {path} cannot be read.", str(error), f"Shipped: {', '.join(names())}."
         ) from error
@@ -272,7 +274,7 @@ def _check_units(term: Term, target: str, stated: Mapping[str, str]) -> None:
                 f"{term.effect.id}: {parameter.name} is stated in {stated[parameter.name]!r},"
                 f" not in {unit!r}.",
                 "The unit follows from the target and the channels.",
-                f"Convert the value to {unit} and state that unit.",
+                f'Convert the value to {unit}, and write unit = "{unit}".',
             )
 
 

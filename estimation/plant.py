@@ -304,9 +304,8 @@ def _check_axes(plant: Plant) -> None:
             )
     for place, axis_name in _named_axes(plant):
         if axis_name not in names:
-            why = "" if names else "The file has no [[axis]]."
-            fix = nearest(axis_name, names) if names else "Add one."
-            raise PlantError(place, f"There is no axis {axis_name!r}.", why, fix)
+            fix = nearest(axis_name, names) if names else "Add an [[axis]] to the file."
+            raise PlantError(place, f"There is no axis {axis_name!r}.", fix=fix)
 
 
 def _named_axes(plant: Plant) -> Iterable[tuple[Place, str]]:
@@ -326,8 +325,12 @@ def _check_sensor(plant: Plant, sensor: Sensor, place: Place) -> None:
     for key in ("counts", "rate_hz", "noise", "delay_s"):
         value = getattr(sensor, key)
         if value is not None and (value < 0.0 or (value == 0.0 and key in ("counts", "rate_hz"))):
+            least = "more than 0" if key in ("counts", "rate_hz") else "0 or more"
             raise PlantError(
-                (*place[:2], key), f"The sensor {sensor.name!r} has {key} = {value:g}."
+                (*place[:2], key),
+                f"The sensor {sensor.name!r} has {key} = {value:g}.",
+                f"It is {least}.",
+                f"Write {key} = NUMBER, or delete the line.",
             )
     if sensor.reads not in ("position", "speed", "effort"):
         return

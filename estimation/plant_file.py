@@ -32,7 +32,7 @@ from typing import Any, cast, get_args
 
 from estimation.channels import unit_of
 from estimation.errors import EstimationError, UnknownNameError
-from estimation.files import write_text_atomic
+from estimation.files import not_utf8, write_text_atomic
 from estimation.plant import (
     Actuator,
     Axis,
@@ -81,7 +81,9 @@ def read(path: Path) -> Plant:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
         raise NoPlantError(f"There is no machine file {path}.", fix="Check the path.") from error
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise PlantFileError(f"{path} is not a machine file.", *not_utf8(error)) from error
+    except OSError as error:
         raise PlantFileError(f"The machine file {path} cannot be read.", str(error)) from error
     return parse(text, str(path))
 
@@ -95,7 +97,11 @@ def parse(text: str, where: str = "machine") -> Plant:
     lines = Lines(text)
     top = Table(content, where, PlantFileError, lines)
     if top.take("schema", str) != SCHEMA:
-        raise PlantFileError(f'{top.at("schema")}: the schema is not "{SCHEMA}".')
+        raise PlantFileError(
+            f'{top.at("schema")}: the schema is not "{SCHEMA}".',
+            "It is that of another version of rig, or of another kind of file.",
+            f'Write schema = "{SCHEMA}"; `rig machine new` writes a file of this version.',
+        )
     try:
         plant = _plant(top)
         equations(plant)  # names must be unique

@@ -18,6 +18,16 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", bound="DataclassInstance")
 
+KINDS: Mapping[type, tuple[str, str]] = {
+    bool: ("true or false", "true, or false"),
+    str: ("a text in quotes", '"..."'),
+    int: ("a whole number", "1"),
+    float: ("a number", "1.0"),
+    list: ("a list", "[...]"),
+    dict: ("a table", "{ ... }"),
+}
+"""Type of a value to its name and an example, for messages."""
+
 Place = tuple[str, int, str]
 """A table's name, which one of that name (from 1), and a key; the key is empty for the header."""
 
@@ -93,12 +103,16 @@ class Table:
         if key not in self.content and default is not None:
             return default
         if key not in self.content:
-            near = difflib.get_close_matches(key, self.content, n=1, cutoff=0.4)
+            near = difflib.get_close_matches(key, self.content, n=1)
             fix = f"Did you mean {near[0]!r}?" if near else f"Write {key} = ... there."
             raise self.error(f"{self.at()} lacks the key {key!r}.", fix=fix)
         value = self.content[key]
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-            raise self.error(f"{self.at(key)}: {key} = {value!r} is not {kind.__name__}.")
+            name, example = KINDS[kind]
+            raise self.error(
+                f"{self.at(key)}: {key} = {value_text(value)} is not {name}.",
+                fix=f"Write {key} = {example}.",
+            )
         return value
 
     def number(self, key: str, default: float | None = None) -> float:

@@ -82,7 +82,7 @@ def import_(
     """
     from rig.importers.table.channels import NotMappedError
     from rig.importers.table.mapping import read_mapping
-    from rig.importers.table.open import read_runs
+    from rig.importers.table.open import read_runs, require_runs
     from rig.importers.table.preview import preview as look
     from rig.importers.table.raw import Remark
     from rig.machines.shipped import place_of
@@ -109,8 +109,7 @@ def import_(
             raise
         present_columns(error.raw, path, json)
         return
-    if not recordings:
-        raise UsageError(f"No run of {path} is long enough.", fix="Change least_s or the cuts.")
+    require_runs(recordings, path, mapping)
     found = look(recordings, said)
     written = [] if preview or out is None else write_logs(recordings, out)
     lines = [f"Note: {line}." for line in found.remarks]

@@ -28,6 +28,7 @@ from calibration.store import (
 )
 from estimation.channels import UnknownUnitError, unit_of
 from estimation.errors import nearest
+from estimation.files import not_utf8
 from rig.configuration.machine_settings import (
     DriftSection,
     LimitsSection,
@@ -231,12 +232,14 @@ def load_config(path: Path | None = None) -> Config:
     if str(path) in shipped_configs():
         path = SHIPPED / f"{path}.toml"
     try:
-        text = path.read_text()
+        text = path.read_text("utf-8")
         return Config.model_validate(tomllib.loads(text))
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path} is not a configuration.", *not_utf8(error)) from error
+    except OSError as error:
         raise UsageError(
             f"The configuration {path} cannot be read.",
-            str(error),
+            f"{error.strerror}.",
             f"Give a TOML file, or a shipped one by name. {nearest(str(path), shipped_configs())}",
         ) from error
     except tomllib.TOMLDecodeError as error:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
+from estimation.files import not_utf8
 from rig.configuration.sections import Number, Positive, Section
 from rig.configuration.validation import explain
 from rig.errors import UsageError
@@ -295,8 +296,10 @@ def load_protocol(name_or_path: str) -> Protocol:
             "Name a TOML file, or one of the shipped protocols.",
         )
     try:
-        text = path.read_text()
+        text = path.read_text("utf-8")
         return Protocol.model_validate(tomllib.loads(text))
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path} is not a protocol.", *not_utf8(error)) from error
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path} is not TOML.", str(error)) from error
     except ValidationError as error:

@@ -122,6 +122,11 @@ def test_a_declared_model_of_any_machine_survives_its_file(plant):
         ("compliant =", "step =", r"has an unknown key 'step'. Known: name, input, output, ratio,"),
         ("compliant =", "compliannt =", r"line \d+ has an unknown key.*Did you mean 'compliant'"),
         ('input = "motor"', 'input = "moter"', r"line \d+: There is no axis 'moter'.*'motor'"),
+        (
+            'reads = "position"',
+            'counts = 0.0\nreads = "position"',
+            r"line \d+: .* has counts = 0. It is more than 0. Write counts = NUMBER",
+        ),
         ('unit = "rad"', 'unit = "deg"', r"line \d+: The axis 'motor' has the unit 'deg'.*\"rad\""),
         ("ratio = 35.0", "ratio = 0.0", r"line \d+: The ratio of 'gearbox' is zero"),
         ('name = "spindle"', 'name = "motor"', r"line \d+: There are two of the name 'motor'"),
@@ -136,7 +141,7 @@ def test_a_declared_model_of_any_machine_survives_its_file(plant):
         ("cutoff_hz = 50.0", "cutoff_hz = -5.0", r"line \d+: cutoff_hz = -5 is not a cutoff"),
         ("order = 3", "order = 0", r"line \d+: order = 0 is not the order of a filter"),
         ("[machine]", "[machine", "is not TOML"),
-        ("rig.machine/1", "rig.machine/9", r"line 1: the schema is not"),
+        ("rig.machine/1", "rig.machine/9", r"line 1: the schema is not.*Write schema = "),
         ("[[actuator]]", "[[actuater]]", r"line \d+ has an unknown key 'actuater'.*'actuator'"),
     ],
 )

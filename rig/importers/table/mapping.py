@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from estimation.channels import UNIT_BY_SUFFIX, UnknownUnitError, unit_of
 from estimation.derived import origin_of
+from estimation.files import not_utf8
 from rig.configuration.validation import explain, line_of
 from rig.errors import DataError, UsageError
 from rig.importers.table.data import DATE, TIME, Data, Invalid, Runs, Section, Source
@@ -104,7 +105,9 @@ def _content(file: Path) -> tuple[str, dict[str, Any]]:
         raise UsageError(
             f"There is no machine file {file}.", f"Shipped: {shipped}.", "Check the path."
         ) from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{file} is not a machine file.", *not_utf8(error)) from error
+    except (OSError, tomllib.TOMLDecodeError) as error:
         hint = ""
         if "overwrite" in str(error):
             hint = "Two lines state the same key, such as one channel twice: delete one of them."

@@ -1,7 +1,7 @@
 """Opening a table: the files at a path, read by their kind and cut into runs."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,10 +35,30 @@ def open_table(path: Path, mapping: ColumnMapping) -> Campaign:
 
     Raises:
         UsageError: The path does not exist.
-        DataError: A file cannot be read as the mapping states, or a channel contradicts the one
-            that is its derivative.
+        DataError: A file cannot be read as the mapping states, no run is long enough, or a
+            channel contradicts the one that is its derivative.
     """
-    return Campaign.of([checked(run) for run in read_runs(path, mapping, [])])
+    runs = [checked(run) for run in read_runs(path, mapping, [])]
+    require_runs(runs, path, mapping)
+    return Campaign.of(runs)
+
+
+def require_runs(runs: Sequence[Recording], path: Path, mapping: ColumnMapping) -> None:
+    """Refuse a table of which no run is left.
+
+    Raises:
+        DataError: There are none.
+    """
+    if runs:
+        return
+    rules = ", ".join(sorted(mapping.data.runs.model_fields_set))
+    raise DataError(
+        f"No run of {path} is long enough.",
+        f"A run has two samples or more, and [data.runs] states {rules}."
+        if rules
+        else "A run has two samples or more.",
+        f"Change {rules} ({mapping.where('runs')})." if rules else "Name files with more samples.",
+    )
 
 
 def read_runs(path: Path, mapping: ColumnMapping, remarks: list[Remark]) -> Iterator[Recording]:

@@ -129,6 +129,7 @@ TABLES = {
     "a picture": (PICTURE, "is not a text table"),
     "a head and units": (ROWS[0] + "s,deg,A\n", "line 2", "name a file with samples"),
     "a decimal comma in one line": ("time;angle\n1;2\n2;3\n3;4\n4;4,5\n", "decimal = ','"),
+    "one sample": ("".join(ROWS[:2]), "No run", "two samples", "Name files with more samples"),
     "half a file": (TABLE[:-4], "line 21", "ends in the middle of this line"),
     "no file": (None, "There is no file"),
     "compressed and cut": (gzip.compress(TABLE.encode())[:-9], "cannot be decompressed"),
@@ -164,6 +165,18 @@ def test_half_a_file_of_any_format(tmp_path, kind):
     said = refused(tmp_path, content[: len(content) // 2 + 3], name=f"run.{kind}")
     assert f"run.{kind}" in said
     assert any(word in said for word in ("cut off", "damaged", "ends in the middle", "whole"))
+
+
+def test_cuts_of_which_no_run_is_left_are_named(tmp_path):
+    said = refused(tmp_path, mapping=GOOD + "[data.runs]\nleast_s = 60\n")
+    assert "Change least_s (bench.toml, line 6)" in said
+
+
+def test_a_machine_file_that_is_not_utf8_is_named_with_its_line(tmp_path):
+    file = tmp_path / "bench.toml"
+    file.write_bytes(GOOD.replace("bench", "Prüfstand").encode("latin-1"))
+    with pytest.raises(UsageError, match=r"Line 2 holds .* not UTF-8.*Save the file as UTF-8"):
+        read_mapping(file, [])
 
 
 def test_an_archive_of_objects_is_not_unpickled(tmp_path):
