@@ -24,6 +24,10 @@ MANY_FLAGGED = 0.1
 """Share of flagged samples in a run from which they may be why none counts."""
 
 
+CONSTANT = 1e-9
+"""Range of a target, relative to its size, below which it is constant but for rounding."""
+
+
 class FitError(EstimationError):
     """The model's parameters are not identifiable from the campaign."""
 
@@ -167,6 +171,24 @@ def solve(problem: Problem, gram: FloatArray) -> FloatArray:
     normal = gram[:-1, :-1] / np.outer(scale, scale)
     _check_independent(problem, normal, np.diag(gram)[:-1])
     return solve_within(gram[:-1, :-1], gram[:-1, -1], problem.lower, problem.upper)
+
+
+def check_target(problem: Problem) -> None:
+    """Refuse a target that does not vary: any model without any effect fits it.
+
+    Raises:
+        FitError: It is constant; in each run, where runs have offsets of their own.
+    """
+    target = problem.model.target
+    values = [run.thin[target] for run in problem.runs]
+    parts = values if problem.model.run_offsets else [np.concatenate(values)]
+    if problem.free.size and all(np.ptp(x) <= CONSTANT * np.abs(x).max() for x in parts):
+        raise FitError(
+            f"{target} is constant at {float(values[0][0]):.4g} {problem.model.unit}, so no effect"
+            f" can be identified in the equation {problem.model.balance}.",
+            "A sensor that is stuck or not connected reads so.",
+            "Check the sensor and its column, or record runs in which it varies.",
+        )
 
 
 def _check_independent(problem: Problem, normal: FloatArray, power: FloatArray) -> None:

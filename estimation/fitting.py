@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.fit_problem import FitRun, Problem, prepared, problem_of, solve
+from estimation.fit_problem import FitRun, Problem, check_target, prepared, problem_of, solve
 from estimation.model import Estimate, Evidence, Model, estimate, with_values
 from estimation.recording import FloatArray
 from estimation.shape_search import range_of, scaled, search_shape, unscaled
@@ -51,10 +51,12 @@ def fit(
         them, has no spread.
 
     Raises:
-        FitError: No valid sample, or columns that are collinear on these runs.
+        FitError: No valid sample, a target that is constant, or columns that are collinear on these
+            runs.
         MissingChannelError: A run lacks a channel of the model.
     """
     problem = problem_of(model, prepared(model, campaign, every))
+    check_target(problem)
     if shapes == "keep":
         shape = [x for term in model.terms for x in term.numbers(term.effect.shape)]
     else:

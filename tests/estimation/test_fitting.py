@@ -87,6 +87,13 @@ def test_collinear_columns_are_named():
         fit(read(Path("linear")), Campaign.of([still]))
 
 
+def test_a_target_that_is_constant_is_refused():
+    """All effects at zero fit it without error, which looks like a complete model."""
+    stuck = [r.with_columns(proximal_torque_n_m=np.full(len(r), 0.12)) for r in campaign()]
+    with pytest.raises(FitError, match=r"proximal_torque_n_m is constant at 0.12 N m.*connected"):
+        fit(read(Path("motor")), Campaign.of(stuck))
+
+
 def test_a_model_reports_what_is_missing(motor):
     recording = run("a", 0.3, 0.1, seed=1)
     with pytest.raises(NotFittedError, match="declared but not fitted"):

@@ -74,6 +74,10 @@ CASES: dict[str, tuple[Spoil, str]] = {
     ),
     "NaN in one run": (lambda r: [holed(r[0]), *r[1:]], "not finite"),
     "a rig that stands": (every(standing), "Record runs in which the rig moves"),
+    "a torque sensor that is stuck": (
+        every(lambda r: r.with_columns(proximal_torque_n_m=np.full(len(r), 0.12))),
+        "proximal_torque_n_m is constant at 0.12 N m",
+    ),
     "clocks that jump": (every(jumping), "its clock jumps"),
     "two rigs": (of_two(rig="another rig"), "2 rigs"),
     "two instruments": (
