@@ -29,6 +29,7 @@ from estimation.causes.search import Rank, Ranking, hypothesis
 from estimation.changes.candidates import claims
 from estimation.changes.difference import Difference, Predicted
 from estimation.changes.stated import likeliest_first, prior_of_moved, shares, stated
+from estimation.copies import copies
 from estimation.diagnosis.split import SplitError, periods
 from estimation.errors import EstimationError
 from estimation.model import Model
@@ -140,6 +141,22 @@ def _check_number(campaign: str, runs: Sequence[Recording], least: int = 4) -> N
 
 
 def _notes(first: Sequence[Recording], second: Sequence[Recording]) -> tuple[str, ...]:
+    return (*_shared(first, second), *_other_conditions(first, second))
+
+
+def _shared(first: Sequence[Recording], second: Sequence[Recording]) -> tuple[str, ...]:
+    """Return that runs are in both campaigns, where they are."""
+    found = copies([*first, *second])
+    if not found:
+        return ()
+    pairs = ", ".join(f"{original} and {copy}" for copy, original in found.items())
+    return (
+        f"Check: these runs are the same, sample by sample: {pairs}. Is one campaign named twice,"
+        " or was a file copied? A run that is in both shows no change.",
+    )
+
+
+def _other_conditions(first: Sequence[Recording], second: Sequence[Recording]) -> tuple[str, ...]:
     conditions = [
         {repr(sorted((k, str(v)) for k, v in r.conditions.items())) for r in runs}
         for runs in (first, second)

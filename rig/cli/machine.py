@@ -5,7 +5,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from rig.cli.options import FormatOption, complete_machine, group, machine_names, require_new
+from rig.cli.options import (
+    FormatOption,
+    complete_machine,
+    group,
+    machine_names,
+    require_new,
+    say_left_out,
+)
 from rig.errors import ExitCode
 from rig.output.console import JsonFlag, present
 
@@ -75,6 +82,8 @@ def check(
     plant = read_machine(file)
     campaign = None if data is None else open_recordings(data, file, format_)
     found = check_plant(plant, campaign, file, recorded_channels(file))
+    if data is not None and campaign is not None:
+        say_left_out(data, campaign)
     asked = [] if campaign is None else questions(list(campaign.evidence), plant.integrals)
     result = {"machine": plant.name, "check": found, "sound": found.is_sound, "questions": asked}
     present(json_, result, *check_lines(plant, found), *(f"Check: {line}" for line in asked))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.channels import unit_of
+from estimation.copies import copies
 from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.zeros import moved_zeros
 from rig.importers.derivatives import CONFUSED
@@ -73,6 +74,14 @@ def of_runs(recordings: Sequence[Recording]) -> Iterator[str]:
     for doubt in doubts:
         runs = [r.name for r in recordings if doubt in r.doubts]
         yield doubt if len(runs) == len(recordings) else f"{doubt} This is in {', '.join(runs)}."
+    same: dict[str, list[str]] = {}
+    for copy, first in copies(recordings).items():
+        same.setdefault(first, []).append(copy)
+    for first, names in same.items():
+        yield (
+            f"{', '.join((first, *names))}: these runs are the same, sample by sample, and count"
+            " once; was a file copied?"
+        )
     yield from apart(recordings)
     yield from (zero.sentence for zero in moved_zeros(recordings))
 

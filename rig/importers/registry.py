@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from estimation.campaign import Campaign, Run
+from estimation.copies import without_copies
 from estimation.errors import EstimationError
 from estimation.recording import Recording
 from rig.errors import DataError, UsageError
@@ -83,7 +84,7 @@ def _loaded(entry: EntryPoint) -> Importer:
 
 
 def open_campaign(path: Path, format_name: str | None = None, skip_bad: bool = False) -> Campaign:
-    """Open a file, folder or archive of any known format.
+    """Open a file, folder or archive of any known format; a run that is there twice counts once.
 
     Args:
         path: File, folder or archive.
@@ -96,7 +97,7 @@ def open_campaign(path: Path, format_name: str | None = None, skip_bad: bool = F
             run raises it where a channel and its derivative contradict one another, and
             MixedRunsError where it is of another rig or instrument.
     """
-    campaign = _importer(path, format_name).open(path)
+    campaign = without_copies(_importer(path, format_name).open(path))
     first: dict[str, tuple[str, str]] = {}
     runs = [replace(run, load=partial(_read, run, first)) for run in campaign.runs]
     return Campaign(tuple(map(_or_excluded, runs) if skip_bad else runs))

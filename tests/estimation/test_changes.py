@@ -173,6 +173,10 @@ def test_a_third_campaign_is_predicted_best_by_the_changed_model():
 def test_other_conditions_are_remarked_on_and_too_few_runs_refused():
     found = compare(record(1), record(2)[:5], [axis()])
     assert "not recorded under the same conditions" in found.notes[0]
+    again = [replace(r, name=f"{r.name} again") for r in record(1)[:2]]
+    found = compare(record(1), [*again, *record(2)[2:]], [axis()])
+    assert "the same, sample by sample: A:" in found.notes[0]
+    assert "again. Is one campaign named twice" in found.notes[0]
     with pytest.raises(ChangesError, match="3 runs"):
         compare(record(1)[:3], record(2), [axis()])
 

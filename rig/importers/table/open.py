@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from estimation.campaign import Campaign
+from estimation.copies import without_copies
 from estimation.recording import Recording
 from rig.errors import DataError, UsageError
 from rig.importers.derivatives import checked
@@ -33,6 +34,8 @@ READERS: Mapping[str, Callable[[Path, Layout], Raw]] = {
 def open_table(path: Path, mapping: ColumnMapping) -> Campaign:
     """Read the runs of a table, a file or a folder of files, into a campaign.
 
+    A run that is there twice counts once.
+
     Raises:
         UsageError: The path does not exist.
         DataError: A file cannot be read as the mapping states, no run is long enough, or a
@@ -40,7 +43,7 @@ def open_table(path: Path, mapping: ColumnMapping) -> Campaign:
     """
     runs = [checked(run) for run in read_runs(path, mapping, [])]
     require_runs(runs, path, mapping)
-    return Campaign.of(runs)
+    return without_copies(Campaign.of(runs))
 
 
 def require_runs(runs: Sequence[Recording], path: Path, mapping: ColumnMapping) -> None:

@@ -8,9 +8,9 @@ from scipy.io import savemat
 
 from estimation.files import write_text_atomic
 from rig.errors import ExitCode
-from rig.importers.registry import open_campaign
+from rig.importers.registry import left_out, open_campaign
 from rig.importers.table.mapping import read_mapping
-from rig.importers.table.open import read_runs
+from rig.importers.table.open import open_table, read_runs
 from rig.importers.table.preview import preview
 from tests.rig.importers.conftest import text_table
 
@@ -56,6 +56,24 @@ def test_a_position_that_switches_to_and_fro_does_not_wrap(tmp_path):
     noise = np.random.default_rng(0).normal(0, 0.01, TIME.size)
     angle = np.sign(np.sin(2 * TIME + 0.1)) + noise
     assert questions(tmp_path, time_s=TIME, motor_angle_rad=angle) == []
+
+
+def test_a_run_that_is_there_twice_is_asked_about_and_counts_once(tmp_path, said):
+    columns = {"time_s": TIME, "motor_angle_rad": WAVE}
+    for name in ("a", "b", "c"):
+        factor = 1.1 if name == "b" else 1.0
+        text_table(tmp_path / f"{name}.csv", columns | {"motor_angle_rad": factor * WAVE})
+    (found,) = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    assert found.startswith("a, c: these runs are the same, sample by sample")
+    campaign = open_table(tmp_path, read_mapping(None, []))
+    assert campaign.evidence.names == ("a", "b")
+    logs = tmp_path / "logs"
+    said("import", tmp_path, "--out", logs)
+    campaign = open_campaign(logs)
+    assert campaign.evidence.names == ("a", "b")
+    assert left_out(logs, campaign) == [
+        "Run c does not count: it is the same as a, sample by sample; delete one of them"
+    ]
 
 
 def test_a_run_whose_zero_moved_is_asked_about(tmp_path):
