@@ -1,6 +1,6 @@
 """Runs that are the same sample by sample: a file that was copied, or imported twice.
 
-A run is the unit of evidence. A copy is no further evidence, and one among the test runs would
+A run is the unit of evidence. A copy adds no evidence, and one among the test runs would
 confirm what was fitted on the original.
 """
 

@@ -16,6 +16,7 @@ from estimation.recording import FloatArray, Recording, shared_columns
 from estimation.zeros import moved_zeros
 from rig.importers.derivatives import CONFUSED
 from rig.importers.table.units import conversion
+from rig.output.table import counted
 
 PLAUSIBLE: dict[str, tuple[float, str]] = {
     "rad": (200.0, "degrees or counts"),
@@ -31,6 +32,10 @@ PLAUSIBLE: dict[str, tuple[float, str]] = {
 """Size above which values of a bench machine are unusual, and what the column may be in instead.
 
 The sizes are those of machines that fit a room: 32 turns of a shaft, 20000 revolutions a minute."""
+
+MOST_LONE, FAR_OUT = 3, 10.0
+"""Most samples that are far beyond all others together, and how many times as far from the median
+as any other sample they are."""
 
 COLDEST_K, HOTTEST_K = 200.0, 600.0
 
@@ -141,8 +146,13 @@ def of_channel(name: str, recordings: Sequence[Recording]) -> list[str]:
     if not values.size:
         return []
     unit = unit_of(name)
+    lone, usual = _lone(values)
+    wrong = [_outlier(name, unit, lone, usual, recordings)] if lone else []
+    if lone:
+        parts = [np.where(np.isin(part, lone), np.nan, part) for part in parts]
+        values = np.concatenate([part[np.isfinite(part)] for part in parts])
     least, greatest = float(values.min()), float(values.max())
-    wrong = [*_implausible(unit, least, greatest)]
+    wrong += _implausible(unit, least, greatest)
     if least == greatest:
         if COMMAND.search(name):
             return wrong
@@ -151,6 +161,39 @@ def of_channel(name: str, recordings: Sequence[Recording]) -> list[str]:
     if unit in ("rad", "m"):
         wrong += _wrapped(parts, least, greatest, unit)
     return wrong
+
+
+def _lone(values: FloatArray) -> tuple[list[float], str]:
+    """Return the values of few samples far beyond all others, and how far these are, as a formula.
+
+    There are none in a channel that is constant otherwise: they may be pulses.
+    """
+    median = float(np.median(values))
+    far = np.abs(values - median)
+    order = np.argsort(far)[::-1]
+    for count in range(min(MOST_LONE, len(values) - 1), 0, -1):
+        least, rest = float(far[order[count - 1]]), float(far[order[count]])
+        if rest > 0.0 and least > FAR_OUT * rest:
+            limit = float(np.sqrt(least * rest))
+            return values[order[:count]].tolist(), f"{median:.3g}) > {limit:.3g}"
+    return [], ""
+
+
+def _outlier(
+    name: str, unit: str, lone: Sequence[float], usual: str, recordings: Sequence[Recording]
+) -> str:
+    """Return a question about the samples far beyond all others, with their places and the remedy."""
+    places = [
+        f"{with_unit(float(r[name][k]), unit)} at {r.time_s[k]:.4g} s of {r.name}"
+        for r in recordings
+        if name in r
+        for k in np.flatnonzero(np.isin(r[name], lone) & r.valid)
+    ]
+    return (
+        f"{counted(len(places), 'sample')} far beyond all others, {', '.join(places)}; was it so?"
+        f" If not, flag it: [[data.invalid]] with when = 'abs({name} - {usual}', reason = 'spike',"
+        " missing = true"
+    )
 
 
 def _implausible(unit: str, least: float, greatest: float) -> Iterator[str]:

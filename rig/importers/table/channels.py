@@ -15,6 +15,10 @@ from rig.importers.table.formula import names_in
 from rig.importers.table.mapping import ColumnMapping, worked_out
 from rig.importers.table.raw import Raw, Values
 from rig.importers.table.units import BASE, agree, conversion, stated_in_name
+from rig.output.table import counted
+
+IMPOSSIBLE = 1e24
+"""Size above which a number is not a reading in any unit; some programs write such for none."""
 
 DAY_S, NO_DATE = 86_400.0, date(1970, 1, 1)
 
@@ -149,7 +153,9 @@ def _channel(raw: Raw, where: str, name: str, source: Source) -> FloatArray:
         raise DataError(
             f"{where}: column {source.column!r} of {raw.path.name} is not numbers: {what}.", fix=fix
         )
-    values = _in_si(raw, where, name, source, found.astype(np.float64))
+    numbers = found.astype(np.float64)
+    possible = np.where(np.abs(numbers) > IMPOSSIBLE, np.nan, numbers)
+    values = _in_si(raw, where, name, source, possible)
     if not np.isfinite(values).any():
         raise DataError(
             f"{where}: column {source.column!r} of {raw.path.name} is empty.",
@@ -218,7 +224,17 @@ def _check_row_of_units(raw: Raw, where: str, name: str, column: str) -> None:
 
 
 def _doubts(raw: Raw, name: str, source: Source) -> Iterator[str]:
-    """Yield that the line below the head and the mapping state two units of a column."""
+    """Yield impossible numbers of a column, and another unit in the line below its head."""
+    cells = raw.columns.get(source.column)
+    if cells is not None and cells.dtype.kind == "f":
+        huge = np.flatnonzero(np.isfinite(cells) & (np.abs(cells) > IMPOSSIBLE))
+        if huge.size:
+            first = f"{cells[huge[0]]:.3g} in {raw.row(int(huge[0]))}"
+            yield (
+                f"{name}: the column {source.column!r} holds {counted(huge.size, 'number')} beyond"
+                f" any reading, first {first}, taken as an empty cell; does the instrument write"
+                " that for no value?"
+            )
     stated, own = raw.units.get(source.column, ""), unit_or_none(name)
     if not stated or own is None or source.unit == DATE or isinstance(source.gain, str):
         return

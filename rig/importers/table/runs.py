@@ -101,7 +101,7 @@ def _run(samples: Samples, part: slice, name: str, remarks: list[Remark]) -> Rec
     interpolated = mapping.data.even_rate_hz is not None  # each channel from its own samples
     _check_clock(samples, part, time_s, twice, interpolated)
     if twice.any():
-        remarks.append((name, f"{int(twice.sum())} samples that are there twice left out"))
+        remarks.append((name, f"{counted(int(twice.sum()), 'sample')} there twice left out"))
         time_s = time_s[~twice]
         channels = {key: values[~twice] for key, values in channels.items()}
     again = np.diff(time_s, prepend=-np.inf) == 0
@@ -140,9 +140,10 @@ def _run(samples: Samples, part: slice, name: str, remarks: list[Remark]) -> Rec
 def _emptiness(
     time_s: FloatArray, channels: dict[str, FloatArray], empty: NDArray[np.bool_], filled: bool
 ) -> str:
+    samples = f"{counted(int(empty.sum()), 'sample')} with a cell that is empty, NaN or inf"
     if filled:
-        return f"{int(empty.sum())} samples have an empty cell; each channel is interpolated"
-    remark = f"{int(empty.sum())} samples with an empty cell flagged"
+        return f"{samples}; each channel is interpolated"
+    remark = f"{samples} flagged"
     fewest = min(int(np.isfinite(values).sum()) for values in channels.values())
     if empty.mean() < SPARSE or fewest < 2:
         return remark
@@ -188,8 +189,9 @@ def _check_clock(
         f"{samples.raw.path}, {samples.raw.row(where + at)}: time goes from"
         f" {float(time_s[at - 1]):.6g} s to {float(time_s[at]):.6g} s."
     )
+    count = int(is_back.sum() or is_again.sum())
     if not is_back.any():
-        count, even = int(is_again.sum()), ""
+        even = ""
         if (steps > 0).any():
             rate_hz = float(f"{1 / np.median(steps[steps > 0]):.3g}")
             even = (
@@ -204,7 +206,7 @@ def _check_clock(
         )
     raise DataError(
         what,
-        f"{int(is_back.sum())} samples come before the one above them.",
+        f"{counted(count, 'sample')} {'comes' if count == 1 else 'come'} before the one above.",
         "If the clock starts again with each trial, write resets = true under [data.runs]"
         " (--runs resets=true); if the column is not a clock, state --rate HZ.",
     )

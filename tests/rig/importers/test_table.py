@@ -135,7 +135,7 @@ READ = {
         "t,enc\n0,1\n0.1,2\n0.1,2\n0.2,3\n",
         ANGLE,
         {"motor_angle_rad": [1, 2, 3]},
-        "1 samples that are there twice",
+        "1 sample there twice left out",
     ),
     "repeated times where the clock is made even": (
         "t,enc,i\n0,0,0\n10,1,1\n10,9,9\n30,3,3\n40,4,4\n",
@@ -356,7 +356,7 @@ def test_channels_of_two_rates_in_one_table_are_each_interpolated(tmp_path):
     (tmp_path / "run.csv").write_text("t,enc,i\n" + rows)
     remarks = []
     list(read_runs(tmp_path / "run.csv", machine(tmp_path), remarks))
-    assert "160 samples with an empty cell flagged" in remarks[-1][1]
+    assert "160 samples with a cell that is empty, NaN or inf flagged" in remarks[-1][1]
     assert "even_rate_hz = 20.1 interpolates" in remarks[-1][1]
     (run,) = open_table(
         tmp_path / "run.csv", machine(tmp_path, "[data]\neven_rate_hz = 50\n" + MAPPED)

@@ -1,6 +1,7 @@
 """`rig import`: what a person sees before anything is written, and what is written then."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -50,6 +51,35 @@ def test_a_table_as_it_should_be_raises_no_question(tmp_path):
     there_and_back = 0.5 - 0.5 * np.cos(np.minimum(TIME, np.pi))
     columns = {"motor_angle_rad": WAVE, "motor_velocity_rad_s": 2 * np.cos(2 * TIME)}
     assert questions(tmp_path, time_s=TIME, **columns, jaw_angle_rad=there_and_back) == []
+
+
+def spiked(values, **samples):
+    found = values.copy()
+    for place, value in samples.items():
+        found[int(place[1:])] = value
+    return found
+
+
+def test_a_single_sample_far_beyond_all_others_is_named_with_its_remedy(tmp_path):
+    force = 400 + 100 * WAVE
+    (found,) = questions(tmp_path, time_s=TIME, load_force_n=spiked(force, k500=1e6))
+    assert "1 sample far beyond all others, 1e+06 N at 5 s of run; was it so?" in found
+    when = re.search(r"when = '(.*?)'", found)[1]
+    flags = [(("invalid",), [{"when": when, "reason": "spike", "missing": True}], "")]
+    (run,) = read_runs(tmp_path / "run.csv", read_mapping(None, flags), [])
+    assert np.flatnonzero(~run.valid).tolist() == [500]
+    assert questions(tmp_path, time_s=TIME, load_force_n=force) == []
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("huge", [1e300, -3.4e38])
+def test_a_number_that_cannot_be_a_reading_is_an_empty_cell(tmp_path, huge):
+    force = spiked(400 + 100 * WAVE, k500=huge)
+    (found,) = questions(tmp_path, time_s=TIME, load_force_n=force)
+    assert "the column 'load_force_n' holds 1 number beyond any reading" in found
+    assert " in line 502, taken as an empty cell" in found
+    (run,) = open_table(tmp_path, read_mapping(None, []))
+    assert np.flatnonzero(~run.valid).tolist() == [500]
 
 
 def test_a_position_that_switches_to_and_fro_does_not_wrap(tmp_path):
