@@ -182,7 +182,7 @@ def _lone(values: FloatArray) -> tuple[list[float], str]:
 def _outlier(
     name: str, unit: str, lone: Sequence[float], usual: str, recordings: Sequence[Recording]
 ) -> str:
-    """Return a question about the samples far beyond all others, with their places and the remedy."""
+    """Return a question about samples far beyond all others, with their places and the remedy."""
     places = [
         f"{with_unit(float(r[name][k]), unit)} at {r.time_s[k]:.4g} s of {r.name}"
         for r in recordings

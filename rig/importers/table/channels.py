@@ -13,8 +13,8 @@ from rig.importers.table.data import DATE, TIME, Source
 from rig.importers.table.delimited import after_samples, bad_cell
 from rig.importers.table.formula import names_in
 from rig.importers.table.mapping import ColumnMapping, worked_out
-from rig.importers.table.raw import Raw, Values
-from rig.importers.table.units import BASE, agree, conversion, stated_in_name
+from rig.importers.table.raw import Raw, Values, is_number
+from rig.importers.table.units import BASE, agree, as_unit, conversion, stated_in_name
 from rig.output.table import counted
 
 IMPOSSIBLE = 1e24
@@ -208,7 +208,7 @@ def _check_row_of_units(raw: Raw, where: str, name: str, column: str) -> None:
 
     A text there that is not a unit is asked about instead.
     """
-    stated, own = raw.units.get(column, ""), unit_or_none(name)
+    stated, own = as_unit(raw.units.get(column, "")), unit_or_none(name)
     if not stated or own is None or agree(stated, "", 1.0, name) is not False:
         return
     fits = conversion(stated, name) is not None
@@ -257,10 +257,14 @@ def _condition(raw: Raw, where: str, name: str, source: Source) -> float | str |
         try:
             many = many.astype(np.float64)
         except ValueError as error:
+            cell = str(many[0])
+            point = cell.replace(",", ".")
             raise DataError(
-                f"{where}: {source.column!r} of {raw.path.name} is not a number: {str(many[0])!r}.",
+                f"{where}: {source.column!r} of {raw.path.name} is not a number: {cell!r}.",
                 f"{name} ends in a unit, so it is one.",
-                "Rename the condition without a unit, or map something else.",
+                f"Write it with a point, {point}, or state decimal = ',' under [data]."
+                if is_number(point)
+                else "Rename the condition without a unit, or map something else.",
             ) from error
     if many.dtype.kind in "fiub":
         many = _in_si(raw, where, name, source, many.astype(np.float64))

@@ -123,12 +123,15 @@ def read_raw(file: Path, mapping: ColumnMapping) -> Raw:
         raw = with_samples(reader(file, mapping.data))
     except OSError as error:
         raise DataError(f"{file} cannot be read: {error.strerror or error}.") from error
-    fields = raw.fields | _named_in(file, mapping) | _beside(file, mapping)
+    fields = raw.fields | _named_in(file, mapping, raw.decimal) | _beside(file, mapping)
     return replace(raw, fields=fields)
 
 
-def _named_in(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
-    """Return the named groups of a file's name, or of that with its folder's before it."""
+def _named_in(file: Path, mapping: ColumnMapping, decimal: str) -> dict[str, float | str]:
+    """Return the named groups of a file's name, or of that with its folder's before it.
+
+    A number has a decimal point, or the decimal sign of the table.
+    """
     pattern = mapping.data.file_name
     if not pattern:
         return {}
@@ -143,11 +146,10 @@ def _named_in(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
             f"{where}: the name {file.name!r} does not match {pattern!r}.",
             fix="Correct file_name, or choose files with files = PATTERN.",
         )
-    return {
-        name: float(text) if is_number(text) else text
-        for name, text in found.groupdict().items()
-        if text is not None
-    }
+    sign = mapping.data.decimal or decimal or "."
+    texts = {name: text for name, text in found.groupdict().items() if text is not None}
+    numbers = {name: text.replace(sign, ".") for name, text in texts.items()}
+    return {n: float(numbers[n]) if is_number(numbers[n]) else texts[n] for n in texts}
 
 
 def _beside(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:

@@ -164,6 +164,15 @@ def conversion(unit: str, name: str) -> Unit | None:
     return Unit(given.factor / wanted.factor, given.powers, given.shift) if same else None
 
 
+def as_unit(text: str) -> str:
+    """Return the unit that a text is, in small letters if need be; nothing where it is none."""
+    for unit in (text, IN_WORDS.get(text.lower(), text)):
+        with suppress(NotAUnitError):
+            read_unit(unit)
+            return unit
+    return ""
+
+
 def agree(stated: str, unit: str, gain: float, name: str) -> bool | None:
     """Return whether a file and a mapping state the same unit of a column; None if unreadable.
 
@@ -175,10 +184,9 @@ def agree(stated: str, unit: str, gain: float, name: str) -> bool | None:
         gain: Factor of the mapping.
         name: The channel.
     """
-    try:
-        given = read_unit(IN_WORDS.get(stated.lower(), stated))
-    except NotAUnitError:
+    if not as_unit(stated):
         return None
+    given = read_unit(as_unit(stated))
     wanted, used = read_unit(unit_of(name)), read_unit(unit or unit_of(name))
     if given.powers != wanted.powers:
         sized = bool(unit) and "count" in given.powers  # such as rev/4096

@@ -232,6 +232,7 @@ load_force_n = "Kraft:kgf"
     [
         ("kgf", "kgf"),
         ("(kgf)", "kgf"),
+        ("[KGF]", "kgf"),
         ("counts", "counts"),  # another quantity
     ],
 )
@@ -278,6 +279,22 @@ def test_a_row_of_units_that_agrees_with_the_mapping(tmp_path, case):
     row, source = case
     mapping = MAPPED.replace('"Kraft:kgf"', source)
     assert asked_of(tmp_path, GERMAN.replace("[kgf]", f"[{row}]"), mapping) == []
+
+
+def test_a_decimal_comma_in_the_name_of_a_file(tmp_path):
+    mapping = "[data]\nfile_name = 'lauf_(?P<f>.+)Hz'\n" + MAPPED
+    mapping += '[data.conditions]\nfrequency_hz = "f"\n'
+    (tmp_path / "bench.toml").write_text(mapping)
+    for name in ("lauf_0,1Hz.csv", "lauf_0.1Hz.csv"):
+        (tmp_path / name).write_text(GERMAN)
+        (run,) = open_table(tmp_path / name, read_mapping(tmp_path / "bench.toml", []))
+        assert run.conditions["frequency_hz"] == 0.1
+    mapping = (
+        mapping.replace("Zeit:iso8601", "time").replace("Weg", "angle").replace("Kraft", "current")
+    )
+    said = refused(tmp_path, TABLE, mapping, "lauf_0,1Hz.csv")
+    assert "'0,1'. frequency_hz ends in a unit" in said
+    assert "Write it with a point, 0.1, or state decimal" in said
 
 
 LAST = GERMAN.splitlines()[-1]
