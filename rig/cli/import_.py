@@ -116,10 +116,24 @@ def import_(
     lines += [] if found.questions else ["Nothing looks wrong."]
     lines += [] if plots is None else [_plotted(recordings, plots)]
     lines += [f"wrote {len(written)} recordings to {out}"] if written else []
+    whole = None if preview and flags else machine  # a file that maps the table alone
+    lines.append(f"Next: {_next(path, None if preview else out, whole)}")
     for line in found.questions:
         remarks().print(f"Check: {line}")
     data = {"preview": found, "written": written, "plots": plots}
     present(json, data, *_tables(found, mapping), *lines)
+
+
+def _next(path: Path, out: Path | None, machine: Path | None) -> str:
+    """Return the next command for a table, or for the recordings that were written of it.
+
+    The machine is None where it does not map the table alone.
+    """
+    if machine is not None:
+        return shlex.join(["rig", "machine", "check", str(machine), str(out or path)])
+    if out is None:
+        return "the same with --out FOLDER in place of --preview"
+    return shlex.join(["rig", "view", str(out)])
 
 
 def _require_a_table(path: Path) -> None:

@@ -167,11 +167,18 @@ def new(
     Without a terminal nothing is asked: what is not stated is not in the file.
     """
     from estimation.plant_file import write
-    from rig.cli.machine_new import asked, data_text, plant_of
+    from rig.cli.machine_new import UNMAPPED, asked, data_text, plant_of
 
     require_new(out)
     words = {"axis": axis, "transmission": transmission, "actuator": actuator, "sensor": sensor}
     stated = {kind: given or [] for kind, given in words.items()}
     plant = plant_of(name or out.stem, stated if any(stated.values()) else asked(from_))
-    write(plant, out, data_text(from_, plant) if from_ else "")
-    present(json_, {"machine": out}, f"Machine: {out}. Next: rig machine check {out} DATA")
+    data = data_text(from_, plant) if from_ else ""
+    write(plant, out, data)
+    step = f"rig machine check {out} {from_ or 'DATA'}"
+    if UNMAPPED in data:
+        step = (
+            f"replace COLUMN:UNIT under [data.columns] in it, then: rig import {from_} --machine"
+            f" {out} --preview"
+        )
+    present(json_, {"machine": out}, f"Machine: {out}. Next: {step}")

@@ -100,6 +100,13 @@ def reads_of(channel: str) -> Reads:
     return "reference" if channel.startswith("target_") else READS.get(unit_of(channel), "other")
 
 
+UNMAPPED = "COLUMN:UNIT"
+"""Source of a channel that is yet to be stated."""
+
+FILE_NAME = r"# file_name = 'run_(?P<load>\d+)g'  # each named group is a condition's value"
+CONDITIONS = ("# [data.conditions]  # constant in a run", '# load_mass_kg = "load:g"')
+
+
 def data_text(table: Path, plant: Plant) -> str:
     """Return `[data]` for a table: a line for each channel, and the table's columns as remarks."""
     from rig.importers.table.data import Data
@@ -113,13 +120,14 @@ def data_text(table: Path, plant: Plant) -> str:
     lines += [f"#   {_line(name, x[0])}" for name, x in raw.columns.items() if len(x)]
     lines += [f"# Single value {_line(name, value)}" for name, value in raw.fields.items()]
     lines += [f"# Remark: {remark}." for remark in raw.remarks]
-    lines += ["[data]", "", "[data.columns]"]
+    ending = f"*{table.suffix}" if table.is_file() else "*.csv"
+    lines += ["[data]", f'# files = "{ending}"  # of a folder', FILE_NAME, "", "[data.columns]"]
     for channel in ("time_s", *channels):
         if channel in raw.columns:
             lines.append(f"{channel} = {value_text(channel)}")
         else:
-            lines.append(f'# {channel} = "COLUMN:UNIT"')
-    return "\n".join(lines) + "\n"
+            lines.append(f'# {channel} = "{UNMAPPED}"')
+    return "\n".join([*lines, "", *CONDITIONS]) + "\n"
 
 
 def _line(name: str, value: object) -> str:

@@ -363,14 +363,18 @@ def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_te
     assert not out.exists()
     words = "--axis carriage:m --actuator carriage:drive_force_n"
     words += " --sensor carriage:carriage_position_m --from"
-    said("machine new", out, words, table)
+    step = f"rig import {table} --machine {out} --preview"
+    assert step in said("machine new", out, words, table).out
     text = out.read_text()
     assert "# Columns of slide.csv, with the first sample:\n#   t: " in text
     mapped = {"time_s": "t", "drive_force_n": "volts:35 N", "carriage_position_m": "x:mm"}
     for name, column in mapped.items():
         text = text.replace(f'# {name} = "COLUMN:UNIT"', f'{name} = "{column}"')
+    text = text.replace('# files = "', 'files = "')
     out.write_text(text)
-    said("machine check", out, table)
+    step = f"rig machine check {out} {table}"
+    assert f"Next: {step}" in said("import", table, "--machine", out, "--preview").out
+    said(step.removeprefix("rig "))
     said("machine new", out, words, table, code=2)
 
 
