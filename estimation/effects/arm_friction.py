@@ -19,5 +19,5 @@ class ArmFriction(Proportional):
 
     id = "arm.friction"
     roles: ClassVar = {"direction": "joint_1_direction_ratio"}
-    amplitudes = (Parameter("friction", "target", "loss in steady motion", lower=0.0),)
+    amplitudes = (Parameter("friction", "target", "size of friction at any speed", lower=0.0),)
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"

@@ -28,7 +28,7 @@ class Capstan(Pointwise):
     amplitudes = (Parameter("carried", "target / load", "fraction of the load", lower=0.0),)
     shape = (
         Parameter("wrap", "1", "coefficient of friction times angle of wrap", 0.03, 3.0, points=4),
-        Parameter("width", "speed", "speed at which 76 % of it acts", 1e-2, 50.0, points=6),
+        Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-2, 50.0, points=6),
     )
     told_apart_by = "the same motion at another wrap angle, such as another pose of the wrist"
 
@@ -58,7 +58,7 @@ class WristCapstan(Capstan):
     }
     shape = (
         Parameter("friction", "1 / other_angle", "coefficient of friction", 0.03, 1.0, points=4),
-        Parameter("width", "speed", "speed at which 76 % of it acts", 1e-2, 50.0, points=6),
+        Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-2, 50.0, points=6),
     )
     told_apart_by = "the same motion in several poses of the wrist"
 

@@ -21,8 +21,8 @@ class CoulombFriction(Pointwise):
     id = "friction.coulomb"
     balances = LOSS
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
-    amplitudes = (Parameter("friction", "target", "loss in steady motion", lower=0.0),)
-    shape = (Parameter("width", "speed", "speed at which 76 % of it acts", 1e-3, 1e2),)
+    amplitudes = (Parameter("friction", "target", "size of friction at any speed", lower=0.0),)
+    shape = (Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-3, 1e2),)
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:

@@ -22,7 +22,7 @@ class CoulombAsymmetry(Pointwise):
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s"}
     amplitudes = (Parameter("asymmetry", "target", "half the loss at speed > 0 less at speed < 0"),)
-    shape = (Parameter("width", "speed", "speed at which 76 % of it acts", 1e-3, 1e2),)
+    shape = (Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-3, 1e2),)
     told_apart_by = "standstill periods, and slow motion in both directions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:

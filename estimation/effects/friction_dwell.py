@@ -44,7 +44,7 @@ class Dwell(Remembering):
     shape = (
         Parameter("time", "clock", "standstill to reach 63 %", 0.1, 10.0, points=3),
         Parameter("way", "speed * clock", "slip after which 37 % remains", 1e-3, 1e3, points=7),
-        Parameter("width", "speed", "speed at which 76 % of it acts", 0.05, 20.0, points=3),
+        Parameter("width", "speed", "speed at which friction reaches 76 %", 0.05, 20.0, points=3),
     )
     walk = _walk
     rest = (0.0, 0.0, 1.0)

@@ -35,7 +35,7 @@ class LoadFriction(Pointwise):
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "load": "motor_load_n_m"}
     amplitudes = (Parameter("friction", "target / load", "loss per unit of load", lower=0.0),)
     shape: ClassVar[Parameters] = (
-        Parameter("width", "speed", "speed at which 76 % of it acts", 1e-3, 1e2),
+        Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-3, 1e2),
     )
     told_apart_by = "the same motion against two stiffnesses, and free"
 
@@ -136,7 +136,7 @@ class PowerLoadFriction(LoadFriction):
     )
     shape = (
         Parameter("exponent", "1", "power of the load", 2.0 / 3.0, 2.5, points=5),
-        Parameter("width", "speed", "speed at which 76 % of it acts", 1e-3, 1e2),
+        Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-3, 1e2),
     )
     told_apart_by = "the same motion against three stiffnesses, and free"
 

@@ -31,7 +31,7 @@ class PositionFriction(Pointwise):
         Parameter("bend", "target / position / position", "quadratic change with position"),
         Parameter("twist", "target / position / position / position", "cubic change with position"),
     )
-    shape = (Parameter("width", "speed", "speed at which 76 % of it acts", 1e-3, 1e2),)
+    shape = (Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-3, 1e2),)
     told_apart_by = "a slow sweep without load, in both directions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:

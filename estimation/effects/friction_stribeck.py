@@ -26,7 +26,7 @@ class Stribeck(Pointwise):
     )
     shape = (
         Parameter("fall", "speed", "speed at which 37 % remains", 1e-2, 1e2),
-        Parameter("width", "speed", "speed at which 76 % of it acts", 1e-3, 1e2),
+        Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-3, 1e2),
     )
     told_apart_by = "a staircase of slow speeds around zero with long plateaus"
 

@@ -45,7 +45,7 @@ class Warmup(Remembering):
     amplitudes = (Parameter("friction", "target", "loss at the start minus the final loss"),)
     shape = (
         Parameter("time", "clock", "time after which 37 % remains", 0.5, 60.0, points=6),
-        Parameter("width", "speed", "speed at which 76 % of it acts", 1e-2, 50.0, points=6),
+        Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-2, 50.0, points=6),
     )
     walk = _walk
     rest = BEGINNING
@@ -72,7 +72,7 @@ class CampaignWarmup(Pointwise):
     amplitudes = (Parameter("friction", "target", "loss at the start minus the final loss"),)
     shape = (
         Parameter("time", "campaign_clock", "time after which 37 % remains", 30, 2e4, points=6),
-        Parameter("width", "speed", "speed at which 76 % of it acts", 1e-2, 50.0, points=6),
+        Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-2, 50.0, points=6),
     )
     told_apart_by = "the first run repeated at the end, and again after a night"
 
@@ -101,7 +101,7 @@ class MeasuredWarmup(Pointwise):
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "temperature": "motor_temperature_k"}
     amplitudes = (Parameter("friction", "target / temperature", "fall of the loss per kelvin"),)
     shape: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("width", "speed", "speed at which 76 % of it acts", 1e-2, 50.0, points=6),
+        Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-2, 50.0, points=6),
     )
     told_apart_by = "the same run when the machine is cold and when it is warm"
 

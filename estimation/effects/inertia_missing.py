@@ -19,5 +19,7 @@ class Inertia(Proportional):
     id = "inertia.missing"
     balances: ClassVar = {"motor": -1, "gearbox": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"acceleration": "motor_acceleration_rad_s2"}
-    amplitudes = (Parameter("inertia", "target / acceleration", "inertia", lower=0.0),)
+    amplitudes = (
+        Parameter("inertia", "target / acceleration", "mass or moment of inertia", lower=0.0),
+    )
     told_apart_by = "the same motion at twice the frequency"

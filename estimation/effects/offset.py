@@ -21,7 +21,7 @@ class Offset(Effect):
 
     id = "sensor.offset"
     roles: ClassVar = {"clock": "time_s"}
-    amplitudes = (Parameter("offset", "target", "the constant"),)
+    amplitudes = (Parameter("offset", "target", "constant part, such as a wrong zero"),)
     told_apart_by = "the unloaded sensor at standstill before and after a run"
 
     def columns(self, inputs: Mapping[str, FloatArray], shape: Sequence[float]) -> FloatArray:
