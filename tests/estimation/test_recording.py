@@ -78,6 +78,11 @@ def test_rate_and_duration():
         _ = make(1).sample_rate_hz
     with pytest.raises(MissingChannelError, match="Did you mean 'motor_current_a'"):
         make()["motor_curent_a"]
+    axis = Recording("a", [0.0, 0.1], {"carriage_position_m": [0.0, 1.0]})
+    with pytest.raises(MissingChannelError, match="mean 'carriage_acceleration_m_s2'"):
+        axis["carriage_accel_m_s2"]
+    with pytest.raises(MissingChannelError, match="--machine"):
+        axis["motor_current_a"]
 
 
 def test_a_compliance_has_the_unit_of_an_angle_by_a_torque():
