@@ -217,11 +217,11 @@ def test_a_page_written_before_does_not_change_the_commit_of_the_next(tmp_path):
 GRIP = "distal_torque_n_m"
 
 
-def recorded(name, bias=0.0):
+def recorded(name, bias=0.0, travel=1.0):
     time_s = np.arange(2000) / 1000
     torque = 0.05 * np.sin(6 * time_s)
     columns = {
-        "jaw_angle_rad": np.cos(3 * time_s),
+        "jaw_angle_rad": travel * np.cos(3 * time_s),
         GRIP: torque,
         f"estimated_{GRIP}": torque + bias,
     }
@@ -232,8 +232,8 @@ def recorded(name, bias=0.0):
 
 @pytest.fixture
 def folder(tmp_path):
-    for name in ("000-a", "001-b"):
-        write_recording(tmp_path / f"{name}.mcap", recorded(name, bias=0.01))
+    for name, travel in (("000-a", 1.0), ("001-b", 1.001)):  # the same run would count once
+        write_recording(tmp_path / f"{name}.mcap", recorded(name, 0.01, travel))
     return tmp_path
 
 
