@@ -23,7 +23,7 @@ import difflib
 import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from datetime import datetime
 from importlib.resources import files
 from pathlib import Path

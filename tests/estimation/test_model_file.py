@@ -85,11 +85,6 @@ DECLARED = to_toml(read(Path("motor")))
             'run_offsets = "ja" is not true or false. Write run_offsets = true, or false.',
         ),
         ("order = 3", "order = true", "is not a whole number"),
-        (
-            'channels.speed = "motor_velocity_rad_s"',
-            "parameters.damping = { bounds = [0, 1] }",
-            "unknown key 'bounds'. Known: unit, value",
-        ),
         ("cutoff_hz = 50.0", "cutoff_hz = nan", "not a finite number"),
         ("rig.model/1", "rig.model/2", "not a model of schema.*version of rig"),
         ("[processing]", "[processing", "is not TOML"),
