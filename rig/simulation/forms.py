@@ -4,6 +4,7 @@ All are tables over a range of one variable, shape (`POINTS`,); between its poin
 and beyond its ends it stays at its last value.
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -59,7 +60,7 @@ def falling(random: Random, x: FloatArray) -> FloatArray:
         np.exp(-(x**power)),
         1.0 / (1.0 + x**power),
         1.0 - np.tanh(x**power),
-        np.log1p(1.0 / (x**power + 1.0 / (np.e - 1.0))),
+        np.log1p(1.0 / (x**power + 1.0 / (math.e - 1.0))),
         np.clip(1.0 - 0.5 * x, 0.0, None) ** power,
     )
     form = kinds[int(random.integers(len(kinds)))] * bend(random)
