@@ -174,11 +174,13 @@ def solve(problem: Problem, gram: FloatArray) -> FloatArray:
 
 
 def check_target(problem: Problem) -> None:
-    """Refuse a target that does not vary: any model without any effect fits it.
+    """Refuse a target that does not vary where effects are declared: an offset alone fits it.
 
     Raises:
         FitError: It is constant; in each run, where runs have offsets of their own.
     """
+    if all(term.effect.id == OFFSET for term in problem.model.terms):
+        return
     target = problem.model.target
     values = [run.thin[target] for run in problem.runs]
     parts = values if problem.model.run_offsets else [np.concatenate(values)]
