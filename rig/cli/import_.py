@@ -25,6 +25,11 @@ MOST_RUNS = 12
 FIRST, MOST_CELL = 5, 30
 """Values shown of a column that is not mapped, and characters of each."""
 
+Flag = tuple[tuple[str, ...], Any, str]
+"""A place in a mapping, its entry, and the words of the command line that state it."""
+
+Words = list[str] | None
+
 ColumnOption = Annotated[
     list[str] | None,
     Option(help="CHANNEL=COLUMN[:UNIT], such as motor_angle_rad=q1:deg; may be repeated."),
@@ -93,13 +98,7 @@ def import_(
             "Nothing states where the recordings are to be written.",
             fix="Add --out FOLDER, or look at the table first with --preview.",
         )
-    flags = [
-        *_entries("--column", column, "columns"),
-        *_entries("--condition", condition, "conditions"),
-        *_entries("--runs", runs, "runs"),
-        *_entries("--set", set_),
-        *([] if rate is None else [(("sample_rate_hz",), rate, f"--rate {rate:g}")]),
-    ]
+    flags = _flags(column, condition, runs, set_, rate)
     mapping = read_mapping(None if machine is None else place_of(machine), flags)
     said: list[Remark] = []
     try:
@@ -122,6 +121,19 @@ def import_(
         remarks().print(f"Check: {line}")
     data = {"preview": found, "written": written, "plots": plots}
     present(json, data, *_tables(found, mapping), *lines)
+
+
+def _flags(
+    column: Words, condition: Words, runs: Words, set_: Words, rate: float | None
+) -> list[Flag]:
+    """Return the part of a mapping that each option states."""
+    return [
+        *_entries("--column", column, "columns"),
+        *_entries("--condition", condition, "conditions"),
+        *_entries("--runs", runs, "runs"),
+        *_entries("--set", set_),
+        *([] if rate is None else [(("sample_rate_hz",), rate, f"--rate {rate:g}")]),
+    ]
 
 
 def _next(path: Path, out: Path | None, machine: Path | None) -> str:
@@ -184,9 +196,7 @@ def _cell(value: float | str) -> str:
     return value[:MOST_CELL] if isinstance(value, str) else f"{value:.10g}"
 
 
-def _entries(
-    option: str, words: list[str] | None, *part: str
-) -> Iterator[tuple[tuple[str, ...], Any, str]]:
+def _entries(option: str, words: Words, *part: str) -> Iterator[Flag]:
     """Yield an option's entries in a part of a mapping, each with the words that state it."""
     for word in words or []:
         name, _, value = word.partition("=")

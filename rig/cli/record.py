@@ -51,12 +51,9 @@ def record(
     """
     from calibration.rules import refuse_errors
     from rig.configuration.check import refuse_problems
-    from rig.live.estimator import require_channels
-    from rig.log.devices import channel_of
     from rig.machines.choose import machine_of
     from rig.protocols.protocol import load_protocol
     from rig.recording.campaign import open_campaign_folder, read_manifest
-    from rig.recording.watch import watch_runs
 
     screen = remarks()
     if resume is not None:
@@ -80,11 +77,7 @@ def record(
     refuse_problems(settings)
     for verdict in refuse_errors(settings.calibration_verdicts()):
         screen.print(f"{verdict.channel}: {verdict.message} ({verdict.rule})")
-    watch = watch_runs(model) if model else None
-    if watch is not None and model is not None:
-        of_devices = tuple(channel_of(name, "") for name in settings.devices)
-        of_logger = {name for name in watch.channels if not name.startswith(of_devices)}
-        require_channels(of_logger, settings, model)
+    watch = None if model is None else _watch(model, settings)
     todo = open_campaign_folder(folder, plan, settings, resume=resume is not None)
     screen.print(f"{plan.name}: {counted(len(todo), 'run')} on {settings.name} into {folder}")
     recorded = _recorded(settings, todo, folder, notes, watch, json)
@@ -95,6 +88,19 @@ def record(
     said = f"{counted(len(recorded), 'run')} recorded, {wrong}. Next: rig log check {folder}"
     present(json, found | models, said)
     return 1 if bad else 0
+
+
+def _watch(model: Path, settings: "Config") -> "RunWatch":
+    """Begin to monitor a fitted model, whose channels are those of the rig's logger."""
+    from rig.live.estimator import require_channels
+    from rig.log.devices import channel_of
+    from rig.recording.watch import watch_runs
+
+    watch = watch_runs(model)
+    of_devices = tuple(channel_of(name, "") for name in settings.devices)
+    of_logger = {name for name in watch.channels if not name.startswith(of_devices)}
+    require_channels(of_logger, settings, model)
+    return watch
 
 
 def _recorded(
