@@ -13,7 +13,8 @@ import numpy as np
 
 from estimation.causes.equations import Equation
 from estimation.causes.layout import Layout
-from estimation.causes.run_signals import ANGLES, RATES, RunSignals
+from estimation.causes.run_signals import ANGLES, RunSignals
+from estimation.derived import MOTION, rates_of
 from estimation.filters import FilterError, zero_phase
 from estimation.recording import FloatArray
 
@@ -132,7 +133,7 @@ def _declared(equation: Equation, run: RunSignals) -> FloatArray:
 
 def _efforts(equation: Equation) -> list[str]:
     """Return the channels of an equation that are efforts: neither angles nor their derivatives."""
-    motion = (*ANGLES, *itertools.chain(*RATES.values()))
+    motion = (*ANGLES, *itertools.chain(*MOTION.values()))
     names = [n for n in equation.channels if not n.endswith(motion) and "_rate_" not in n]
     return names if equation.of_angle else [equation.target, *names]
 
@@ -161,9 +162,7 @@ def _add_estimate(equation: Equation, run: RunSignals) -> None:
     if equation.of_angle:  # an estimate has no offset, and a place along the travel needs one
         target = target + float(np.mean(run.channels[equation.target] - target))
     run.channels[instrumented(equation.target, equation.name)] = target
-    base = next((a for a in ANGLES if equation.target.endswith(a)), "")
-    if base:
-        speed = equation.target.removesuffix(base) + RATES[base][0]
+    for speed in rates_of(equation.target)[:1]:
         run.channels[instrumented(speed, equation.name)] = np.gradient(target) * run.rate_hz
 
 

@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from estimation.derived import CAMPAIGN_TIME, CLOCKS, measured_channels, zero_phase_channels
+from estimation.derived import (
+    CAMPAIGN_TIME,
+    CLOCKS,
+    MOTION,
+    measured_channels,
+    rates_of,
+    zero_phase_channels,
+)
 from estimation.errors import EstimationError
 from estimation.filters import LowPass
 from estimation.model import Model, balance_channels
@@ -31,12 +38,8 @@ COULOMB = "friction.coulomb"
 LEAST = 20
 """Samples that an equation needs of each run."""
 
-ANGLES = ("_angle_rad", "_position_m")
+ANGLES = tuple(MOTION)
 EFFORTS = ("_n_m", "_n")
-RATES = {
-    "_angle_rad": ("_velocity_rad_s", "_acceleration_rad_s2"),
-    "_position_m": ("_velocity_m_s", "_acceleration_m_s2"),
-}
 
 
 class LayoutError(EstimationError):
@@ -102,13 +105,7 @@ def signals_of_run(
     low_pass, signals = models[0].low_pass, models[0].signals
     joined = [c.name for c in signals.joined if c.shares[0].channel in measured]
     positions = [*measured, *(n for n in joined if signals.combination(n) is not None)]
-    moved = [
-        angle.removesuffix(kind) + rate
-        for angle in positions
-        for kind, rates in RATES.items()
-        if angle.endswith(kind)
-        for rate in rates
-    ]
+    moved = [rate for position in positions for rate in rates_of(position)]
     wanted = [*positions, *moved, *(n for m in models for n in (*m.channels, m.target))]
     filtered = zero_phase_channels(recording, [*wanted, CAMPAIGN_TIME], low_pass, signals)
     valid, step, grid = _places(filtered, low_pass)
