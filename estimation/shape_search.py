@@ -66,7 +66,10 @@ def search_shape(problem: Problem, everywhere: bool = True) -> list[float]:
     if not parameters:
         return []
     estimates = [term.values.get(p.name) for term in problem.model.terms for p in term.effect.shape]
-    known = [None if one is None else one.value for one in estimates]
+    known = [
+        one.value if one and (p.linear or one.value > 0.0) else None  # else on no scale
+        for one, p in zip(estimates, parameters, strict=True)
+    ]
     bounds = [range_of(p, value) for p, value in zip(parameters, known, strict=True)]
     point = [
         float(np.mean(bound)) if value is None else scaled(p, value)

@@ -186,6 +186,19 @@ def test_the_change_of_sign_of_friction_is_narrow_next_to_the_speeds_of_the_axis
     assert values["width"] < 0.06 * speed_m_s
 
 
+@pytest.mark.parametrize("width", [0.0, -1.0])
+def test_a_width_that_no_friction_has_is_no_place_to_start(width: float):
+    model, recordings = read(Path("motor")), Campaign.of(varied_runs(count=3, seconds=2.0))
+    terms = tuple(
+        replace(term, values={**term.values, "width": Estimate(width)})
+        if term.effect.id == "friction.coulomb"
+        else term
+        for term in model.terms
+    )
+    found = fit(replace(model, terms=terms), recordings, bootstrap=0)
+    assert numbers(found)["width"] == numbers(fit(model, recordings, bootstrap=0))["width"]
+
+
 PERIOD_M = 0.005
 
 
