@@ -7,7 +7,9 @@ move next to one another. Fits and errors count the samples that the model count
 standstill friction takes any value.
 """
 
+import itertools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -193,21 +195,15 @@ class Refit:
         solved = self.solve(parts)
         terms = [p.term for p in solved.parts if p.is_written and p.term is not None]
         campaign = Campaign.of([self.recordings[n] for n in self.train_names])
-        own = dict(zip(map(id, self._declared), solved.declared, strict=True))
-        declared = [own.get(id(term), term) for term in self.model.terms]
-        for term in [*terms]:
-            inside = [k for k, one in enumerate(declared) if _contains(term, one)]
-            if inside:
-                declared[inside[0]] = term
-                terms.remove(term)
-        while True:
-            model = replace(self.model, terms=(*declared, *terms), evidence=None)
-            try:
+        moved = dict(zip(map(id, self._declared), solved.declared, strict=True))
+        # a shape may have moved to where a declared term is as good as an offset
+        tried = itertools.product(range(len(terms), -1, -1), (moved, {}))
+        for count, own in tried:
+            known = [own.get(id(term), term) for term in self.model.terms]
+            model = replace(self.model, terms=_joined(known, terms[:count]), evidence=None)
+            with suppress(FitError):
                 return without_unused(fit(model, campaign, bootstrap=DRAWS, shapes="keep"))
-            except FitError:
-                if not terms:
-                    raise
-                terms.pop()
+        return fit(model, campaign, bootstrap=DRAWS, shapes="keep")
 
     def settled(self, parts: Sequence[Addition]) -> list[Addition]:
         """Return causes with the shapes that they were fitted with next to one another."""
@@ -338,6 +334,18 @@ class Refit:
                     ),
                 )
         return held[name]
+
+
+def _joined(declared: Sequence[Term], terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Return declared terms and others; one that contains a declared term is in its place."""
+    out, after = [*declared], []
+    for term in terms:
+        inside = [k for k, one in enumerate(out) if _contains(term, one)]
+        if inside:
+            out[inside[0]] = term
+        else:
+            after.append(term)
+    return (*out, *after)
 
 
 def _contains(term: Term, declared: Term) -> bool:
