@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from estimation.causes.blocks import Products
 from estimation.causes.candidates import Candidate, Claim
-from estimation.causes.functions import Function
 from estimation.causes.instruments import instrumented, signal
 from estimation.causes.joint import Joint
 from estimation.causes.laid import centred
@@ -59,18 +58,8 @@ def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, Products]]) -> 
         chosen = tuple(runs.tolist())
         if len(known) < CHOICES and chosen not in known:
             known.add(chosen)
-            tried.append(Claim(_whole(claim.cause), chosen, claim.choices))
+            tried.append(Claim(claim.cause, chosen, claim.choices))
     return tried
-
-
-def _whole(cause: Source | Function) -> Source | Function:
-    """Return a slow creep by its whole form, other causes as they are.
-
-    Most of it is a gain, which is even in time. In all runs alike declared terms take the gain up.
-    """
-    if isinstance(cause, Source) and cause.family == "sensor.creep":
-        return replace(cause, odd=False)
-    return cause
 
 
 def in_other_runs(candidate: Candidate) -> Iterator[Claim]:

@@ -67,11 +67,13 @@ OF_KIND: Mapping[str, tuple[str, ...]] = {
 FILTERS = (
     "sensor.delay",
     "sensor.lag",
-    "sensor.creep",
     "motor.electrical",
     "transmission.relaxation",
 )
-"""Effects that pass a reading through a linear filter, as smoothing its noise does."""
+"""Effects that pass a reading through a linear filter, as smoothing its noise does.
+
+A creep does too, but so slowly that it takes much of the motion off with the noise.
+"""
 
 LOOPS = ("hysteresis.", "transmission.backlash")
 """Effects with a loop: at a constant load they follow the noise of its reading."""

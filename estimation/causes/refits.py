@@ -124,9 +124,9 @@ class Refits:
             refit.predict_next_to([*before, part])
         if cause.effect.id in LATE:
             part = self._whole(part, candidate, name)
-        if sum(e.equation == name for e in cause.place.enters) > 1:
+        if cause.effect.id in LATE or sum(e.equation == name for e in cause.place.enters) > 1:
             # the term is one of several ways in which the cause enters, such as a position's delay
-            # by the speed and the acceleration
+            # by the speed and the acceleration; a late reading is early by itself, as no term is
             whole = self._columns(candidate, name, acts)
             term_left, left = (refit.solve([*before, p]).squared for p in (part, whole))
             if left < (1.0 - self.numbers.form_floor) * term_left:

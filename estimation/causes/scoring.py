@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -111,6 +111,9 @@ def tried(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
             gain, price = round(float(judged.gains[k]), DIGITS), _price(candidate, joint)
             score = gain - price.score(joint.numbers)
             by_run = Products(*(x[:, k] for x in judged.by_run))
+            if isinstance(candidate.cause, Source):
+                cause = candidate.cause.directed(float(amplitudes[0]))
+                candidate = replace(candidate, cause=cause)
             out.append(Scored(candidate, score, gain, price, amplitudes, by_run))
     return out
 

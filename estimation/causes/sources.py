@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,8 @@ ANGLE_STEP_RAD = 1e-4
 TURNING = ("motor_angle", "output_angle", "encoder")
 """Roles of an angle that a wave repeats with."""
 
-LATE = ("sensor.delay", "sensor.lag", "motor.electrical")
+READ_LATE = ("sensor.delay", "sensor.lag")
+LATE = (*READ_LATE, "motor.electrical")
 LEAST_LATE, MOST_LATE = 0.3, 1.5
 """Share of a reading that a delay or a lag makes late, at least and at most. It is the whole
 reading, but for noise; a small slow share is creep."""
@@ -51,6 +52,8 @@ class Source:
         parts: Which of its columns take part, so that simpler forms compete too.
         odd: Whether half the difference to the same filter backwards in time stands in for it: its
             correlation with the stationary noise of what it reads is zero.
+        ahead: Whether its reading is what is late, so that its whole form is an advance of that
+            reading, and a delay of what other sensors predict for it.
         bend: Its deviation from its equation, after the column itself; none if None.
         tried: How many points it was chosen from by the error, of which it is the only candidate;
             0 where all of them are.
@@ -62,6 +65,7 @@ class Source:
     shape: tuple[float, ...]
     parts: tuple[int, ...]
     odd: bool = False
+    ahead: bool = False
     bend: Bend | None = None
     tried: int = 0
 
@@ -123,6 +127,16 @@ class Source:
         """The role of the angle or position that a wave repeats with."""
         return next(role for role, _ in self.channels if role in TURNING)
 
+    def directed(self, amplitude: float) -> "Source":
+        """Return a cause that was found by its odd part, with the direction that this shows.
+
+        A reading is late in any case. At a drive the reading of its current may be late, with a
+        negative amplitude, or what the current drives.
+        """
+        of_reading = self.odd and self.effect.id in READ_LATE
+        is_ahead = of_reading and (self.place.kind != "actuator" or amplitude < 0.0)
+        return replace(self, ahead=True) if is_ahead else self
+
     def values(self, run: RunSignals) -> FloatArray | None:
         """Return the source's columns over the run, (n, parts), as its own equation reads them.
 
@@ -142,7 +156,7 @@ class Source:
         for entry in self.place.enters:
             names = self._names(run, entry.equation)
             load = entry.load and signal(run, entry.load, entry.equation)
-            form = (self.effect.id, self.shape, names, self.odd, load, self.on_grid)
+            form = (self.effect.id, self.shape, names, self.odd, self.ahead, load, self.on_grid)
             key = (form, entry.order, bends_first, bends_first and self.parts)
             if key not in run.memo:  # of the grid alone: the whole run is many times as long
                 if form not in series:
@@ -181,9 +195,13 @@ def _worked_out(
             for step in (ANGLE_STEP_RAD, -ANGLE_STEP_RAD)
         ]
         columns = read(load)[:, None] * (ends[0] - ends[1]) / (2.0 * ANGLE_STEP_RAD)
-    if source.odd:
+    reads_itself = source.ahead and tuple(names) == tuple(c for _, c in source.channels)
+    if source.odd or reads_itself:
         back = {r: x[::-1] if r not in CLOCKS else x[-1] - x[::-1] for r, x in seen.items()}
-        columns = 0.5 * (columns - effect.columns(back, source.shape)[::-1])
+        earlier = -effect.columns(back, source.shape)[::-1]
+        # the error of a lag is its time times the rate of its reading, which is odd in time
+        is_odd = source.odd or effect.id == "sensor.lag"
+        columns = 0.5 * (columns + earlier) if is_odd else earlier
     if not np.isfinite(columns).all():
         return None
     if source.is_wave:

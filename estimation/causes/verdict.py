@@ -331,6 +331,8 @@ def _unwritten(candidate: Candidate) -> str:
         why = "it acts in some of the runs only"
     elif isinstance(cause, Function):
         why = "its form is unknown"
+    elif cause.ahead:
+        why = "its reading is late, and a model cannot read it earlier"
     elif not any(e.order for e in cause.place.enters if e.equation == cause.place.home):
         why = "it depends on the quantity that the model estimates, which the model cannot read"
     else:
