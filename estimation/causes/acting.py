@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from estimation.causes.blocks import Products
 from estimation.causes.candidates import Candidate, Claim
-from estimation.causes.instruments import instrumented, signal
+from estimation.causes.instruments import estimated
 from estimation.causes.joint import Joint
 from estimation.causes.laid import centred
 from estimation.causes.layout import Layout
-from estimation.causes.places import places_of
+from estimation.causes.places import Place, places_of
 from estimation.causes.run_signals import RunSignals
 from estimation.causes.scoring import is_possible
 from estimation.causes.sources import Source
@@ -159,9 +159,23 @@ class Moved(Source):
         return False
 
     @property
+    def is_gain(self) -> bool:
+        """Whether it is the gain of a sensor or of a drive, as a share of the usual one."""
+        return self.effect.id == "sensor.gain" or self.of_all
+
+    @property
     def side(self) -> int:
         """The sign of its term is in how it enters."""
         return 1
+
+    def _names(self, run: RunSignals, equation: str) -> tuple[str, ...]:
+        """Return what stands for its channels; for a target, what its equation estimates.
+
+        Unless other sensors predict it; the target's own reading would explain itself.
+        """
+        found = zip(super()._names(run, equation), self.channels, strict=True)
+        own = [(n, estimated(c, equation) if n == c else n) for n, (_, c) in found]
+        return tuple(estimate if estimate in run.channels else n for n, estimate in own)
 
     def change(self, amplitude: float, runs: Sequence[RunSignals]) -> float:
         """Return by how much the factor differs; of a gain, as a share of the usual one.
@@ -172,16 +186,23 @@ class Moved(Source):
             amplitude: Of its column.
             runs: Those in which it acts.
         """
-        if self.effect.id != "sensor.gain" and not self.of_all:
+        if not self.is_gain:
             return amplitude
         (channel,), home = self.reads, self.place.home
         both = [
             [run.channels[name][run.grid[run.used[home]]] for run in runs]
-            for name in (channel, signal(runs[0], channel, home))
+            for name in (channel, *self._names(runs[0], home))
         ]
         read, stands = (np.concatenate([x - x.mean() for x in of_runs]) for of_runs in both)
         share = amplitude * float(stands @ stands) / float(read @ stands)
         return share if self.place.kind == "actuator" else share / (1.0 - share)
+
+    def change_from_usual(self, amplitude: float) -> float:
+        """Return by how much a gain differs whose column is what the usual one predicts.
+
+        A drive that gives more torque an ampere takes less current.
+        """
+        return amplitude / (1.0 - amplitude) if self.place.kind == "actuator" else amplitude
 
 
 def amplitudes_of(layout: Layout) -> Iterator[Moved]:
@@ -206,18 +227,22 @@ def amplitudes_of(layout: Layout) -> Iterator[Moved]:
 def gains_of(layout: Layout) -> Iterator[Moved]:
     """Yield the gains of drives that are targets, and of all sensors of a torque or a force.
 
-    What only one equation reads, its target, is read as the equation predicts it.
+    By that of a target which no other equation reads, all terms of its equation differ.
     """
     for place in places_of(layout):
-        target = layout.equations[place.home].target
-        is_predicted = instrumented(target, place.home) in layout.runs[0].channels
-        of_all = is_predicted and len(place.enters) == 1
+        target, of_all = layout.equations[place.home].target, reads_target_alone(layout, place)
         if place.name == f"actuator {target}" and of_all:
             constant, source = effect("motor.torque_constant"), (("source", target),)
             yield Moved(place, constant, source, (), (0,), of_all=True)
         elif place.kind == "torque sensor" and (of_all or len(place.enters) > 1):
             reading = (("reading", place.roles["reading"][0]),)
             yield Moved(place, effect("sensor.gain"), reading, (), (0,), of_all=of_all)
+
+
+def reads_target_alone(layout: Layout, place: Place) -> bool:
+    """Whether a place is that of the reading which is one equation's target and in no other."""
+    target = layout.equations[place.home].target
+    return len(place.enters) == 1 and target in place.roles.get("reading", ())
 
 
 def moved_terms(joint: Joint) -> list[tuple[Claim, Products]]:
@@ -233,18 +258,21 @@ def moved_terms(joint: Joint) -> list[tuple[Claim, Products]]:
         if one.effect.id == "sensor.gain" and not one.of_all:
             out.append((Claim(one), _products(joint, one, usual)))
             continue
-        part = one.place.home, "within"
-        terms = np.zeros(joint.size + 1)
-        if one.column is not None:
-            terms[joint.at[part][one.column]] = 1.0
-        elif one.of_all:
-            terms[joint.at[part]] = one.place.enters[0].gain * usual[joint.at[part]]
-        else:
+        if not one.is_declared:
             continue
-        products = weights[part] * joint.gram[part] @ terms[:, None]
-        base = products[:, :-1]
-        cross = products[:, -1] - np.einsum("b,rbk->rk", usual, base)
-        out.append((Claim(one), Products(base, (terms @ products)[..., None], cross)))
+        across, own = np.zeros((len(joint.runs), joint.size + 1)), np.zeros(len(joint.runs))
+        for part in ((one.place.home, kind) for kind in ("within", "between")):
+            terms, at = np.zeros(joint.size + 1), [*joint.at[part]]
+            if one.column is None:
+                terms[at] = one.place.enters[0].gain * usual[at]
+            else:
+                terms[at[one.column]] = 1.0
+            added = weights[part] * joint.gram[part] @ terms
+            across += added
+            own += added @ terms
+        base = across[:, :-1, None]
+        cross = across[:, -1:] - np.einsum("b,rbk->rk", usual, base)
+        out.append((Claim(one), Products(base, own[:, None, None], cross)))
     return out
 
 

@@ -171,6 +171,8 @@ def _amplitudes_and_shape(
         moved = Term(cause.effect, channels=dict(cause.channels))
         unit = "1" if cause.of_all else moved.unit(cause.effect.amplitudes[k], model.target)
         amplitude = float(refits.of[home].amplitudes(kept.part, refits.parts[home])[k])
+        if cause.is_gain and model.target in cause.reads:  # of what the equation predicts for it
+            return {"change": Value(cause.change_from_usual(amplitude), unit, None)}
         acting = [run for run in refits.layout.runs if run.name in finding.runs_affected]
         return {"change": Value(cause.change(amplitude, acting), unit, None)}
     if (term := written_term(kept, model)) is not None:

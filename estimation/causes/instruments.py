@@ -30,6 +30,11 @@ def instrumented(channel: str, equation: str) -> str:
     return f"{channel} for {equation}"
 
 
+def estimated(channel: str, equation: str) -> str:
+    """Return the name under which an equation's own estimate of its target is kept."""
+    return f"{channel} by {equation}"
+
+
 def add_instruments(layout: Layout, train: Sequence[str]) -> None:
     """Add to every run the efforts of every equation, predicted without that equation's sensors.
 
@@ -51,12 +56,11 @@ def add_instruments(layout: Layout, train: Sequence[str]) -> None:
         seen = [(r, k) for r, k in zip(layout.runs, known, strict=False) if r.name in trained]
         good = {c for c in own if _is_better(equation, c, seen)}
         layout.independent.update((c, equation.name) for c in good & apart)
-        estimated = equation.target not in good and equation.is_quieter([r for r, _ in seen])
+        takes_its_place = equation.target not in good and equation.is_quieter([r for r, _ in seen])
         for run, others in zip((*layout.runs, *layout.shaken), known, strict=True):
             for channel in good:
                 run.channels[instrumented(channel, equation.name)] = others[channel]
-            if estimated:
-                _add_estimate(equation, run)
+            _add_estimate(equation, run, takes_its_place)
 
 
 def signal(run: RunSignals, channel: str, equation: str) -> str:
@@ -156,9 +160,12 @@ def _is_better(
     return added <= left
 
 
-def _add_estimate(equation: Equation, run: RunSignals) -> None:
-    """Add what an equation predicts for its target, and for the speed of an angle."""
+def _add_estimate(equation: Equation, run: RunSignals, takes_its_place: bool) -> None:
+    """Add what an equation predicts for its target, which may take its place, and for its speed."""
     target = equation.estimate(run.channels)
+    run.channels[estimated(equation.target, equation.name)] = target
+    if not takes_its_place:
+        return
     if equation.of_angle:  # an estimate has no offset, and a place along the travel needs one
         target = target + float(np.mean(run.channels[equation.target] - target))
     run.channels[instrumented(equation.target, equation.name)] = target

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from estimation.causes.acting import Moved, amplitudes_of
+from estimation.causes.acting import Moved, amplitudes_of, reads_target_alone
 from estimation.causes.candidates import Claim
 from estimation.causes.layout import Layout
 from estimation.causes.offered import sources_at
@@ -43,7 +43,10 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
         is_drive = place.name == f"actuator {layout.equations[place.home].target}"
         if place.kind in ("torque sensor", "angle sensor") or is_drive:
             gain, reading = effect("sensor.gain"), (("reading", place.roles["reading"][0]),)
-            changed = Changed(place, gain, reading, (), (0,), key=f"gain of {place.name}")
+            of_all = reads_target_alone(layout, place)
+            changed = Changed(
+                place, gain, reading, (), (0,), of_all=of_all, key=f"gain of {place.name}"
+            )
             yield Claim(changed, later, given=True)
         for source in sources_at(layout, place):
             if _takes_part(source):

@@ -117,6 +117,25 @@ def test_a_drive_that_gives_another_torque_an_ampere_is_named_where_it_is_the_ta
     assert low < 1 / 1.25 - 1 < high
 
 
+def test_a_gain_of_the_cell_is_named_where_all_terms_differ_by_one_factor():
+    def behind_a_drive(seed: int, gain: float) -> list[Recording]:
+        random, out = np.random.default_rng(seed), []
+        for run in record(seed):
+            force = 3.0 * np.sin(2.0 * TIME_S + random.uniform(0.0, 6.0))
+            current = (force + run["drive_force_n"]) / 2.0
+            cell = gain * force + random.normal(0, 0.01, TIME_S.size)
+            out.append(run.with_columns(drive_current_a=current, cell_force_n=cell))
+        return out
+
+    constant = Term(effect("motor.torque_constant"), 1, {"source": "drive_current_a"})
+    model = equation("cell_force_n", constant, -1, "axis_velocity_m_s")
+    mass = Term(effect("inertia.missing"), -1, {"acceleration": "axis_acceleration_m_s2"})
+    model = replace(model, terms=(*model.terms, mass))
+    (change,) = compare(behind_a_drive(1, 1.0), behind_a_drive(2, 1.05), [model]).changes
+    assert change.name == "gain of sensor cell_force_n"
+    assert change.parameters["gain"] == pytest.approx(0.05, abs=0.005)
+
+
 @pytest.mark.parametrize(
     ("before", "after", "verdict", "family"),
     [

@@ -1,6 +1,6 @@
 """What the search over causes finds, and what it never reads."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -26,7 +26,7 @@ from estimation.causes.scoring import assessed, best_of_each, tried
 from estimation.causes.search import Found, search
 from estimation.causes.verdict import answer, diagnose
 from estimation.derived import CAMPAIGN_TIME
-from estimation.diagnosis.result import Finding
+from estimation.diagnosis.result import Diagnosis, Finding
 from estimation.diagnosis.split import split
 from estimation.effects import effect
 from estimation.model import Model, Term
@@ -243,6 +243,45 @@ def test_the_gain_of_a_sensor_that_is_the_target_competes_with_that_of_the_drive
     assert {*finding.runs_affected} == {runs[k].name for k in has}
     change = {"sensor.gain": -0.08, "motor.torque_constant": -0.08 * 0.8}[finding.family]
     assert finding.parameters["change"].value == pytest.approx(change, rel=0.05)
+
+
+def _read_behind_a_drive(gains: Sequence[float], late_s: float = 0.0) -> Diagnosis:
+    """Return the diagnosis of a drive with friction whose load is read with little noise.
+
+    Args:
+        gains: Of the sensor of the load, one a run.
+        late_s: How late the current is read.
+    """
+    random, runs = np.random.default_rng(0), []
+    for k, (run, gain) in enumerate(zip(turning(), gains, strict=False)):
+        load = 0.3 * (1.0 + 0.1 * (3 * k % 10)) * (2.0 + np.sin(11.0 * run.time_s + k))
+        current = (load + run["crank_torque_n_m"]) / 0.8 + random.normal(0, 0.01, len(load))
+        columns = {
+            "crank_current_a": np.interp(run.time_s - late_s, run.time_s, current),
+            "crank_torque_n_m": gain * load + random.normal(0, 0.002, len(load)),
+        }
+        runs.append(Recording(run.name, run.time_s, run.columns | columns))
+    sensor = '[[sensor]]\nname = "crank_torque_n_m"\naxis = "crank"\nreads = "effort"\n'
+    models = declared(plant_file.parse(AXIS.replace("DRIVE", "crank_current_a") + sensor))
+    return diagnose(runs, models, split(runs))
+
+
+def test_the_gain_of_a_sensor_with_little_noise_is_named_where_it_differs_in_some_runs() -> None:
+    """All terms of its equation differ by one factor, and no other sensor predicts its reading."""
+    has = (1, 4, 6, 8)
+    found = _read_behind_a_drive([1.1 if k in has else 1.0 for k in range(12)])
+    (finding,) = found.findings
+    assert finding.family == "sensor.gain"
+    assert finding.parameters["change"].value == pytest.approx(0.1, rel=0.05)
+    assert {*finding.runs_affected} == {f"{k:02d}" for k in has}
+
+
+def test_a_late_reading_of_the_drive_is_one_finding_that_removes_its_error() -> None:
+    """Its reading comes late, so its whole form is an advance."""
+    found = _read_behind_a_drive([1.0] * 12, late_s=0.02)
+    (finding,) = found.findings
+    assert finding.family in ("sensor.delay", "sensor.lag")
+    assert finding.rmse_after < 0.15 * finding.rmse_before
 
 
 def test_a_tight_spot_in_every_turn_depends_on_the_angle_and_the_direction() -> None:
