@@ -169,9 +169,9 @@ class Moved(Source):
         return 1
 
     def _names(self, run: RunSignals, equation: str) -> tuple[str, ...]:
-        """Return what stands for its channels; for a target, what its equation estimates.
+        """Return the signals for its channels; for a target that of its equation's estimate.
 
-        Unless other sensors predict it; the target's own reading would explain itself.
+        Unless other sensors predict it: the target's own reading would explain itself.
         """
         found = zip(super()._names(run, equation), self.channels, strict=True)
         own = [(n, estimated(c, equation) if n == c else n) for n, (_, c) in found]
