@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimation.causes.apart import Apart, apart
 from estimation.causes.candidates import Candidate, Claim, laid_out
 from estimation.causes.criterion import base_errors, log_ratio
 from estimation.causes.joint import Joint
-from estimation.causes.laid import TINY, Part
+from estimation.causes.laid import Part
 from estimation.causes.layout import Layout
 from estimation.causes.nuisances import with_skews
 from estimation.causes.numbers import Numbers
@@ -18,14 +19,6 @@ from estimation.causes.sources import Source
 from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.split import Sealed
 from estimation.recording import FloatArray
-
-ALIKE, FACTOR = 0.7, 2.0
-"""Correlation from which a run follows the prediction of the others, and the factor from which it
-is remarked on."""
-
-UNEXPLAINED, AS_USUAL = 0.1, 1.5
-"""Share of a run's own variation that the prediction times a factor may not explain: the first, or
-so many times that of half of the runs. A run in which another effect dominates has more."""
 
 OPEN = 0.05
 """Probability of acting, or of not acting, below which the training runs decide."""
@@ -78,14 +71,8 @@ class HeldOut:
         self._last: tuple[tuple[Candidate, ...], Joint, Mapping[Part, FloatArray]] | None = None
         self.at = [k for k, run in enumerate(layout.runs) if run.name in set(sealed.confirm)]
 
-    def apart(
-        self, kept: Sequence[tuple[Candidate, Collection[str]]]
-    ) -> list[tuple[str, str, float]]:
-        """Return equation, run and factor where a run's target is not what the others predict.
-
-        The factor is the slope of the target over the prediction of the other runs: -1 where a sign
-        is swapped, 57 where degrees were taken for radians. The run's variation has to be the
-        prediction times that factor, as closely as in most runs.
+    def apart(self, kept: Sequence[tuple[Candidate, Collection[str]]]) -> list[Apart]:
+        """Return the runs of which one channel is not what the others predict.
 
         Args:
             kept: The causes found, each with the runs in which it acts; they predict too.
@@ -94,21 +81,7 @@ class HeldOut:
         for candidate, runs in kept:
             some = tuple(run.name in runs for run in self.layout.runs)
             joint = self._grown(joint, candidate, None if candidate.acts is None else some)
-        fits, found = joint.left_out([[k] for k in range(len(self.layout.runs))]), []
-        for name in self.layout.equations:
-            gram = joint.gram[name, "within"]
-            both = np.einsum("rb,rb->r", fits.base, gram[:, :-1, -1])
-            predicted = np.einsum("rb,rbc,rc->r", fits.base, gram[:, :-1, :-1], fits.base) + TINY
-            alike = np.abs(both) / np.sqrt(predicted * gram[:, -1, -1] + TINY)
-            rest = 1.0 - alike**2
-            most = max(UNEXPLAINED, AS_USUAL * float(np.median(rest)))
-            is_scaled = (alike > ALIKE) & (rest < most)
-            for run, slope, agrees in zip(
-                self.layout.runs, both / predicted, is_scaled, strict=True
-            ):
-                if agrees and not 1.0 / FACTOR < slope < FACTOR:
-                    found.append((name, run.name, float(slope)))
-        return found
+        return apart(joint)
 
     def acts_in(
         self, before: Sequence[Candidate], cause: Candidate

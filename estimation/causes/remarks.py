@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 
 import numpy as np
 
+from estimation.causes.apart import Apart
 from estimation.causes.equations import Equation
 from estimation.causes.folds import unvaried
 from estimation.causes.instruments import noise_share
@@ -21,12 +22,12 @@ from estimation.recording import Recording
 from estimation.signals import Signals
 
 
-def apart(layout: Layout, found: Iterable[tuple[str, str, float]]) -> Iterator[str]:
-    """Yield the runs whose target is in another sign or unit than the other runs predict."""
-    for name, run, factor in found:
+def apart(layout: Layout, found: Iterable[Apart]) -> Iterator[str]:
+    """Yield the runs of which a channel is in another sign or unit than the others predict."""
+    for channel, run, factor in found:
         yield (
-            f"{run}: {layout.equations[name].target} is {factor:.2g} times what the other runs"
-            " predict for it. Check its sign and unit in this run, or exclude the run."
+            f"{run}: {channel} is {factor:.2g} times what the other runs predict for it. Check its"
+            " sign and unit in this run, or exclude the run."
         )
 
 

@@ -1,6 +1,6 @@
 """Recordings of one torque equation, with or without an effect that it does not declare."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -192,5 +192,62 @@ def turning(
         lost = lost + torque(angle, speed, acceleration)
         lost += random.normal(0, 0.01 * np.std(lost), len(time))
         columns = {"crank_torque_n_m": lost, "crank_angle_rad": angle}
+        out.append(Recording(f"{k:02d}", time, columns, started_at_ns=int(1e10 * k) + 1))
+    return out
+
+
+HOIST = """
+schema = "rig.machine/1"
+machine = { name = "hoist", cutoff_hz = 10.0, run_offsets = false }
+[[axis]]
+name = "drum"
+unit = "rad"
+[[axis]]
+name = "rope"
+unit = "m"
+[[transmission]]
+name = "drum_rope"
+input = "drum"
+output = "rope"
+ratio = 20.0
+[[actuator]]
+name = "drive_command_v"
+axis = "drum"
+[[sensor]]
+name = "drum_angle_rad"
+axis = "drum"
+reads = "position"
+[[sensor]]
+name = "rope_force_n"
+axis = "rope"
+reads = "effort"
+"""
+"""A drum that is driven by a voltage, 60 N/V at the rope, and lifts a mass."""
+
+
+def hoist(cutoff_hz: float = 10.0) -> Model:
+    """Return its equation: that of the force, with noise of an acceleration below a cutoff."""
+    text = HOIST.replace("cutoff_hz = 10.0", f"cutoff_hz = {cutoff_hz}")
+    (model,) = declared(plant_file.parse(text))
+    return model
+
+
+def hoisted(masses_kg: Sequence[float] = (20.0, 40.0, 60.0, 80.0)) -> list[Recording]:
+    """Return runs of a hoist that lifts masses in turn; every fourth run is slow."""
+    random = np.random.default_rng(0)
+    time, out = np.arange(int(RATE_HZ * SECONDS)) / RATE_HZ, []
+    for k in range(12):
+        mass, size = masses_kg[k % len(masses_kg)], 0.2 if k % 4 == 1 else 3.0
+        waves = zip(random.uniform(0.1, 0.4, 3), random.uniform(0, 2 * np.pi, 3), strict=True)
+        angle = size * sum(np.sin(2 * np.pi * f * time + p) for f, p in waves) / 2
+        speed = np.gradient(angle, time)
+        acceleration = np.gradient(speed, time)
+        torque = (0.6 + mass * 0.05**2) * acceleration + 8.0 * speed + 4.0 * np.tanh(speed / 0.01)
+        volts = (torque + mass * 9.81 * 0.05) / 3.0
+        columns = {
+            "drive_command_v": volts + random.normal(0, 0.02, len(time)),
+            "drum_angle_rad": angle + random.normal(0, 2e-4, len(time)),
+            "rope_force_n": mass * (9.81 + 0.05 * acceleration) + random.normal(0, 1.5, len(time)),
+        }
         out.append(Recording(f"{k:02d}", time, columns, started_at_ns=int(1e10 * k) + 1))
     return out

@@ -10,7 +10,7 @@ from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
 from estimation.signals import Combination, Share, Signals
-from tests.estimation.causes.synthetic import axis, turning
+from tests.estimation.causes.synthetic import axis, hoist, hoisted, motor, recordings, turning
 
 REMARK = "times what the other runs predict"
 
@@ -39,6 +39,33 @@ def test_a_run_with_a_swapped_sign_is_the_first_note() -> None:
     found = diagnose(runs, [axis()], split(runs))
     assert found.notes[0].startswith(f"04: crank_torque_n_m is -1 {REMARK}")
     assert len(found.notes) > 1
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor"),
+    [("proximal_torque_n_m", -1.0), ("motor_current_a", -1.0), ("motor_current_a", 10.0)],
+)
+def test_the_run_that_is_apart_is_named_with_its_channel_and_no_other_run(
+    channel: str, factor: float
+) -> None:
+    runs = recordings()
+    runs[4] = runs[4].with_columns(**{channel: factor * runs[4][channel]})
+    (note,) = [n for n in diagnose(runs, [motor()], split(runs)).notes if REMARK in n]
+    said = re.match(rf"04: {channel} is (\S+) {REMARK} for it", note)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(factor, rel=0.2)
+
+
+def test_a_slow_run_in_another_unit_shows_in_its_mean() -> None:
+    runs = hoisted()
+    runs[5] = runs[5].with_columns(rope_force_n=10.0 * runs[5]["rope_force_n"])
+    (note,) = [n for n in diagnose(runs, [hoist()], split(runs)).notes if REMARK in n]
+    assert note.startswith("05: rope_force_n is ")
+
+
+def test_a_slow_run_whose_prediction_is_mostly_noise_is_not_remarked_on() -> None:
+    runs = hoisted()
+    assert not [n for n in diagnose(runs, [hoist(28.0)], split(runs)).notes if REMARK in n]
 
 
 def uneven(factor: float, share: float) -> tuple[list[Recording], str]:
