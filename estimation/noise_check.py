@@ -73,7 +73,7 @@ def _noise_sizes(model: Model, campaign: Campaign) -> dict[str, float]:
             if isinstance(term.effect, Proportional) and origin_of(channel)[1]:
                 gains[channel] = gains.get(channel, 0.0) + float(term.weights[0])
     squares: dict[str, list[float]] = {name: [0.0] for name in gains}
-    for _, noise in _noises(model, campaign, list(gains)):
+    for _, noise in noises(model, campaign, list(gains)):
         for name, gain in gains.items():
             squares[name].append(float(np.var(gain * noise[name])))
     return {name: math.sqrt(np.mean(own[1:] or own)) for name, own in squares.items()}
@@ -83,14 +83,14 @@ def _noise_shares(model: Model, campaign: Campaign) -> dict[str, float]:
     """Return the noise of each channel over all that it holds, the median over runs."""
     names = [name for name in model.channels if name not in CLOCKS]
     shares: dict[str, list[float]] = {name: [] for name in names}
-    for channels, noise in _noises(model, campaign, names):
+    for channels, noise in noises(model, campaign, names):
         for name in names:
             size = float(np.std(channels[name]))
             shares[name].append(float(np.std(noise[name])) / size if size else 0.0)
     return {name: float(np.median(found or [0.0])) for name, found in shares.items()}
 
 
-def _noises(
+def noises(
     model: Model, campaign: Campaign, names: Sequence[str]
 ) -> Iterator[tuple[dict[str, FloatArray], dict[str, FloatArray]]]:
     """Yield of each run channels, and the noise of their readings, where the equation counts."""

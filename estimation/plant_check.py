@@ -24,6 +24,7 @@ from estimation.plant import Plant
 from estimation.plant_equations import Missing, missing, signals, unused
 from estimation.plant_models import declared
 from estimation.recording import Recording, move_condition, shared_columns
+from estimation.separable import inseparable
 from estimation.signals import Reading
 from estimation.travel import FOLLOWS, other_ratio, slope
 
@@ -165,7 +166,8 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
         fitted = fit(model, campaign, bootstrap=0)
     except EstimationError as error:
         return replace(plain, trouble=f"{error.what} {error.fix}".strip())
-    limits = (*plain.limits, *swamped(fitted, campaign))
+    shared = filter(None, [inseparable(fitted, campaign)])
+    limits = (*plain.limits, *swamped(fitted, campaign), *shared)
     found = replace(_described(fitted, values=True), limits=limits)
     evidence = fitted.evidence
     assert evidence is not None  # noqa: S101  a fit sets its evidence

@@ -130,6 +130,7 @@ def fit(
     """
     from estimation import model_file
     from estimation.opposed import FIX, opposed
+    from estimation.separable import inseparable
     from estimation.travel import off_ratio
     from rig.importers.questions import questions
     from rig.machines.recordings import open_recordings
@@ -154,6 +155,8 @@ def fit(
             said.append(f"{contradicted} The values above describe that: correct the ratio first.")
         if contradicted := opposed(fitted, campaign):
             said.append(f"{contradicted} {FIX}")
+        if shared := inseparable(fitted, campaign):
+            said.append(f"Check: {fitted.balance}: {shared}")
     if out is not None:
         model_file.write_all([fitted for fitted, _ in done], out)
         said.append(f"Model: {out}")

@@ -30,6 +30,7 @@ from estimation.plant_file import PlantFileError, parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from estimation.recording import Recording
 from estimation.signals import Combination, Direction, Reading, Share
+from tests.estimation.causes.synthetic import HOIST, hoisted
 
 REFERENCE = to_toml(shipped_plant("reference"))
 
@@ -255,6 +256,19 @@ def test_noise_of_an_acceleration_that_swamps_the_drive_is_named(noise_m, is_nam
         lower = replace(plant, cutoff_hz=float(proposed[1]))
         (equation,) = check(lower, Campaign.of(runs)).equations
         assert not equation.limits
+
+
+@pytest.mark.parametrize(("masses", "is_named"), [((60.0,), True), ((20.0, 40.0, 80.0), False)])
+def test_amplitudes_that_one_load_does_not_separate_are_named(masses, is_named):
+    runs = [
+        replace(run, conditions={"load_mass_kg": masses[k % len(masses)]})
+        for k, run in enumerate(hoisted(masses))
+    ]
+    (equation,) = check(parse(HOIST), Campaign.of(runs)).equations
+    said = " ".join(equation.limits)
+    named = "motor.torque_constant gain, inertia.missing inertia"
+    assert (f"{named}, friction.viscous damping" in said) == is_named
+    assert ("In all of them load_mass_kg is 60." in said) == is_named
 
 
 def test_the_unit_of_a_travel_does_not_matter():
