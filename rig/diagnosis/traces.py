@@ -3,7 +3,7 @@
 They are those that the reported errors are made of: the same samples, the same refitted equations.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
@@ -14,8 +14,8 @@ from estimation.causes.functions import Function
 from estimation.causes.verdict import Answer
 from estimation.cross_validation import live_half_width
 from estimation.derived import zero_phase_channels
-from estimation.model import Model, counted_error
-from estimation.recording import FloatArray
+from estimation.model import Model, counted_error, predict
+from estimation.recording import FloatArray, Recording
 from estimation.scores import rmse
 
 
@@ -108,8 +108,9 @@ def with_cost_of_causal_filters(found: Answer) -> Answer:
     """Return the diagnosis with the error of each written model with causal filters.
 
     A note states it next to that of zero-phase filters. Both estimates are compared with the target
-    as the zero-phase filter gives it, on the test runs, each run's mean removed. The models contain
-    their interval live, and their date.
+    as the zero-phase filter gives it, on the test runs, each run's mean removed, where the equation
+    counts. The error that a replay shows has none of that, and may be far larger: it is stated too.
+    The models contain their interval live, and their date.
     """
     notes, models = [], []
     now = datetime.now(UTC).isoformat(timespec="seconds")
@@ -126,11 +127,25 @@ def with_cost_of_causal_filters(found: Answer) -> Answer:
             f" causal ones it runs with live ({causal / max(zero_phase, 1e-300):.2f} times as"
             " much)."
         )
+        if shown := [error for run in runs for error in _as_shown(model, run)]:
+            at_rest = "at reversals and standstill too, " * (model.samples == "motion")
+            notes[-1] += (
+                f" Next to {model.target} as it is read, {at_rest}with the delay of these filters,"
+                f" it is {scale * rmse(np.concatenate(shown), 0.0):.3g} {unit}: a replay shows it."
+            )
         half_width = live_half_width(errors[1])
         evidence = model.evidence and replace(model.evidence, made_at=now, half_width=half_width)
         models.append(replace(model, evidence=evidence))
     diagnosis = replace(found.diagnosis, notes=(*found.diagnosis.notes, *notes))
     return replace(found, diagnosis=diagnosis, models=tuple(models))
+
+
+def _as_shown(model: Model, run: Recording) -> Iterator[FloatArray]:
+    """Yield the error that a replay of a run shows; nothing where its target is not recorded."""
+    if model.target in run:
+        settled = np.cumsum(run.valid) > 2.0 * model.low_pass.reach_s * run.sample_rate_hz
+        error = run[model.target] - predict(model, run, causal=True)
+        yield error[settled & run.valid & np.isfinite(error)]
 
 
 def _spread(errors: Sequence[FloatArray]) -> float:
