@@ -1,6 +1,6 @@
 """From the columns of a file to channels and conditions in SI units."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
@@ -9,12 +9,13 @@ import numpy as np
 from estimation.channels import UnknownUnitError, unit_of, unit_or_none
 from estimation.recording import FloatArray
 from rig.errors import DataError, UsageError
+from rig.importers.table.cuts import edges_of
 from rig.importers.table.data import DATE, TIME, Source
 from rig.importers.table.delimited import after_samples, bad_cell
 from rig.importers.table.formula import names_in
 from rig.importers.table.mapping import ColumnMapping, worked_out
-from rig.importers.table.raw import Raw, Values, is_number
-from rig.importers.table.units import BASE, agree, as_unit, conversion, stated_in_name
+from rig.importers.table.raw import Raw, Values, find, is_number
+from rig.importers.table.units import agree, as_unit, conversion, stated_in_name
 from rig.output.table import counted
 
 IMPOSSIBLE = 1e24
@@ -48,19 +49,23 @@ class Samples:
         raw: The file.
         mapping: What its columns were mapped by.
         time_s: Shape (n,), as it is there.
+        edges: First sample of each run, and the end of the last one.
         channels: Name to values, shape (n,) each; not finite where a cell is empty.
         conditions: Name to one value, or to values that must be constant in each run.
         started_at_ns: Time of the first sample where the file holds dates, ns since 1970.
         doubts: What is doubtful about the file, questions in words.
+        remarks: What was assumed about its clock, in words.
     """
 
     raw: Raw
     mapping: ColumnMapping
     time_s: FloatArray
+    edges: list[int]
     channels: dict[str, FloatArray]
     conditions: dict[str, float | str | Values]
     started_at_ns: int | None = None
     doubts: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:
@@ -72,61 +77,59 @@ def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:
     """
     data = mapping.data
     sources = data.columns or _by_name(raw, mapping)
+    time_s, started_at_ns, remarks = _clock(raw, mapping, sources.get(TIME))
+    edges = edges_of(raw, mapping, time_s)
     channels = {
-        name: _channel(raw, mapping.where("columns", name), name, source)
+        name: _channel(raw, mapping.where("columns", name), name, source, edges)
         for name, source in sources.items()
-        if not (name == TIME and source.unit == DATE)
+        if name != TIME
     }
     conditions = {
         name: _condition(raw, mapping.where("conditions", name), name, source)
         for name, source in data.conditions.items()
     }
-    started_at_ns = None
-    if TIME in sources and sources[TIME].unit == DATE:
-        time_s, started_at_ns = _dates(raw, mapping.where("columns", TIME), sources[TIME])
-    elif TIME in channels:
-        time_s = channels.pop(TIME)
-    elif data.sample_rate_hz is not None:
-        time_s = np.arange(len(raw)) / data.sample_rate_hz
-    else:
-        raise DataError(
-            f"{raw.path} has no time: no column is called time_s, and no sample rate is stated.",
-            raw.listing(),
-            "Map one, --column time_s=COLUMN:ms, or state --rate HZ.",
-        )
     for name, formula in _in_order(mapping):
         known = {**conditions, **channels, TIME: time_s}
         where = mapping.where("formulas", name)
         channels[name] = worked_out(where, formula, known, time_s.shape, np.float64).copy()
     mapped = {**sources, **data.conditions}.items()
     doubts = tuple(text for name, source in mapped for text in _doubts(raw, name, source))
-    return Samples(raw, mapping, time_s, channels, conditions, started_at_ns, doubts)
-
-
-def find(raw: Raw, where: str, key: str, column: str) -> Values | float | str:
-    """Return a column or single value of a file by name, for a key of the mapping and its place.
-
-    Raises:
-        DataError: The file has neither.
-    """
-    if column in raw.columns:
-        return raw.columns[column]
-    if column in raw.fields:
-        return raw.fields[column]
-    name, _, unit = column.rpartition(":")
-    if name in raw.columns or name in raw.fields:
-        raise DataError(
-            f"{where}: {unit!r} is not a unit that is known.",
-            "A unit is a product of powers of these with an optional number:"
-            f" {', '.join(BASE)}; with a prefix, such as mm or N cm.",
-            f"Write {key} = '{name}:UNIT', or the column alone where it is in SI units.",
-        )
-    near = raw.nearest(column)
-    raise DataError(
-        f"{where}: {raw.path.name} has no column {column!r} for {key}.",
-        raw.listing(),
-        f"Did you mean {near!r}? Write {key} = {near!r}." if near else "Correct the name.",
+    return Samples(
+        raw, mapping, time_s, edges, channels, conditions, started_at_ns, doubts, remarks
     )
+
+
+def _clock(
+    raw: Raw, mapping: ColumnMapping, source: Source | None
+) -> tuple[FloatArray, int | None, tuple[str, ...]]:
+    """Return the time of each sample, s, that of the first one if known, ns, and remarks."""
+    where, rate_hz = mapping.where("columns", TIME), mapping.data.sample_rate_hz
+    if source is not None and source.unit == DATE:
+        return _dates(raw, where, source)
+    if source is not None:
+        time_s = _channel(raw, where, TIME, source, [])
+        of_day = np.nanmin(time_s) >= 0.0 and np.nanmax(time_s) <= DAY_S
+        if of_day and not mapping.data.runs.resets:
+            return _past_midnight(raw, time_s)
+        return time_s, None, ()
+    if rate_hz is not None:
+        return np.arange(len(raw)) / rate_hz, None, ()
+    raise DataError(
+        f"{raw.path} has no time: no column is called time_s, and no sample rate is stated.",
+        raw.listing(),
+        "Map one, --column time_s=COLUMN:ms, or state --rate HZ.",
+    )
+
+
+def _past_midnight(raw: Raw, time_s: FloatArray) -> tuple[FloatArray, None, tuple[str, ...]]:
+    """Return a time of the day that goes on where it falls by about a day, and a remark on it."""
+    steps = np.diff(time_s, prepend=time_s[0])
+    falls = steps < -0.5 * DAY_S
+    if not falls.any() or (steps > 0.5 * DAY_S).any():  # the clock does not come back
+        return time_s, None, ()
+    place = raw.row(int(np.argmax(falls)))
+    remark = f"the time falls by a day in {place}, at midnight, and is continued there"
+    return time_s + DAY_S * np.cumsum(falls), None, (remark,)
 
 
 def _by_name(raw: Raw, mapping: ColumnMapping) -> dict[str, Source]:
@@ -140,7 +143,8 @@ def _by_name(raw: Raw, mapping: ColumnMapping) -> dict[str, Source]:
     return found
 
 
-def _channel(raw: Raw, where: str, name: str, source: Source) -> FloatArray:
+def _channel(raw: Raw, where: str, name: str, source: Source, edges: Sequence[int]) -> FloatArray:
+    """Return a column in SI units; a counter that starts again does so in each run for itself."""
     found = find(raw, where, name, source.column)
     if not isinstance(found, np.ndarray):
         found = np.full(len(raw), found)
@@ -155,7 +159,7 @@ def _channel(raw: Raw, where: str, name: str, source: Source) -> FloatArray:
         )
     numbers = found.astype(np.float64)
     possible = np.where(np.abs(numbers) > IMPOSSIBLE, np.nan, numbers)
-    values = _in_si(raw, where, name, source, possible)
+    values = _in_si(raw, where, name, source, possible, edges)
     if not np.isfinite(values).any():
         raise DataError(
             f"{where}: column {source.column!r} of {raw.path.name} is empty.",
@@ -164,7 +168,14 @@ def _channel(raw: Raw, where: str, name: str, source: Source) -> FloatArray:
     return values
 
 
-def _in_si(raw: Raw, where: str, name: str, source: Source, values: FloatArray) -> FloatArray:
+def _in_si(
+    raw: Raw,
+    where: str,
+    name: str,
+    source: Source,
+    values: FloatArray,
+    edges: Sequence[int] = (),
+) -> FloatArray:
     gain = source.gain
     if isinstance(gain, str):
         gain_found = find(raw, where, name, gain)
@@ -175,7 +186,9 @@ def _in_si(raw: Raw, where: str, name: str, source: Source, values: FloatArray) 
             )
         gain = float(gain_found)
     if source.wraps_at is not None:
-        values = np.unwrap(values, period=source.wraps_at)
+        values = np.concatenate(
+            [_unwrapped(part, source.wraps_at) for part in np.split(values, edges)]
+        )
     if source.sign_bit is not None:
         values = np.where(values >= source.sign_bit, source.sign_bit - values, values)
     unit = conversion(source.unit, name) if source.unit else None
@@ -185,6 +198,13 @@ def _in_si(raw: Raw, where: str, name: str, source: Source, values: FloatArray) 
     if unit is None:
         return np.asarray(gain * (values - source.zero))
     return np.asarray(unit.factor * gain * (values - source.zero) + unit.shift)
+
+
+def _unwrapped(values: FloatArray, period: float) -> FloatArray:
+    """Return the values of a counter, of one run, that goes on where it starts again."""
+    found, is_there = values.copy(), np.isfinite(values)
+    found[is_there] = np.unwrap(values[is_there], period=period)
+    return found
 
 
 def _check_name(where: str, name: str, column: str) -> None:
@@ -273,7 +293,7 @@ def _condition(raw: Raw, where: str, name: str, source: Source) -> float | str |
     return str(many[0]) if many.dtype.kind in "US" else float(many[0])
 
 
-def _dates(raw: Raw, where: str, source: Source) -> tuple[FloatArray, int | None]:
+def _dates(raw: Raw, where: str, source: Source) -> tuple[FloatArray, int | None, tuple[str, ...]]:
     cells = find(raw, where, TIME, source.column)
     assert isinstance(cells, np.ndarray)  # noqa: S101  a single value has no clock
     read = [_date(str(cell)) for cell in cells]
@@ -288,8 +308,8 @@ def _dates(raw: Raw, where: str, source: Source) -> tuple[FloatArray, int | None
         )
     since = np.array([(one - at[0]).total_seconds() for one in at])
     if at[0].date() == NO_DATE:  # a time of the day alone: a run may go past midnight
-        return since + DAY_S * np.cumsum(np.diff(since, prepend=0.0) < -0.5 * DAY_S), None
-    return since, round(at[0].timestamp() * 1e6) * 1000
+        return _past_midnight(raw, since)
+    return since, round(at[0].timestamp() * 1e6) * 1000, ()
 
 
 def _date(cell: str) -> datetime | None:

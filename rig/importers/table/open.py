@@ -75,9 +75,10 @@ def read_runs(path: Path, mapping: ColumnMapping, remarks: list[Remark]) -> Iter
     several = len({file.parent for file in files}) > 1
     for file in files:
         folders = file.relative_to(path).parts[:-1] if several else ()
-        raw = read_raw(file, mapping)
-        remarks += [(file.name, remark) for remark in raw.remarks]
-        for run in recordings(to_samples(raw, mapping), remarks):
+        samples = to_samples(read_raw(file, mapping), mapping)
+        said = (*samples.raw.remarks, *samples.remarks)
+        remarks += [(file.name, remark) for remark in said]
+        for run in recordings(samples, remarks):
             name = "-".join([*folders, run.name])
             if name in taken:
                 name += file.suffix.lower()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import DataError
+from rig.importers.table.units import BASE
 
 Values = NDArray[np.generic]
 """One column: float64, or text where a cell is not a number."""
@@ -65,6 +66,32 @@ class Raw:
         lower = {one.lower(): one for one in known}
         near = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.5)
         return lower[near[0]] if near else ""
+
+
+def find(raw: Raw, where: str, key: str, column: str) -> Values | float | str:
+    """Return a column or single value of a file by name, for a key of the mapping and its place.
+
+    Raises:
+        DataError: The file has neither.
+    """
+    if column in raw.columns:
+        return raw.columns[column]
+    if column in raw.fields:
+        return raw.fields[column]
+    name, _, unit = column.rpartition(":")
+    if name in raw.columns or name in raw.fields:
+        raise DataError(
+            f"{where}: {unit!r} is not a unit that is known.",
+            "A unit is a product of powers of these with an optional number:"
+            f" {', '.join(BASE)}; with a prefix, such as mm or N cm.",
+            f"Write {key} = '{name}:UNIT', or the column alone where it is in SI units.",
+        )
+    near = raw.nearest(column)
+    raise DataError(
+        f"{where}: {raw.path.name} has no column {column!r} for {key}.",
+        raw.listing(),
+        f"Did you mean {near!r}? Write {key} = {near!r}." if near else "Correct the name.",
+    )
 
 
 def with_samples(raw: Raw) -> Raw:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.recording import Flag, FloatArray, Recording, RecordingError, Stretch
 from rig.errors import DataError
-from rig.importers.table.arrays import TRIAL
-from rig.importers.table.channels import Samples, find
+from rig.importers.table.channels import Samples
 from rig.importers.table.mapping import ColumnMapping, worked_out
 from rig.importers.table.raw import Remark, Values
 from rig.output.table import counted
@@ -30,8 +29,7 @@ def recordings(samples: Samples, remarks: list[Remark]) -> Iterator[Recording]:
     Raises:
         DataError: Time goes back inside a run, or a condition changes inside one.
     """
-    edges = _edges(samples)
-    parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
+    parts = [slice(a, b) for a, b in itertools.pairwise(samples.edges)]
     kept = [part for part in parts if _is_long_enough(samples, part)]
     stem, short = samples.raw.path.stem.lower(), len(parts) - len(kept)
     if short:
@@ -43,54 +41,16 @@ def recordings(samples: Samples, remarks: list[Remark]) -> Iterator[Recording]:
         yield _run(samples, part, name, remarks)
 
 
-def _edges(samples: Samples) -> list[int]:
-    """Return the first sample of each run, and the end of the last one."""
-    data, time_s = samples.mapping.data, samples.time_s
-    rules = data.runs
-    since_s = np.maximum.accumulate(time_s - time_s[0])
-    begins = np.zeros(len(time_s), bool)
-    steps = np.diff(time_s)
-    if rules.gap_s is not None:
-        begins[1:] |= steps > rules.gap_s
-    if rules.resets:
-        begins[1:] |= steps < 0
-    for name in (*rules.changes, *([TRIAL] if data.trials else [])):
-        values = _cutting(samples, "changes", name)
-        begins[1:] |= values[1:] != values[:-1]
-    if rules.falls:
-        begins[1:] |= np.diff(_cutting(samples, "falls", rules.falls).astype(float)) < 0
-    if rules.mark:
-        marked = _cutting(samples, "mark", rules.mark) != 0
-        begins[1:] |= marked[1:] & ~marked[:-1]
-    first = int(np.searchsorted(since_s, rules.start_s)) if rules.start_s > 0 else 0
-    end = int(np.searchsorted(since_s, since_s[-1] - rules.tail_s, side="right"))
-    begins[:first] = False
-    at = [*rules.at_s]
-    if rules.lap_s is not None:
-        laps = np.arange(rules.start_s, since_s[-1] - rules.tail_s, rules.lap_s)
-        at += laps.tolist()
-    begins[[k for k in np.searchsorted(since_s, np.array(at) - 1e-9) if k < len(begins)]] = True
-    return sorted({first, *np.flatnonzero(begins[:end]).tolist(), max(first, end)})
-
-
-def _cutting(samples: Samples, rule: str, name: str) -> NDArray[np.generic]:
-    where = samples.mapping.where("runs", rule)
-    found = find(samples.raw, where, rule, name)
-    if not isinstance(found, np.ndarray):
-        raise DataError(
-            f"{where}: {name!r} of {samples.raw.path.name} is one value, so it cuts nothing.",
-            fix="Name a column.",
-        )
-    return found
-
-
 def _is_long_enough(samples: Samples, part: slice) -> bool:
     rules = samples.mapping.data.runs
     least_s = rules.least_s
     if least_s is None:
         least_s = KEPT_OF_A_LAP * rules.lap_s if rules.lap_s else 0.0
     time_s = samples.time_s[part]
-    return len(time_s) > 1 and float(time_s[-1] - time_s[0]) >= least_s
+    if len(time_s) < 2:
+        return False
+    # a time that is empty or goes back is refused later, not passed over as short
+    return not abs(float(time_s[-1] - time_s[0])) < least_s
 
 
 def _run(samples: Samples, part: slice, name: str, remarks: list[Remark]) -> Recording:

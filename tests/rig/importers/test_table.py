@@ -131,6 +131,12 @@ READ = {
         ANGLE.replace('"t"', '"t:iso8601"'),
         {"time_s": [0.0, 0.25, 0.5]},
     ),
+    "milliseconds of the day that pass midnight": (
+        "t,enc\n86399500,0\n86399750,1\n0,2\n",
+        ANGLE.replace('"t"', '"t:ms"'),
+        {"time_s": [0.0, 0.25, 0.5]},
+        "the time falls by a day in line 4, at midnight, and is continued there",
+    ),
     "a sample that is there twice": (
         "t,enc\n0,1\n0.1,2\n0.1,2\n0.2,3\n",
         ANGLE,
@@ -295,6 +301,8 @@ CUTS = [
     ('mark = "key"', {"t": [0, 0.1, 0.2, 0.3, 0.4, 0.5], "key": [0, 0, 0, 1, 1, 0]}),
     ("lap_s = 0.3", {"t": [0, 0.1, 0.2, 0.3, 0.4, 0.5]}),
     ("at_s = [0.3]", {"t": [0, 0.1, 0.2, 0.3, 0.4, 0.5]}),
+    ("gap_s = 9", {"t": [86399.6, 86399.8, 0.0, 99.0, 99.2, 99.4]}),  # midnight in a run
+    ("gap_s = 9", {"t": [86399.0, 86399.2, 86399.4, 10.0, 10.2, 10.4]}),  # and between two
 ]
 
 
@@ -302,6 +310,22 @@ CUTS = [
 def test_runs_are_cut_where_the_mapping_states(tmp_path, rule, columns):
     parts = cut(tmp_path, rule, {**columns, "enc": [1, 2, 3, 4, 5, 6]})
     assert [np.degrees(part).round().tolist() for part in parts] == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_a_counter_that_starts_again_does_so_in_each_run_for_itself(tmp_path):
+    """The second run begins with the counter at 0; one cell of it is empty."""
+    path = tmp_path / "run.csv"
+    path.write_text(
+        "t,trial,enc\n0,1,3072\n0.1,1,4095\n0.2,1,1024\n0.3,2,0\n0.4,2,4000\n0.5,2,\n0.6,2,3900\n"
+    )
+    text = SECONDS + 'motor_angle_rad = { column = "enc", unit = "rev/4096", wraps_at = 4096 }\n'
+    first, second = open_table(path, machine(tmp_path, f'{text}[data.runs]\nchanges = ["trial"]'))
+    np.testing.assert_allclose(
+        first["motor_angle_rad"], np.array([3072, 4095, 5120]) / 2048 * np.pi
+    )
+    np.testing.assert_allclose(
+        second["motor_angle_rad"][[0, 1, 3]], np.array([0, -96, -196]) / 2048 * np.pi
+    )
 
 
 def test_each_run_is_on_a_clock_of_its_own_and_a_short_rest_is_left_out(tmp_path):

@@ -167,6 +167,15 @@ def test_half_a_file_of_any_format(tmp_path, kind):
     assert any(word in said for word in ("cut off", "damaged", "ends in the middle", "whole"))
 
 
+@pytest.mark.parametrize(("time", "word"), [("0", "time goes from"), ("", "time is empty")])
+def test_a_run_whose_time_is_wrong_at_its_end_is_not_left_out_as_short(tmp_path, time, word):
+    table = TABLE.replace("time", "trial,time").replace("\n", "\n1,").removesuffix("1,")
+    table += f"1,{time},5,5\n" + "".join(f"2,{k / 100},{k},{k}\n" for k in range(20))
+    said = refused(tmp_path, table, GOOD + '[data.runs]\nchanges = ["trial"]\n')
+    assert word in said
+    assert "line 22" in said
+
+
 def test_cuts_of_which_no_run_is_left_are_named(tmp_path):
     said = refused(tmp_path, mapping=GOOD + "[data.runs]\nleast_s = 60\n")
     assert "Change least_s (bench.toml, line 6)" in said
