@@ -11,7 +11,7 @@ from estimation.recording import FloatArray
 from rig.errors import DataError, UsageError
 from rig.importers.table.cuts import edges_of
 from rig.importers.table.data import DATE, TIME, Source
-from rig.importers.table.delimited import after_samples, bad_cell
+from rig.importers.table.delimited import after_samples, bad_cell, has_thousands
 from rig.importers.table.formula import names_in
 from rig.importers.table.mapping import ColumnMapping, worked_out
 from rig.importers.table.raw import Raw, Values, find, is_number
@@ -149,14 +149,7 @@ def _channel(raw: Raw, where: str, name: str, source: Source, edges: Sequence[in
     if not isinstance(found, np.ndarray):
         found = np.full(len(raw), found)
     if found.dtype.kind not in "fiub":
-        what, fix = str(found[0]), "Correct the file, or map another column."
-        if source.column in raw.columns:
-            what, fix = bad_cell(raw, source.column)
-        if name == TIME and _date(str(found[0])) is not None:
-            fix = f"Write {TIME} = '{source.column}:{DATE}'."
-        raise DataError(
-            f"{where}: column {source.column!r} of {raw.path.name} is not numbers: {what}.", fix=fix
-        )
+        raise _not_numbers(raw, where, name, source, str(found[0]))
     numbers = found.astype(np.float64)
     possible = np.where(np.abs(numbers) > IMPOSSIBLE, np.nan, numbers)
     values = _in_si(raw, where, name, source, possible, edges)
@@ -166,6 +159,17 @@ def _channel(raw: Raw, where: str, name: str, source: Source, edges: Sequence[in
             fix="Map another column, or delete this line.",
         )
     return values
+
+
+def _not_numbers(raw: Raw, where: str, name: str, source: Source, cell: str) -> DataError:
+    what, fix = cell, "Correct the file, or map another column."
+    if source.column in raw.columns:
+        what, fix = bad_cell(raw, source.column)
+    if name == TIME and _date(cell) is not None:
+        fix = f"Write {TIME} = '{source.column}:{DATE}'."
+    return DataError(
+        f"{where}: column {source.column!r} of {raw.path.name} is not numbers: {what}.", fix=fix
+    )
 
 
 def _in_si(
@@ -274,6 +278,8 @@ def _condition(raw: Raw, where: str, name: str, source: Source) -> float | str |
     found = find(raw, where, name, source.column)
     many = found if isinstance(found, np.ndarray) else np.array([found])
     if many.dtype.kind in "US" and unit_or_none(name):
+        if raw.decimal == "," and any(has_thousands(str(cell), ",") for cell in many):
+            raise _not_numbers(raw, where, name, source, str(many[0]))
         try:
             many = many.astype(np.float64)
         except ValueError as error:

@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
+
 from rig.errors import DataError
 from rig.importers.table.data import Layout
-from rig.importers.table.raw import Raw, is_number, numbers_or_text
+from rig.importers.table.raw import Raw, Values, is_number, numbers_or_text
 
 COMPRESSED = b"\x1f\x8b"
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
@@ -26,7 +28,7 @@ BRACKETS = " []()"
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "space"}
 THOUSANDS = re.compile(
-    r"[-+]?\d{1,3}(?:(?P<sign>[.,' ])\d{3})(?:(?P=sign)\d{3})*(?:(?!(?P=sign))[.,]\d*)?"
+    r"[-+]?[1-9]\d{0,2}(?:(?P<sign>[.,' ])\d{3})(?:(?P=sign)\d{3})*(?:(?!(?P=sign))[.,]\d*)?"
 )
 """A number with signs between thousands: 1.234,50 or 1,234.50 or 1'234."""
 
@@ -89,7 +91,7 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
     _check_widths(path, body, len(names), is_cut)
     words = TRUTHS | dict.fromkeys((text.strip().lower() for text in layout.missing), "")
     columns = {
-        name: numbers_or_text(
+        name: _column(
             [words.get(cells[place].strip().lower(), cells[place]) for _, cells in body], decimal
         )
         for place, name in enumerate(names)
@@ -243,11 +245,31 @@ def _is_number(cell: str, decimal: str) -> bool:
     return is_number(cell.replace(decimal, "."))
 
 
+def has_thousands(cell: str, decimal: str) -> bool:
+    """Whether a number has another sign than the decimal one where one between thousands stands."""
+    found = THOUSANDS.fullmatch(cell.strip())
+    return found is not None and found["sign"] != decimal
+
+
+def _column(cells: list[str], decimal: str) -> Values:
+    """Return cells as numbers, or as text where one is none or where points are of thousands.
+
+    With a decimal comma `1.500` is 1500 or 1.5. A column that has `1.5` or `0.500`, too, has
+    decimal points.
+    """
+    pointed = [cell for cell in cells if "." in cell] if decimal == "," else []
+    if pointed and all(has_thousands(cell, decimal) for cell in pointed):
+        return np.array([cell.strip() for cell in cells])
+    return numbers_or_text(cells, decimal)
+
+
 def _decimal(rows: list[tuple[int, list[str]]], separator: str) -> str:
     """Return the decimal sign of the first numbers below a head and a line of units."""
     cells = [cell for _, cells in rows[1:4] for cell in cells]
     with_comma = any(_is_number(cell, ",") and not _is_number(cell, ".") for cell in cells)
-    with_point = any("." in cell and _is_number(cell, ".") for cell in cells)
+    with_point = any(
+        "." in cell and _is_number(cell, ".") and not has_thousands(cell, ",") for cell in cells
+    )
     return "," if separator != "," and with_comma and not with_point else "."
 
 
@@ -303,15 +325,19 @@ def after_samples(raw: Raw, fits: Sequence[bool], first: int) -> str:
 def bad_cell(raw: Raw, name: str) -> tuple[str, str]:
     """Return where a text column's first cell that is not a number is, with it, and the remedy."""
     cells = [str(cell).strip() for cell in raw.columns[name]]
-    fits = [_is_number(cell, raw.decimal or ".") for cell in cells]
+    sign = raw.decimal or "."
+    fits = [_is_number(cell, sign) and not has_thousands(cell, sign) for cell in cells]
     index = next((k for k, cell in enumerate(cells) if cell and not fits[k]), None)
     if index is None:
         return f"{raw.row(cells.index(''))} is empty", "Map another column."
     cell = cells[index]
     what = f"{raw.row(index)} holds {cell[:30]!r}"
-    if sign := THOUSANDS.fullmatch(cell):
-        bare = cell.replace(sign["sign"], "")
-        return what, f"Save the file without the sign between thousands, such as {bare}."
+    if has_thousands(cell, sign) and (found := THOUSANDS.fullmatch(cell)):
+        bare = cell.replace(found["sign"], "")
+        meant = f"Save the file without the sign between thousands, such as {bare}"
+        if _is_number(cell, sign):  # a point, in a table with a decimal comma
+            meant += f"; if the point is a decimal one, with a comma, {cell.replace('.', ',')}"
+        return what, f"{meant}."
     if len(raw) == 1:
         return what, "It is the only line below the head: name a file with samples."
     if not raw.decimal:

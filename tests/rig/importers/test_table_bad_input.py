@@ -323,6 +323,34 @@ def test_a_cell_that_is_not_a_number_is_quoted_with_its_remedy(tmp_path, case):
     assert all(word in said for word in words), said
 
 
+THOUSANDS = "Tid;Vinkel;Kraft\n0,000;0,000;1.500\n0,005;2,000;999\n0,010;4,000;1.001\n"
+IN_NEWTON = """[data.columns]
+time_s = "Tid"
+motor_angle_rad = "Vinkel:deg"
+load_force_n = "Kraft"
+"""
+
+
+@pytest.mark.parametrize("stated", [[(("decimal",), ",", "")], []])
+@pytest.mark.parametrize(
+    "mapping", [IN_NEWTON, IN_NEWTON.replace("load_f", "[data.conditions]\nload_f")]
+)
+def test_a_point_of_thousands_is_not_a_decimal_one(tmp_path, mapping, stated):
+    said = refused(tmp_path, THOUSANDS, mapping, flags=stated)
+    assert "'Kraft' of run.csv is not numbers: line 2 holds '1.500'" in said
+    assert "without the sign between thousands, such as 1500; if the point is a decimal" in said
+    assert "with a comma, 1,500." in said
+
+
+@pytest.mark.parametrize("cell", ["0.500", "1.5"])
+def test_a_column_of_decimal_points_next_to_one_of_decimal_commas(tmp_path, cell):
+    (tmp_path / "run.csv").write_text(THOUSANDS.replace("999", cell))
+    (tmp_path / "bench.toml").write_text(IN_NEWTON)
+    mapping = read_mapping(tmp_path / "bench.toml", [(("decimal",), ",", "")])
+    (run,) = open_table(tmp_path / "run.csv", mapping)
+    assert run["load_force_n"].tolist() == [1.5, float(cell), 1.001]
+
+
 def test_a_text_that_means_no_value_is_flagged_as_an_empty_cell(tmp_path):
     lines = GERMAN.splitlines()
     lines[49] = ";".join([*lines[49].split(";")[:2], "OVERLOAD"])
