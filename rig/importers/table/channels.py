@@ -1,6 +1,6 @@
 """From the columns of a file to channels and conditions in SI units."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
@@ -14,12 +14,9 @@ from rig.importers.table.data import DATE, TIME, Source
 from rig.importers.table.delimited import after_samples, bad_cell, has_thousands
 from rig.importers.table.formula import names_in
 from rig.importers.table.mapping import ColumnMapping, worked_out
-from rig.importers.table.raw import Raw, Values, find, is_number
-from rig.importers.table.units import agree, as_unit, conversion, stated_in_name
-from rig.output.table import counted
-
-IMPOSSIBLE = 1e24
-"""Size above which a number is not a reading in any unit; some programs write such for none."""
+from rig.importers.table.raw import IMPOSSIBLE, Raw, Values, find, is_number
+from rig.importers.table.stated import check_name, check_row_of_units, mapped_twice, unit_doubts
+from rig.importers.table.units import conversion
 
 DAY_S, NO_DATE = 86_400.0, date(1970, 1, 1)
 
@@ -93,7 +90,10 @@ def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:
         where = mapping.where("formulas", name)
         channels[name] = worked_out(where, formula, known, time_s.shape, np.float64).copy()
     mapped = {**sources, **data.conditions}.items()
-    doubts = tuple(text for name, source in mapped for text in _doubts(raw, name, source))
+    doubts = (
+        *(text for name, source in mapped for text in unit_doubts(raw, name, source)),
+        *mapped_twice(sources),
+    )
     return Samples(
         raw, mapping, time_s, edges, channels, conditions, started_at_ns, doubts, remarks
     )
@@ -197,8 +197,8 @@ def _in_si(
         values = np.where(values >= source.sign_bit, source.sign_bit - values, values)
     unit = conversion(source.unit, name) if source.unit else None
     if unit is None and gain == 1.0:
-        _check_name(where, name, source.column)
-        _check_row_of_units(raw, where, name, source.column)
+        check_name(where, name, source.column)
+        check_row_of_units(raw, where, name, source.column)
     if unit is None:
         return np.asarray(gain * (values - source.zero))
     return np.asarray(unit.factor * gain * (values - source.zero) + unit.shift)
@@ -209,67 +209,6 @@ def _unwrapped(values: FloatArray, period: float) -> FloatArray:
     found, is_there = values.copy(), np.isfinite(values)
     found[is_there] = np.unwrap(values[is_there], period=period)
     return found
-
-
-def _check_name(where: str, name: str, column: str) -> None:
-    """Refuse a column whose name states another unit than the channel's, where none is stated."""
-    stated = stated_in_name(column, name)
-    if not stated:
-        return
-    raise DataError(
-        f"{where}: the name of the column {column!r} states {stated}, and the"
-        f" mapping states no unit for {name}.",
-        "Without one, values are taken as SI units.",
-        f"Write {name} = '{column}:{stated}'; if they are in SI units, that unit in its place."
-        if conversion(stated, name)
-        else f"Correct the name {name}; if they are in SI units, write {name} ="
-        f" '{column}:{unit_of(name)}'.",
-    )
-
-
-def _check_row_of_units(raw: Raw, where: str, name: str, column: str) -> None:
-    """Refuse a column of which the line below the head states another unit, where none is stated.
-
-    A text there that is not a unit is asked about instead.
-    """
-    stated, own = as_unit(raw.units.get(column, "")), unit_or_none(name)
-    if not stated or own is None or agree(stated, "", 1.0, name) is not False:
-        return
-    fits = conversion(stated, name) is not None
-    raise DataError(
-        f"{where}: line {raw.units_line} of {raw.path.name} states {stated} for the column"
-        f" {column!r}, and the mapping states no unit for {name}.",
-        "Without one, values are taken as SI units.",
-        f"Write {name} = '{column}:{stated}'; if they are in SI units, {name} = '{column}:{own}'."
-        if fits
-        else f"Write a gain, {name} = {{ column = '{column}', gain = SIZE }}; if they are in SI"
-        f" units, {name} = '{column}:{own}'.",
-    )
-
-
-def _doubts(raw: Raw, name: str, source: Source) -> Iterator[str]:
-    """Yield impossible numbers of a column, and another unit in the line below its head."""
-    cells = raw.columns.get(source.column)
-    if cells is not None and cells.dtype.kind == "f":
-        huge = np.flatnonzero(np.isfinite(cells) & (np.abs(cells) > IMPOSSIBLE))
-        if huge.size:
-            first = f"{cells[huge[0]]:.3g} in {raw.row(int(huge[0]))}"
-            yield (
-                f"{name}: the column {source.column!r} holds {counted(huge.size, 'number')} beyond"
-                f" any reading, first {first}, taken as an empty cell; does the instrument write"
-                " that for no value?"
-            )
-    stated, own = raw.units.get(source.column, ""), unit_or_none(name)
-    if not stated or own is None or source.unit == DATE or isinstance(source.gain, str):
-        return
-    agreed = agree(stated, source.unit, source.gain, name)
-    row = f"{name}: line {raw.units_line} of the file states {stated} for the column"
-    if agreed is False:
-        gain = "" if source.gain == 1.0 else f" times {source.gain:g}"
-        used = f"{source.unit or own}{gain}"
-        yield f"{row} {source.column!r}, and the mapping {used}; which one is right?"
-    elif agreed is None and not source.unit and source.gain == 1.0:
-        yield f"{row} {source.column!r}, which is not a unit that is known; is it in {own}?"
 
 
 def _condition(raw: Raw, where: str, name: str, source: Source) -> float | str | Values:

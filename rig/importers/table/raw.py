@@ -20,6 +20,10 @@ Remark = tuple[str, str]
 """File or run, and what was assumed, left out or filled in there, in words."""
 
 
+IMPOSSIBLE = 1e24
+"""Size above which a number is not a reading in any unit; some programs write such for none."""
+
+
 @dataclass(frozen=True)
 class Raw:
     """One file.

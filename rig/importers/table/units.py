@@ -211,6 +211,29 @@ def stated_in_name(column: str, name: str) -> str:
     return ""
 
 
+def contradicted_by_name(column: str, unit: str, gain: float, name: str) -> str:
+    """Return the unit at the end of a column's name that contradicts a mapping, or nothing.
+
+    One of another dimension counts in brackets, such as `Force [kN]`, or where no part is called
+    so. The arguments are those of `agree`.
+    """
+    found = ""
+    for stated in _candidates(column):
+        agreed = agree(stated, unit, gain, name)
+        if agreed:
+            return ""
+        if agreed is False and (conversion(as_unit(stated), name) or _is_a_unit(column, stated)):
+            found = found or as_unit(stated)
+    return found
+
+
+def _is_a_unit(column: str, stated: str) -> bool:
+    """Return whether a unit of another dimension at the end of a name can be no word."""
+    if not IN_BRACKETS.search(column):
+        return stated in ALONE
+    return bool(read_unit(as_unit(stated)).powers) and ("[" in column or stated in UNMISTAKABLE)
+
+
 def _candidates(column: str) -> Iterator[str]:
     """Yield the units that the end of a column's name may state."""
     if found := IN_BRACKETS.search(column):

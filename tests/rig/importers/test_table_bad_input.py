@@ -222,6 +222,44 @@ def test_a_unit_of_another_quantity_in_the_name_of_a_column(tmp_path):
     assert "if they are in SI units, write motor_angle_rad = 'angle_rpm:rad'" in said
 
 
+@pytest.mark.parametrize(
+    ("column", "source", "asked"),
+    [
+        ("Kraft [kN]", '"Kraft [kN]:V"', "states kN, and the mapping V; which one is right?"),
+        ("Kraft (kN)", '"Kraft (kN)"', "states kN, and the mapping V;"),
+        ("u_mV", '"u_mV:V"', "states mV, and the mapping V;"),
+        ("u [N]", '"u [N]:kV"', "states N, and the mapping kV;"),
+        (
+            "u_mV",
+            '{ column = "u_mV", unit = "V", gain = 2.0 }',
+            "states mV, and the mapping V times",
+        ),
+        ("u_mV", '{ column = "u_mV", unit = "V", gain = 0.001 }', ""),
+        ("u_mV", '"u_mV:mV"', ""),
+        ("Kraft [kN]", '{ column = "Kraft [kN]", unit = "V", gain = 5.0 }', ""),  # an amplifier
+        ("u [counts]", '"u [counts]:0.4/255 V"', ""),
+        ("channel (A)", '"channel (A):V"', ""),
+        ("channel (1)", '"channel (1):V"', ""),
+        ("drive_mm", '"drive_mm:V"', ""),
+    ],
+)
+def test_a_unit_in_the_name_of_a_column_that_contradicts_the_mapping(
+    tmp_path, column, source, asked
+):
+    table = TABLE.replace("current", column)
+    found = asked_of(tmp_path, table, f"{GOOD}drive_command_v = {source}\n")
+    found = [text for text in found if "which one" in text]
+    assert len(found) == bool(asked)
+    assert all(text.startswith("drive_command_v: ") and asked in text for text in found)
+
+
+def test_one_column_of_two_channels_is_asked_about(tmp_path):
+    (said,) = asked_of(tmp_path, TABLE, GOOD + 'arm_angle_rad = "angle:deg"\n')
+    assert said == "motor_angle_rad and arm_angle_rad are one column, 'angle'; is this meant?"
+    torque = 'motor_torque_n_m = { column = "angle", gain = 0.05 }\n'
+    assert asked_of(tmp_path, TABLE, GOOD + torque) == []
+
+
 GERMAN = "Zeit;Weg;Kraft\n[ISO];[mm];[kgf]\n" + "".join(
     f"2026-03-12T09:43:{k // 10:02d}.{k % 10}00;{np.sin(k / 3):.3f};{np.cos(k / 4):.3f}\n".replace(
         ".", ","
