@@ -8,14 +8,12 @@ import re
 from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from estimation.channels import unit_of
 from estimation.copies import copies
-from estimation.recording import FloatArray, Recording, shared_columns
+from estimation.recording import FloatArray, Recording
 from estimation.zeros import moved_zeros
-from rig.importers.derivatives import CONFUSED
-from rig.importers.table.units import conversion
+from rig.importers.apart import in_another_unit, of_another_sign
 from rig.output.table import counted
 
 PLAUSIBLE: dict[str, tuple[float, str]] = {
@@ -51,15 +49,6 @@ WHOLE = 0.75
 COMMAND = re.compile(r"(^|_)(command|target)_")
 """In the name of a channel that was commanded, not measured: it may be held constant."""
 
-ALIKE, MOST = 2.0, 0.75
-"""Factor within which a channel varies alike in runs, and the share of runs that must agree."""
-
-FAR = 5.0
-"""Factor from which a run is apart; below the least one between confused units, a turn in rad."""
-
-SURE = 1.25
-"""Factor between a ratio and that of a unit which is allowed in any case."""
-
 
 def questions(recordings: Sequence[Recording], derived: Collection[str] = ()) -> list[str]:
     """Return the doubts about the channels and zeros of runs: questions, each with its channel.
@@ -87,56 +76,9 @@ def of_runs(recordings: Sequence[Recording]) -> Iterator[str]:
             f"{', '.join((first, *names))}: these runs are the same, sample by sample, and count"
             " once; was a file copied?"
         )
-    yield from apart(recordings)
+    yield from in_another_unit(recordings)
+    yield from of_another_sign(recordings)
     yield from (zero.sentence for zero in moved_zeros(recordings))
-
-
-def apart(recordings: Sequence[Recording]) -> Iterator[str]:
-    """Yield which channels are probably in another unit in some runs, in words.
-
-    Such a channel varies far more or less there than in most runs, while another one varies as
-    usual: where a machine rightly moves less, its drive does less, too.
-    """
-    recordings = [recording for recording in recordings if recording.valid.any()]
-    ratios = {}
-    for name in shared_columns(recordings) if recordings else ():
-        spread = np.array([np.std(r[name][r.valid & np.isfinite(r[name])]) for r in recordings])
-        usual = np.median(spread)
-        if unit_of(name) in CONFUSED and np.mean(_within(spread, usual)) >= MOST:
-            ratios[name] = spread / usual
-    runs: dict[tuple[str, str], list[tuple[str, float]]] = {}
-    for k, recording in enumerate(recordings):
-        far = {n: r[k] for n, r in ratios.items() if not _within(r[k], 1.0, FAR)}
-        if far and any(_within(r[k], 1.0) for r in ratios.values()):
-            units = {n: _unit(n, ratio, ratios[n]) for n, ratio in far.items()}
-            name = next((n for n in far if units[n]), next(iter(far)))
-            runs.setdefault((name, units[name]), []).append((recording.name, far[name]))
-    for (name, unit), places in runs.items():
-        where = ", ".join(run for run, _ in places)
-        yield (
-            f"{name}: it varies {places[0][1]:.3g} times as much in {where} as in the other runs,"
-            f" and other channels as usual; {unit or 'are unit and gain right'} there?"
-        )
-
-
-def _within(values: ArrayLike, usual: float, factor: float = ALIKE) -> NDArray[np.bool_]:
-    """Return which values are within a factor of the usual one."""
-    sizes = np.asarray(values)
-    return (sizes * factor > usual) & (sizes < factor * usual)
-
-
-def _unit(name: str, ratio: float, ratios: FloatArray) -> str:
-    """Return the wrong unit that explains a ratio, as far as other runs agree; or nothing."""
-    alike = ratios[_within(ratios, 1.0)]
-    allowed = max(SURE, float(alike.max()), 1 / float(alike.min()))
-    for unit in CONFUSED[unit_of(name)]:
-        if (size := conversion(unit, name)) is None:
-            continue
-        if _within(ratio, size.factor, allowed):
-            return f"is it stated in {unit} without being so"
-        if _within(ratio, 1 / size.factor, allowed):
-            return f"is it in {unit}"
-    return ""
 
 
 def of_channel(name: str, recordings: Sequence[Recording]) -> list[str]:

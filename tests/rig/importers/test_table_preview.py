@@ -154,6 +154,54 @@ def test_a_run_that_moves_less_is_not_asked_about(tmp_path, angles, currents):
     assert of_runs(tmp_path, angles, currents) == []
 
 
+def of_all_sizes(tmp_path, odd=1.0, odd_name="drive_command_v", fast=1.0):
+    """Return the questions about runs of all sizes with noise, a channel of one of them changed."""
+    random = np.random.default_rng(2)
+    for number, size in enumerate([1.0, 3.0, 0.2, 0.5, 9.0, 2.0, 0.1, 5.0]):
+        time_s = TIME * (fast if number == 3 else 1.0)
+        wave = size * np.sin(time_s * (2 + 0.1 * number))
+        rate = size * np.cos(time_s * (2 + 0.1 * number))
+        columns = {
+            "motor_angle_rad": wave + 1e-4 * random.normal(size=TIME.size),
+            "drive_command_v": rate + 0.3 * wave + 0.01 * random.normal(size=TIME.size),
+            "rope_force_n": 100 * size + 5 * random.normal(size=TIME.size),
+        }
+        columns[odd_name] *= odd if number == 3 else 1.0
+        text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
+    recordings = list(read_runs(tmp_path, read_mapping(None, []), []))
+    return preview(recordings, []).questions
+
+
+@pytest.mark.parametrize(
+    ("name", "odd", "words"),
+    [
+        ("drive_command_v", 1e-3, "from sample to sample in run3 as in the other runs, and other"),
+        ("drive_command_v", 1e-3, "is it stated in mV without being so there?"),
+        ("drive_command_v", 1e3, "is it in mV there?"),
+        ("rope_force_n", 10.0, "rope_force_n: it varies"),
+        ("rope_force_n", 100.0, "are unit and gain right there?"),
+        (
+            "drive_command_v",
+            -1.0,
+            "drive_command_v: it goes against the motion of motor_angle_rad in run3,",
+        ),
+        (
+            "motor_angle_rad",
+            -1.0,
+            "drive_command_v: it goes against the motion of motor_angle_rad in run3,",
+        ),
+    ],
+)
+def test_one_of_runs_of_all_sizes_in_another_unit_or_sign_is_asked_once(tmp_path, name, odd, words):
+    (found,) = of_all_sizes(tmp_path, odd, name)
+    assert words in found
+
+
+@pytest.mark.parametrize("fast", [1.0, 6.0])
+def test_runs_of_all_sizes_or_speeds_are_not_asked_about(tmp_path, fast):
+    assert of_all_sizes(tmp_path, fast=fast) == []
+
+
 RANDOM = np.random.default_rng(1)
 CLOCKS = {
     "a gap": (np.where(TIME > 4, TIME + 1, TIME), ["1 gap in time", "gap_s"]),
