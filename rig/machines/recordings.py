@@ -33,7 +33,7 @@ def open_recordings(
         path: File, folder or archive.
         machine: Machine file or the name of a shipped one; None for the reference rig.
         format_name: Importer to use; found from the path when None.
-        skip_bad: Exclude runs that cannot be read, with the reason. Not of a foreign table.
+        skip_bad: Exclude runs that cannot be read, with the reason.
 
     Raises:
         UsageError: The path does not exist, or the format is not known.
@@ -46,7 +46,7 @@ def open_recordings(
     if format_name is not None or LOGS.recognises(path) or not has_data(file):
         campaign = open_campaign(path, format_name, skip_bad)
     else:
-        campaign = open_table(path, read_mapping(file, ()))
+        campaign = open_table(path, read_mapping(file, ()), skip_bad)
     return with_positions(campaign, read_machine(file))
 
 
@@ -95,7 +95,9 @@ def with_motion(campaign: Campaign, models: Sequence[Model]) -> Campaign:
 
     A declared equation whose channels were not recorded decides nothing.
     """
-    return Campaign.of([_checked(run.recording(), models) for run in campaign.runs])
+    kept = Campaign.of(_checked(recording, models) for recording in campaign.evidence)
+    checked = {run.name: run for run in kept.runs}
+    return Campaign(tuple(checked.get(run.name, run) for run in campaign.runs))
 
 
 def _checked(recording: Recording, models: Sequence[Model]) -> Recording:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from estimation.campaign import Campaign
+from estimation.campaign import Campaign, Run
 from estimation.copies import without_copies
 from estimation.recording import Recording
 from rig.errors import DataError, UsageError
@@ -31,19 +31,43 @@ READERS: Mapping[str, Callable[[Path, Layout], Raw]] = {
 """Ending of a file's name to its reader; any other file is read as a text table."""
 
 
-def open_table(path: Path, mapping: ColumnMapping) -> Campaign:
+def open_table(path: Path, mapping: ColumnMapping, skip_bad: bool = False) -> Campaign:
     """Read the runs of a table, a file or a folder of files, into a campaign.
 
     A run that is there twice counts once.
+
+    Args:
+        path: File or folder.
+        mapping: How it is read.
+        skip_bad: Exclude files and runs that cannot be read, with the reason, unless none can.
 
     Raises:
         UsageError: The path does not exist.
         DataError: A file cannot be read as the mapping states, no run is long enough, or a
             channel contradicts the one that is its derivative.
     """
-    runs = [checked(run) for run in read_runs(path, mapping, [])]
+    bad: list[Run] = []
+    runs = []
+    for run in read_runs(path, mapping, [], bad if skip_bad else None):
+        try:
+            runs.append(checked(run))
+        except DataError as error:
+            if not skip_bad:
+                raise
+            bad.append(_unread(run.name, error))
+    if bad and not runs:
+        bad[0].load()
     require_runs(runs, path, mapping)
-    return without_copies(Campaign.of(runs))
+    return Campaign((*without_copies(Campaign.of(runs)).runs, *bad))
+
+
+def _unread(name: str, error: DataError) -> Run:
+    """Return a run that is excluded because of an error, which reading it raises."""
+
+    def load() -> Recording:
+        raise error
+
+    return Run(name, load, excluded=f"{error.what} {error.why}".strip())
 
 
 def require_runs(runs: Sequence[Recording], path: Path, mapping: ColumnMapping) -> None:
@@ -64,26 +88,40 @@ def require_runs(runs: Sequence[Recording], path: Path, mapping: ColumnMapping) 
     )
 
 
-def read_runs(path: Path, mapping: ColumnMapping, remarks: list[Remark]) -> Iterator[Recording]:
+def read_runs(
+    path: Path, mapping: ColumnMapping, remarks: list[Remark], bad: list[Run] | None = None
+) -> Iterator[Recording]:
     """Yield the runs of a table, one file in memory at a time, without the check of derivatives.
 
     Of files in several folders, the name of a run begins with those of its file: `monday-run1`.
-    `remarks` gets a sentence on everything that was assumed, left out or filled in.
+    `remarks` gets a sentence on everything that was assumed, left out or filled in, and `bad` the
+    files that cannot be read; without it the first of these is an error.
     """
     taken: set[str] = set()
     files = files_at(path, mapping)
     several = len({file.parent for file in files}) > 1
     for file in files:
         folders = file.relative_to(path).parts[:-1] if several else ()
-        samples = to_samples(read_raw(file, mapping), mapping)
-        said = (*samples.raw.remarks, *samples.remarks)
-        remarks += [(file.name, remark) for remark in said]
-        for run in recordings(samples, remarks):
+        try:
+            runs = _runs_of(file, mapping, remarks)
+        except DataError as error:
+            if bad is None:
+                raise
+            bad.append(_unread("/".join((*folders, file.name)), error))
+            continue
+        for run in runs:
             name = "-".join([*folders, run.name])
             if name in taken:
                 name += file.suffix.lower()
             taken.add(name)
             yield replace(run, name=name)
+
+
+def _runs_of(file: Path, mapping: ColumnMapping, remarks: list[Remark]) -> list[Recording]:
+    samples = to_samples(read_raw(file, mapping), mapping)
+    said = (*samples.raw.remarks, *samples.remarks)
+    remarks += [(file.name, remark) for remark in said]
+    return list(recordings(samples, remarks))
 
 
 def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from rig.errors import RigError, UsageError
+from rig.errors import DataError, RigError, UsageError
 from rig.importers.questions import questions
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
 from rig.importers.table.preview import preview
+from rig.machines.recordings import with_motion
 
 TABLE = "time,angle,current\n" + "".join(f"{k / 100},{k},{2 * k}\n" for k in range(20))
 GOOD = """[machine]
@@ -342,6 +343,28 @@ def test_a_decimal_comma_in_the_name_of_a_file(tmp_path):
     said = refused(tmp_path, TABLE, mapping, "lauf_0,1Hz.csv")
     assert "'0,1'. frequency_hz ends in a unit" in said
     assert "Write it with a point, 0.1, or state decimal" in said
+
+
+def test_files_and_runs_that_cannot_be_read_are_left_out_where_asked(tmp_path):
+    runs, file = tmp_path / "runs", tmp_path / "bench.toml"
+    runs.mkdir()
+    file.write_text(GOOD)
+    (runs / "a.csv").write_text(TABLE)
+    (runs / "b.csv").write_text(TABLE[:-4])
+    (runs / "c.csv").write_text("")
+    (runs / "d.csv").write_text(TABLE.replace("angle", "other"))
+    mapping = read_mapping(file, [])
+    campaign = open_table(runs, mapping, skip_bad=True)
+    assert [run.name for run in campaign.evidence.runs] == ["a"]
+    said = {run.name: run.excluded for run in campaign.runs if run.excluded}
+    assert list(said) == ["b.csv", "c.csv", "d.csv"]
+    assert "ends in the middle" in said["b.csv"]
+    assert "is empty" in said["c.csv"]
+    assert "no column 'angle'" in said["d.csv"]
+    assert with_motion(campaign, []).names == campaign.names  # as a diagnosis does
+    (runs / "a.csv").unlink()
+    with pytest.raises(DataError, match=r"b\.csv, line 21"):
+        open_table(runs, mapping, skip_bad=True)
 
 
 LAST = GERMAN.splitlines()[-1]
