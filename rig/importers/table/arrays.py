@@ -193,8 +193,9 @@ def _spread(name: str, values: Values) -> dict[str, Values]:
 
 
 def _damaged(path: Path, kind: str, error: Exception) -> DataError:
+    why = str(error).splitlines()[0].partition(". ")[0].removesuffix(".")
     return DataError(
-        f"{path} cannot be read as a {kind} file: {str(error).splitlines()[0][:120]}.",
+        f"{path} cannot be read as a {kind} file: {why}.",
         "It is damaged, cut off, or of another kind. Nothing of it was imported.",
         "Copy or save it again.",
     )

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 
 from estimation.campaign import Campaign, Run
@@ -16,7 +17,7 @@ from rig.importers.table.data import Layout
 from rig.importers.table.delimited import read_delimited
 from rig.importers.table.json_rows import read_json
 from rig.importers.table.mapping import ColumnMapping
-from rig.importers.table.raw import Raw, Remark, is_number, with_samples
+from rig.importers.table.raw import NoColumnError, Raw, Remark, is_number, with_samples
 from rig.importers.table.runs import recordings
 from rig.log.order import by_number
 
@@ -106,6 +107,8 @@ def read_runs(
             runs = _runs_of(file, mapping, remarks)
         except DataError as error:
             if bad is None:
+                if isinstance(error, NoColumnError) and not mapping.data.files and len(files) > 1:
+                    raise DataError(error.what, error.why, _not_this(error, files)) from error
                 raise
             bad.append(_unread("/".join((*folders, file.name)), error))
             continue
@@ -115,6 +118,18 @@ def read_runs(
                 name += file.suffix.lower()
             taken.add(name)
             yield replace(run, name=name)
+
+
+def _not_this(error: NoColumnError, files: Sequence[Path]) -> str:
+    """Return the remedy where a file of a folder is not a recording, after that of its column."""
+    name, kind = error.raw.path.name, error.raw.path.suffix
+    letters = zip(*(file.name for file in files if file.name != name), strict=False)
+    shared = takewhile(lambda same: len(set(same)) == 1, letters)
+    stem = "".join(same[0] for same in shared).rstrip("0123456789")
+    pattern = f"{stem}*{kind}" if not name.startswith(stem) else "PATTERN"
+    own = f"; if it states values of each file, side_file = {name!r}"
+    own = own if "file" in error.raw.columns else ""
+    return f"{error.fix} If {name} is not a recording, write files = {pattern!r} under [data]{own}."
 
 
 def _runs_of(file: Path, mapping: ColumnMapping, remarks: list[Remark]) -> list[Recording]:

@@ -72,6 +72,18 @@ class Raw:
         return lower[near[0]] if near else ""
 
 
+class NoColumnError(DataError):
+    """A file has no such column or single value.
+
+    Attributes:
+        raw: The file.
+    """
+
+    def __init__(self, raw: Raw, what: str, why: str, fix: str) -> None:
+        self.raw = raw
+        super().__init__(what, why, fix)
+
+
 def find(raw: Raw, where: str, key: str, column: str) -> Values | float | str:
     """Return a column or single value of a file by name, for a key of the mapping and its place.
 
@@ -91,7 +103,8 @@ def find(raw: Raw, where: str, key: str, column: str) -> Values | float | str:
             f"Write {key} = '{name}:UNIT', or the column alone where it is in SI units.",
         )
     near = raw.nearest(column)
-    raise DataError(
+    raise NoColumnError(
+        raw,
         f"{where}: {raw.path.name} has no column {column!r} for {key}.",
         raw.listing(),
         f"Did you mean {near!r}? Write {key} = {near!r}." if near else "Correct the name.",

@@ -165,6 +165,7 @@ def test_half_a_file_of_any_format(tmp_path, kind):
     content = whole.read_bytes()
     said = refused(tmp_path, content[: len(content) // 2 + 3], name=f"run.{kind}")
     assert f"run.{kind}" in said
+    assert "Either" not in said  # advice of a library, cut off
     assert any(word in said for word in ("cut off", "damaged", "ends in the middle", "whole"))
 
 
@@ -343,6 +344,25 @@ def test_a_decimal_comma_in_the_name_of_a_file(tmp_path):
     said = refused(tmp_path, TABLE, mapping, "lauf_0,1Hz.csv")
     assert "'0,1'. frequency_hz ends in a unit" in said
     assert "Write it with a point, 0.1, or state decimal" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("about.csv", "files = 'run_*.csv' under [data]; if it states values of each file, side_f"),
+        ("run_b.csv", "If run_b.csv is not a recording, write files = 'PATTERN' under [data]"),
+    ],
+)
+def test_a_file_of_a_folder_that_is_not_a_recording_is_left_out_by_the_line_named(
+    tmp_path, name, words
+):
+    for number in (1, 2):
+        (tmp_path / f"run_0{number}.csv").write_text(TABLE)
+    (tmp_path / name).write_text("file,load_kg\nrun_01.csv,3\nrun_02.csv,4\n")
+    (tmp_path / "bench.toml").write_text(GOOD)
+    with pytest.raises(DataError) as error:
+        open_table(tmp_path, read_mapping(tmp_path / "bench.toml", []))
+    assert words in error.value.fix
 
 
 def test_files_and_runs_that_cannot_be_read_are_left_out_where_asked(tmp_path):
