@@ -128,6 +128,8 @@ def fit(
 
     `--machine grasper` fits the force at each axis of a 3-DOF grasper, in one file.
     """
+    options.require_machine(machine)
+
     from estimation import model_file
     from estimation.opposed import FIX, opposed
     from estimation.separable import inseparable

@@ -74,12 +74,14 @@ def check(
     With DATA each equation is also fitted. Exit code 1 where one cannot be, where recordings
     contradict the file, or where nothing can be identified.
     """
+    from rig.machines.shipped import read_machine
+
+    plant = read_machine(file)  # a slip of the pen is named before the libraries are loaded
+
     from estimation.plant_check import check as check_plant
     from rig.importers.questions import questions
     from rig.machines.recordings import open_recordings, recorded_channels
-    from rig.machines.shipped import read_machine
 
-    plant = read_machine(file)
     campaign = None if data is None else open_recordings(data, file, format_)
     found = check_plant(plant, campaign, file, recorded_channels(file))
     if data is not None and campaign is not None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from estimation.channels import unit_of
+from estimation.channels import UnknownUnitError, unit_of
 from estimation.plant import Actuator, Axis, Plant, PlantError, Reads, Sensor, Transmission
 from estimation.toml_table import value_text
 from rig.errors import UsageError
@@ -58,8 +58,8 @@ def asked(table: Path | None) -> dict[str, list[str]]:
 
 def plant_of(name: str, words: Mapping[str, Sequence[str]]) -> Plant:
     """Return the machine that words for its kinds of parts state; a wrong one is a UsageError."""
-    parts = {kind: [_parts(kind, word) for word in words[kind]] for kind in PARTS}
     try:
+        parts = {kind: [_parts(kind, word) for word in words[kind]] for kind in PARTS}
         return Plant(
             name=name,
             axes=tuple(Axis(axis, unit) for axis, unit in parts["axis"]),
@@ -67,7 +67,7 @@ def plant_of(name: str, words: Mapping[str, Sequence[str]]) -> Plant:
             actuators=tuple(Actuator(channel, axis) for axis, channel in parts["actuator"]),
             sensors=tuple(Sensor(c, axis, reads_of(c)) for axis, c in parts["sensor"]),
         )
-    except PlantError as error:
+    except (PlantError, UnknownUnitError) as error:
         raise UsageError(error.what, error.why, error.fix) from error
 
 

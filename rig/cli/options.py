@@ -232,6 +232,14 @@ def require_new(path: Path | None) -> None:
         raise UsageError(f"{path} is there already.", fix="Name another file.")
 
 
+def require_machine(file: Path | None) -> None:
+    """Refuse a machine file with an error, before the libraries are loaded, which takes seconds."""
+    from rig.machines.shipped import read_machine
+
+    if file is not None:
+        read_machine(file)
+
+
 def say_left_out(path: Path, campaign: "Campaign") -> None:
     """Print on stderr the files and runs at a path that a campaign excludes, with the reason."""
     from rig.importers.registry import left_out

@@ -28,6 +28,23 @@ def test_help_imports_nothing_heavy():
     assert "record" in done.stdout
 
 
+@pytest.mark.parametrize(
+    "words", ["machine check FILE .", "fit . --machine FILE", "diagnose . --machine FILE"]
+)
+def test_a_slip_in_a_machine_file_is_named_before_anything_heavy_is_imported(tmp_path, words):
+    file = tmp_path / "bench.toml"
+    file.write_text('schema = "rig.machine/1"\n[machine]\nnam = "bench"\n')
+    typed = words.replace("FILE", str(file)).split()
+    code = (
+        f"import sys; from rig.cli.main import main; main({typed});"
+        "heavy = {'numba', 'scipy'} & set(sys.modules);"
+        "sys.exit(f'imported: {heavy}' if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "Did you mean 'nam'?" in done.stderr
+
+
 SLIPS = {
     "recrod": "recrod",
     "effects friction.colomb": "friction.coulomb",
@@ -35,6 +52,7 @@ SLIPS = {
     "machine new new.toml --axis carriage:mm": "has the unit 'mm'",
     "machine new new.toml --axis carriage": "is not NAME:rad or NAME:m",
     "machine new new.toml --axis a:rad --sensor b:a_angle_rad": "There is no axis 'b'",
+    "machine new new.toml --axis a:rad --sensor a:a_angle_deg": "'a_angle_deg' carries no unit",
     "machine new new.toml --axis a:rad --axis b:rad --transmission a:b:x": "is not a number",
     "diagnose . --equation elbow": "elbow",
     "diagnose --plan quick --machine emps": "recordings of the machine instead",
