@@ -132,11 +132,14 @@ def check(
         return CheckedPlant(found, tuple(missing(plant)), tuple(unused(plant)))
     recordings = list(campaign.evidence)
     columns = shared_columns(recordings) if recordings else []
+    contradictions = tuple(_contradictions(plant, recordings, str(file or plant.name)))
     return CheckedPlant(
-        equations=tuple(_fitted(model, campaign, columns) for model in models),
+        equations=tuple(
+            _fitted(model, campaign, columns, bool(contradictions)) for model in models
+        ),
         missing=tuple(missing(plant)),
         unused=tuple(unused(plant)),
-        contradictions=tuple(_contradictions(plant, recordings, str(file or plant.name))),
+        contradictions=contradictions,
         runs=len(recordings),
     )
 
@@ -157,7 +160,10 @@ def _described(model: Model, values: bool = False) -> CheckedEquation:
     return CheckedEquation(model.balance, model.description, parameters, model.target, model.unit)
 
 
-def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> CheckedEquation:
+def _fitted(
+    model: Model, campaign: Campaign, columns: Sequence[str], is_contradicted: bool
+) -> CheckedEquation:
+    """Return an equation as the recordings have it; `is_contradicted` is of the file."""
     plain = _described(model)
     if absent := _absent(model, columns, "was not recorded", campaign.evidence):
         return replace(plain, trouble=absent)
@@ -172,7 +178,9 @@ def _fitted(model: Model, campaign: Campaign, columns: Sequence[str]) -> Checked
     evidence = fitted.evidence
     assert evidence is not None  # noqa: S101  a fit sets its evidence
     size = size_of_target(fitted, campaign)
-    if contradicted := opposed(fitted, campaign):
+    # a difference of travels is none with a wrong ratio, and the sign of its load decides nothing
+    is_none = is_contradicted and model.signals.combination(model.target) is not None
+    if not is_none and (contradicted := opposed(fitted, campaign)):
         found = replace(found, trouble=f"{contradicted} {FIX}")
     if not fitted.run_offsets:
         return replace(found, relative_error=evidence.rmse_with_means / size)

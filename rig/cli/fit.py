@@ -155,7 +155,7 @@ def fit(
         said += [parameter_table(fitted), held_out_sentence(fitted, error) if error else one]
         if contradicted := off_ratio(fitted, list(campaign.evidence)):
             said.append(f"{contradicted} The values above describe that: correct the ratio first.")
-        if contradicted := opposed(fitted, campaign):
+        elif contradicted := opposed(fitted, campaign):
             said.append(f"{contradicted} {FIX}")
         if shared := inseparable(fitted, campaign):
             said.append(f"Check: {fitted.balance}: {shared}")

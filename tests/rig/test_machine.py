@@ -12,6 +12,7 @@ from benchmarks.rigs import draw
 from estimation import model_file
 from estimation.plant_file import parse, shipped_plant, to_toml
 from estimation.plant_models import declared
+from estimation.recording import Recording
 from rig.errors import ExitCode
 from rig.log.convert import write_recording
 from rig.machines.shipped import read_machine, shipped
@@ -415,6 +416,27 @@ def test_another_gear_ratio_is_fitted_with_its_file_and_contradicted_without(gea
         equations = json.loads(printed.out)["check"]["equations"]
         errors += [e["relative_error"] for e in equations if e["name"] == "gearbox"]
     assert 5 * errors[0] < errors[1]
+
+
+def test_a_ratio_of_the_other_sign_is_named_and_no_sensor_is_accused(tmp_path, said):
+    """A spring at the link: with the ratio's sign wrong, the deflection is twice its travel."""
+    time_s = np.arange(0, 8, 0.005)
+    for number in range(3):
+        link = 0.5 * np.sin((2 + number) * time_s) + 0.2 * np.sin(7 * time_s)
+        torque = 10.0 * link
+        columns = {"link_angle_rad": link, "joint_torque_n_m": torque}
+        columns["motor_angle_rad"] = 100.0 * (link + 1e-4 * torque)
+        columns["motor_current_a"] = torque / 9 + 0.1 * np.cos(time_s)
+        run = Recording(f"run{number}", time_s, columns)
+        write_recording(tmp_path / f"run{number}.mcap", run)
+    file = tmp_path / "arm.toml"
+    words = "--axis motor:rad --axis link:rad --transmission motor:link:-100"
+    words += " --actuator motor:motor_current_a --sensor motor:motor_angle_rad"
+    words += " --sensor link:link_angle_rad --sensor link:joint_torque_n_m"
+    said("machine new", file, words)
+    out = said("machine check", file, tmp_path, code=1).out
+    assert "states the ratio -100 for motor_to_link" in out
+    assert "opposite sign" not in out
 
 
 def test_no_cause_is_sought_in_a_deflection_from_another_gear_ratio(geared, tmp_path, said):
