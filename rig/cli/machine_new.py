@@ -1,7 +1,7 @@
 """A machine file from a few words, typed as options or answered on a terminal."""
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import typer
@@ -60,10 +60,11 @@ def plant_of(name: str, words: Mapping[str, Sequence[str]]) -> Plant:
     """Return the machine that words for its kinds of parts state; a wrong one is a UsageError."""
     try:
         parts = {kind: [_parts(kind, word) for word in words[kind]] for kind in PARTS}
+        read = {a for a, channel in parts["sensor"] if reads_of(channel) in ("position", "speed")}
         return Plant(
             name=name,
             axes=tuple(Axis(axis, unit) for axis, unit in parts["axis"]),
-            transmissions=tuple(_transmission(one) for one in parts["transmission"]),
+            transmissions=tuple(_transmission(one, read) for one in parts["transmission"]),
             actuators=tuple(Actuator(channel, axis) for axis, channel in parts["actuator"]),
             sensors=tuple(Sensor(c, axis, reads_of(c)) for axis, c in parts["sensor"]),
         )
@@ -82,7 +83,8 @@ def _parts(kind: str, word: str) -> list[str]:
     return parts
 
 
-def _transmission(parts: Sequence[str]) -> Transmission:
+def _transmission(parts: Sequence[str], read: Collection[str]) -> Transmission:
+    """Return a transmission; it bends measurably where the travel of both its axes is read."""
     ratio = None
     if len(parts) > 2:
         try:
@@ -92,7 +94,8 @@ def _transmission(parts: Sequence[str]) -> Transmission:
                 f"The ratio {parts[2]!r} is not a number.",
                 fix="Write the travel of the input per travel of the output, such as 35.",
             ) from None
-    return Transmission(f"{parts[0]}_to_{parts[1]}", parts[0], parts[1], ratio, compliant=True)
+    compliant = {*parts[:2]} <= {*read}
+    return Transmission(f"{parts[0]}_to_{parts[1]}", parts[0], parts[1], ratio, compliant)
 
 
 def reads_of(channel: str) -> Reads:

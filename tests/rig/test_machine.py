@@ -382,6 +382,15 @@ def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_te
     said("machine new", out, words, table, code=2)
 
 
+@pytest.mark.parametrize("both", [True, False])
+def test_a_transmission_bends_where_both_its_travels_are_read(tmp_path, said, both):
+    words = "--axis motor:rad --axis slide:m --transmission motor:slide:200"
+    words += " --actuator motor:motor_current_a --sensor motor:motor_angle_rad"
+    words += " --sensor slide:slide_position_m" if both else " --sensor slide:rope_force_n"
+    said("machine new", tmp_path / "new.toml", words)
+    assert read_machine(tmp_path / "new.toml").transmissions[0].compliant == both
+
+
 def test_a_sensor_of_no_axis_is_written_from_an_option(tmp_path, said):
     out = tmp_path / "new.toml"
     words = "--axis carriage:m --actuator carriage:drive_force_n"
