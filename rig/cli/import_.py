@@ -193,7 +193,7 @@ def present_columns(raw: "Raw", path: Path, json: bool) -> None:
 
 
 def _cell(value: float | str) -> str:
-    return value[:MOST_CELL] if isinstance(value, str) else f"{value:.10g}"
+    return value[:MOST_CELL] if isinstance(value, str) else f"{value + 0.0:.10g}"  # no -0
 
 
 def _entries(option: str, words: Words, *part: str) -> Iterator[Flag]:
@@ -244,10 +244,14 @@ def _tables(found: "Preview", mapping: "ColumnMapping") -> "list[TextTable]":
         runs.append((run.name, *sizes, listed(run.conditions)))
     note = f"{len(found.runs)} runs in all" if len(found.runs) > MOST_RUNS else ""
     channels = [
-        (c.name, _source(mapping, c.name), *(f"{v:.5g}" for v in (c.least, c.greatest, c.mean)))
+        (
+            c.name,
+            _source(mapping, c.name),
+            *(f"{v + 0.0:.5g}" for v in (c.least, c.greatest, c.mean)),
+        )
         for c in found.channels
     ]
-    cells = [[name, *(f"{v:.6g}" for v in row)] for name, row in found.first.items()]
+    cells = [[name, *(f"{v + 0.0:.6g}" for v in row)] for name, row in found.first.items()]
     numbers = map(str, range(1, len(found.first["time_s"]) + 1))
     return [
         TextTable("Runs", ("run", "samples", "s", "Hz", "flagged", "conditions"), runs, note),

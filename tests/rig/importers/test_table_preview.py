@@ -254,10 +254,12 @@ def test_import_writes_recordings_that_open(tmp_path, said):
 
 def test_a_preview_writes_nothing_and_shows_si_units(tmp_path, said):
     table = text_table(
-        tmp_path / "bench.csv", {"t": 1e3 * TIME, "q": np.degrees(WAVE), "i": 0 * TIME}
+        tmp_path / "bench.csv", {"t": 1e3 * TIME, "q": np.degrees(WAVE), "i": -0.0 * TIME}
     )
     page = tmp_path / "p.html"
     columns = "--column time_s=t:ms --column motor_angle_rad=q:deg --column motor_current_a=i:mA"
+    in_si = said("import", table, columns.replace(":mA", ""), "--preview").out
+    assert "-0" not in in_si.split()
     answer = said("import", table, columns, "--preview --json --plots", page)
     shown = json.loads(answer.out)["preview"]
     assert shown["first"]["motor_angle_rad"][1] == pytest.approx(WAVE[1])
