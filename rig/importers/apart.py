@@ -26,6 +26,9 @@ SURE = 1.25
 RELATED = 0.5
 """Correlation of two channels in a run from which its sign is that of the machine."""
 
+LEAST = 100
+"""Samples from which a correlation is one."""
+
 POSITIONS, MOTIONS = ("rad", "m"), ("rad", "m", "rad/s", "m/s", "rad/s^2", "m/s^2")
 """Units of which the rate counts, and those of motion: two motions may be independent."""
 
@@ -74,7 +77,8 @@ def _apart(
         if unit_of(name) in CONFUSED and np.mean(_within(found, usual)) >= MOST:
             ratios[name] = found / usual
     for k, recording in enumerate(recordings):
-        far = {n: r[k] for n, r in ratios.items() if r[k] > 0 and not _within(r[k], 1.0, FAR)}
+        known = {n: r[k] for n, r in ratios.items() if np.isfinite(r[k])}
+        far = {n: ratio for n, ratio in known.items() if not _within(ratio, 1.0, FAR)}
         if far and any(_within(r[k], 1.0) for r in ratios.values()):
             units = {n: _unit(n, ratio, ratios[n]) for n, ratio in far.items()}
             name = next((n for n in far if units[n]), next(iter(far)))
@@ -115,7 +119,7 @@ def _unit(name: str, ratio: float, ratios: FloatArray) -> str:
 
 def _is_of_ten(ratio: float) -> bool:
     """Return whether a ratio is about a power of ten."""
-    return bool(_within(ratio, 10.0 ** round(np.log10(ratio)), SURE))
+    return ratio > 0.0 and bool(_within(ratio, 10.0 ** round(np.log10(ratio)), SURE))
 
 
 def of_another_sign(recordings: Sequence[Recording]) -> Iterator[str]:
@@ -158,12 +162,15 @@ def _moved(name: str) -> str:
 
 def _correlations(recording: Recording, names: Sequence[str]) -> FloatArray:
     """Return the correlation of each two channels, 0 where there is none."""
+    if len(recording) < LEAST:
+        return np.zeros((len(names), len(names)))
     columns = np.array([recording[name] for name in names])
     for place, name in enumerate(names):
         if unit_of(name) in POSITIONS:
-            columns[place] = np.gradient(columns[place], recording.time_s)
+            with np.errstate(invalid="ignore"):  # infinite where a cell was
+                columns[place] = np.gradient(columns[place], recording.time_s)
     columns = columns[:, recording.valid & np.isfinite(columns).all(axis=0)]
-    if columns.shape[1] < 2:
+    if columns.shape[1] < LEAST:
         return np.zeros((len(names), len(names)))
     columns -= columns.mean(axis=1, keepdims=True)
     size = np.sqrt(np.sum(columns**2, axis=1))

@@ -133,6 +133,7 @@ def of_runs(tmp_path, angles, currents):
         (np.pi / 180, "is it stated in deg without being so there?"),
         (180 / np.pi, "is it in deg there?"),
         (1 / 20, "are unit and gain right there?"),
+        (0.0, "are unit and gain right there?"),
     ],
 )
 def test_one_run_in_another_unit_is_asked_once(tmp_path, factor, question):
