@@ -1,5 +1,6 @@
 """A channel whose sign contradicts the other channels of its equation."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -62,6 +63,22 @@ def opposed(fitted: Model, campaign: Campaign) -> str:
         f"{best} has the opposite sign of what the motion needs: with it negated, the residual is"
         f" {left:.2g} % of what it was."
     )
+
+
+def driven_back(fitted: Model, campaign: Campaign) -> Iterator[str]:
+    """Yield the drives with a negative gain that is more than the error of the fit, a sentence."""
+    evidence = fitted.evidence
+    for term in fitted.terms:
+        if term.effect.id != "motor.torque_constant" or evidence is None:
+            continue
+        source, (gain,) = term.channels["source"], term.weights
+        squares = [np.var(run[source]) for run in campaign.evidence if source in run]
+        if gain < 0.0 and squares and abs(gain) * np.sqrt(np.mean(squares)) > evidence.rmse:
+            yield (
+                f"{source} has a negative gain: where it rises, it drives {fitted.target} down."
+                f" Correct its sign, or that of {fitted.target} and the position: gain = -1 in the"
+                " machine file."
+            )
 
 
 def size_of_target(model: Model, campaign: Campaign) -> float:

@@ -19,7 +19,7 @@ from estimation.noise import (
     noise_width,
 )
 from estimation.noise_check import noisy, swamped
-from estimation.opposed import FIX, opposed, size_of_target
+from estimation.opposed import FIX, driven_back, opposed, size_of_target
 from estimation.plant import Plant
 from estimation.plant_equations import Missing, missing, signals, unused
 from estimation.plant_models import declared
@@ -182,6 +182,8 @@ def _fitted(
     is_none = is_contradicted and model.signals.combination(model.target) is not None
     if not is_none and (contradicted := opposed(fitted, campaign)):
         found = replace(found, trouble=f"{contradicted} {FIX}")
+    else:
+        found = replace(found, limits=(*limits, *driven_back(fitted, campaign)))
     if not fitted.run_offsets:
         return replace(found, relative_error=evidence.rmse_with_means / size)
     means = between_runs(evidence)

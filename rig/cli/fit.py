@@ -131,7 +131,7 @@ def fit(
     options.require_machine(machine)
 
     from estimation import model_file
-    from estimation.opposed import FIX, opposed
+    from estimation.opposed import FIX, driven_back, opposed
     from estimation.separable import inseparable
     from estimation.travel import off_ratio
     from rig.importers.questions import questions
@@ -157,6 +157,8 @@ def fit(
             said.append(f"{contradicted} The values above describe that: correct the ratio first.")
         elif contradicted := opposed(fitted, campaign):
             said.append(f"{contradicted} {FIX}")
+        else:
+            said += [f"Check: {line}" for line in driven_back(fitted, campaign)]
         if shared := inseparable(fitted, campaign):
             said.append(f"Check: {fitted.balance}: {shared}")
     if out is not None:

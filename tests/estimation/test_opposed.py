@@ -11,13 +11,13 @@ from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.filters import LowPass
 from estimation.fitting import fit
-from estimation.opposed import opposed
+from estimation.opposed import driven_back, opposed
 from estimation.plant_file import parse
 from estimation.plant_models import declared
 from estimation.recording import Recording
 from estimation.signals import Signals
 from estimation.travel import off_ratio, other_ratio, slope
-from tests.estimation.causes.synthetic import axis, turning
+from tests.estimation.causes.synthetic import axis, hoist, hoisted, turning
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +41,15 @@ def test_a_sound_machine_has_no_channel_of_the_opposite_sign(sound: list[Recordi
 @pytest.mark.parametrize("channel", ["crank_torque_n_m", "crank_angle_rad"])
 def test_the_drive_is_named_where_either_sign_is_wrong(sound, channel):
     assert _opposed(_negated(sound, channel)).startswith("crank_torque_n_m has the opposite sign")
+
+
+@pytest.mark.parametrize("channel", ["", "drive_command_v"])
+def test_a_drive_that_pulls_back_is_named(channel: str) -> None:
+    runs = _negated(hoisted(), channel) if channel else hoisted()
+    campaign = Campaign.of(runs)
+    found = [*driven_back(fit(hoist(), campaign, bootstrap=0), campaign)]
+    assert len(found) == bool(channel)
+    assert all(one.startswith("drive_command_v has a negative gain") for one in found)
 
 
 def test_no_cause_is_sought_where_a_sign_is_wrong(sound: list[Recording]) -> None:
