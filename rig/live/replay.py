@@ -49,7 +49,20 @@ def replay_blocks(
         raise DataError(f"Run {recording.name!r} holds no samples.", "There is nothing to show.")
     if speed is not None and not speed > 0:
         raise UsageError(f"A speed of {speed:g} shows nothing.", fix="Give a positive speed.")
-    return _blocks(recording, estimators, _Pace(speed, keys))
+    read = [_read_target(recording, one) for one in estimators]
+    known = recording.with_columns(**{name: x for part in read for name, x in part.items()})
+    return _blocks(known, estimators, _Pace(speed, keys))
+
+
+def _read_target(recording: Recording, estimator: LiveEstimator) -> dict[str, FloatArray]:
+    """Return a target that is a sum of readings, such as a difference of angles, by its name."""
+    name = estimator.target_channel
+    if name in recording or estimator.model is None:
+        return {}
+    sums = estimator.model.signals.combination(name)
+    if sums is None or sums.direction or any(s.channel not in recording for s in sums.shares):
+        return {}
+    return {name: np.sum([s.gain * recording[s.channel] for s in sums.shares], axis=0)}
 
 
 def _blocks(

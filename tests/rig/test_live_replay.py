@@ -11,10 +11,14 @@ import numpy as np
 import pytest
 
 from estimation.campaign import Campaign
+from estimation.estimators.model import ModelEstimator
+from estimation.fitting import fit
 from estimation.recording import Flag, Recording, Stretch
 from rig.errors import DataError, ExitCode, UsageError
+from rig.live.estimator import LiveEstimator
 from rig.live.replay import lost_samples, replay_blocks
 from rig.log.convert import write_recording
+from tests.estimation.causes.synthetic import gearbox, geared
 
 GRIP = "distal_torque_n_m"
 ESTIMATED = "estimated_distal_torque_n_m"
@@ -48,6 +52,16 @@ def virtual(monkeypatch):
     time = Time()
     monkeypatch.setattr("rig.live.replay.time", time)
     return time
+
+
+def test_a_target_that_is_a_difference_of_angles_is_read_from_both():
+    runs = geared()
+    fitted = fit(gearbox(), Campaign.of(runs), bootstrap=0)
+    estimator = LiveEstimator(ModelEstimator(fitted), runs[0].sample_rate_hz)
+    blocks = list(replay_blocks(runs[0], (estimator,), None))
+    read = np.concatenate([block.columns[fitted.target] for block in blocks])
+    angles = runs[0]["motor_angle_rad"] / 35.0 - runs[0]["spindle_angle_rad"]
+    np.testing.assert_allclose(np.abs(read), np.abs(angles), atol=1e-12)
 
 
 def test_keys_pause_hasten_skip_and_leave_a_replay(virtual):
