@@ -1,5 +1,6 @@
 """Where a result comes from: the day, the commit, the seed and the command that made it."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -31,7 +32,8 @@ class Provenance:
         commit: As `commit` returns it.
         version: Version of rig.
         seed: Seed of everything random.
-        command: Command line; of a path only the last part, since the others are the machine's own.
+        command: Command line; of an absolute path only the last part, since the others are the
+            machine's own.
     """
 
     date: str
@@ -43,7 +45,7 @@ class Provenance:
     @classmethod
     def now(cls, seed: int) -> "Provenance":
         """Return the provenance of what this process makes now."""
-        words = [Path(word).name if "/" in word else word for word in sys.argv]
+        words = [re.sub(r"(^|=)[~/]\S*/", r"\1", word) for word in sys.argv]
         if module := getattr(sys.modules["__main__"], "__spec__", None):
             words[:1] = ["python", "-m", module.name.removesuffix(".__main__")]
         return cls(

@@ -188,7 +188,22 @@ def test_a_table_is_the_same_in_every_medium():
     assert "p|q" in written.getvalue()
 
 
-def test_provenance_names_the_commit(tmp_path):
+def test_provenance_keeps_the_folders_of_relative_paths_only(monkeypatch):
+    words = [
+        "diagnose",
+        "runs/may",
+        "--column",
+        "a_rad=enc:rev/2000",
+        "--report=/home/me/r",
+        "/b/c",
+    ]
+    monkeypatch.setattr("sys.argv", ["/usr/bin/rig", *words])
+    kept = "diagnose runs/may --column a_rad=enc:rev/2000 --report=r c"
+    assert Provenance.now(0).command.endswith(kept)
+
+
+def test_provenance_names_the_commit(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["/usr/bin/rig", "demo"])
     assert commit(tmp_path) == "unknown"
     made = Provenance.now(7)
     assert made.seed == 7
