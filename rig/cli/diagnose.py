@@ -55,9 +55,7 @@ def diagnose(
     if plan:
         _plan(path, model, balance, machine, json_)
         return
-
     options.require_machine(machine)
-
     from estimation.file_kinds import DIAGNOSIS, HTML, MODEL, PROTOCOL
     from rig.campaigns.work import engine
     from rig.diagnosis.durations import timed_stages

@@ -131,9 +131,6 @@ def fit(
     options.require_machine(machine)
 
     from estimation import model_file
-    from estimation.opposed import FIX, driven_back, opposed
-    from estimation.separable import inseparable
-    from estimation.travel import off_ratio
     from rig.importers.questions import questions
     from rig.machines.recordings import open_recordings
     from rig.machines.shipped import read_machine
@@ -153,19 +150,29 @@ def fit(
     one = "One run: there is no error on runs that it was not fitted on."
     for fitted, error in done:
         said += [parameter_table(fitted), held_out_sentence(fitted, error) if error else one]
-        if contradicted := off_ratio(fitted, list(campaign.evidence)):
-            said.append(f"{contradicted} The values above describe that: correct the ratio first.")
-        elif contradicted := opposed(fitted, campaign):
-            said.append(f"{contradicted} {FIX}")
-        else:
-            said += [f"Check: {line}" for line in driven_back(fitted, campaign)]
-        if shared := inseparable(fitted, campaign):
-            said.append(f"Check: {fitted.balance}: {shared}")
+        said += _doubts(fitted, campaign)
     if out is not None:
         model_file.write_all([fitted for fitted, _ in done], out)
         said.append(f"Model: {out}")
     told = [_told(fitted, error, out) for fitted, error in done]
     present(json_, told[0] if len(told) == 1 else {"models": told, "out": out}, *said)
+
+
+def _doubts(fitted: "Model", campaign: "Campaign") -> list[str]:
+    """Return what speaks against a fit: the ratio, a sign, and amplitudes alike in these runs."""
+    from estimation.opposed import FIX, driven_back, opposed
+    from estimation.separable import inseparable
+    from estimation.travel import off_ratio
+
+    if contradicted := off_ratio(fitted, list(campaign.evidence)):
+        found = [f"{contradicted} The values above describe that: correct the ratio first."]
+    elif contradicted := opposed(fitted, campaign):
+        found = [f"{contradicted} {FIX}"]
+    else:
+        found = [f"Check: {line}" for line in driven_back(fitted, campaign)]
+    if shared := inseparable(fitted, campaign):
+        found.append(f"Check: {fitted.balance}: {shared}")
+    return found
 
 
 def _folds(asked: int | None, runs: int) -> int:
