@@ -190,6 +190,8 @@ def _rejected(candidate: Candidate, why: str, found: Collection[object]) -> str:
     """Return that a cause is not a finding; of another form of a finding, that it is a second."""
     second = "A second form of " if candidate.name in found else ""
     family, place = candidate.cause.family, candidate.cause.place.name
+    if isinstance(candidate.cause, Function):
+        family = f"{'an' if second else 'An'} effect of unknown form"
     return f"{second}{family} ({place}) was found in the training runs and {why}."
 
 
@@ -326,11 +328,11 @@ def _unidentified(
 
 
 def _unwritten(candidate: Candidate) -> str:
-    cause = candidate.cause
-    if candidate.acts is not None:
+    cause, family = candidate.cause, candidate.cause.family
+    if isinstance(cause, Function):
+        family, why = "an effect of unknown form", "it has no equation"
+    elif candidate.acts is not None:
         why = "it acts in some of the runs only"
-    elif isinstance(cause, Function):
-        why = "its form is unknown"
     elif cause.ahead:
         why = "its reading is late, and a model cannot read it earlier"
     elif not any(e.order for e in cause.place.enters if e.equation == cause.place.home):
@@ -340,7 +342,7 @@ def _unwritten(candidate: Candidate) -> str:
             "the rate of change of what it adds enters the equation, and a term of a model is not a"
             " rate of change"
         )
-    return f"{cause.place.home}: {cause.family} is reported and not added to the model file; {why}."
+    return f"{cause.place.home}: {family} is reported and not added to the model file; {why}."
 
 
 def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
