@@ -159,7 +159,7 @@ def fit(
 
 
 def _doubts(fitted: "Model", campaign: "Campaign") -> list[str]:
-    """Return what speaks against a fit: the ratio, a sign, and amplitudes alike in these runs."""
+    """Return the doubts about a fit: its ratio, a sign, and amplitudes alike in these runs."""
     from estimation.opposed import FIX, driven_back, opposed
     from estimation.separable import inseparable
     from estimation.travel import off_ratio
