@@ -116,9 +116,9 @@ def test_the_written_model_runs_live_with_the_error_that_is_reported(whole):
     )
     assert live == pytest.approx(estimator.predict(one, causal=True), rel=1e-12, abs=1e-14)
     (note,) = [n for n in whole.found["notes"] if "causal" in n]
-    zero_phase, causal = (float(n) for n in re.findall(r"([\d.]+) mN m", note))
+    zero_phase, causal, shown = (float(n) for n in re.findall(r"([\d.]+) mN m", note))
     assert zero_phase == pytest.approx(1e3 * whole.found["rmse_after"]["motor"], rel=0.01)
-    assert causal > zero_phase
+    assert shown > causal > zero_phase
 
 
 def test_a_second_look_at_the_same_runs_is_exploratory_with_any_seed(whole, campaign, tmp_path):
