@@ -111,9 +111,9 @@ def tried(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
             gain, price = round(float(judged.gains[k]), DIGITS), _price(candidate, joint)
             score = gain - price.score(joint.numbers)
             by_run = Products(*(x[:, k] for x in judged.by_run))
-            if isinstance(candidate.cause, Source):
-                cause = candidate.cause.directed(float(amplitudes[0]))
-                candidate = replace(candidate, cause=cause)
+            cause = candidate.cause
+            if isinstance(cause, Source) and cause.odd:
+                candidate = replace(candidate, cause=cause.directed(float(amplitudes[0])))
             out.append(Scored(candidate, score, gain, price, amplitudes, by_run))
     return out
 

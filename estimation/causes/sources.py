@@ -133,9 +133,8 @@ class Source:
         A reading is late in any case. At a drive the reading of its current may be late, with a
         negative amplitude, or what the current drives.
         """
-        of_reading = self.odd and self.effect.id in READ_LATE
-        is_ahead = of_reading and (self.place.kind != "actuator" or amplitude < 0.0)
-        return replace(self, ahead=True) if is_ahead else self
+        is_late = self.effect.id in READ_LATE
+        return replace(self, ahead=is_late and (self.place.kind != "actuator" or amplitude < 0.0))
 
     def values(self, run: RunSignals) -> FloatArray | None:
         """Return the source's columns over the run, (n, parts), as its own equation reads them.
