@@ -160,7 +160,7 @@ def derive(
         if times and tracked and source in tracked:
             return tracked[source][:, times]
         made = signals.combination(source)
-        values = filtered[source] if made is None else _combined(made, differentiated)
+        values = filtered[source] if made is None else combined(made, differentiated)
         for _ in range(times):
             values = derivative(values)
         return values
@@ -185,10 +185,11 @@ def derive(
     return channels
 
 
-def _combined(
+def combined(
     combination: Combination,
     differentiated: Callable[[str], FloatArray],
 ) -> FloatArray:
+    """Return a combination of channels, each as a function of its name gives it, shape (n,)."""
     parts = [s.times * differentiated(s.channel) / s.over for s in combination.shares]
     if (turn := combination.direction) is not None:
         parts.append(turn.size * np.tanh(differentiated(turn.speed) / turn.width))

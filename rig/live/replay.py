@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from estimation.channels import ESTIMATED
+from estimation.derived import combined
 from estimation.recording import Flag, FloatArray, Recording
 from rig.errors import DataError, UsageError
 from rig.live.block import DeviceStatus, SampleBlock
@@ -62,7 +63,7 @@ def _read_target(recording: Recording, estimator: LiveEstimator) -> dict[str, Fl
     sums = estimator.model.signals.combination(name)
     if sums is None or sums.direction or any(s.channel not in recording for s in sums.shares):
         return {}
-    return {name: np.sum([s.gain * recording[s.channel] for s in sums.shares], axis=0)}
+    return {name: combined(sums, recording.__getitem__)}
 
 
 def _blocks(
