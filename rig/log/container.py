@@ -11,11 +11,9 @@ written by the `mcap` package. Layout of the file:
 Source: MCAP format specification, https://mcap.dev/spec.
 """
 
-import signal
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -42,10 +40,6 @@ COMPRESSION_LEVEL = -1
 the default level 3 and unpacks 20 % faster; level 1 packs 10 % tighter still, and unpacks 10 %
 slower."""
 
-INTERRUPTS = {
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-}
-
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 
@@ -67,23 +61,11 @@ def encode(*records: mcap.McapRecord) -> bytes:
     return data
 
 
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Hold signals back, so that none comes between bytes in the file and their checksum."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 class Container:
     """An MCAP file being written to an open binary file.
 
     Nothing is held back: each call writes its bytes to the file, empty at first, before it returns.
+    After a call that an exception broke off, the checksum of the file is wrong.
     """
 
     def __init__(self, file: BinaryIO, library: str) -> None:
@@ -102,10 +84,9 @@ class Container:
     def _put(self, data: bytes) -> int:
         """Write bytes of the data section and return the offset they start at."""
         start = self._offset
-        with _uninterrupted():
-            self._file.write(data)
-            self._crc = zlib.crc32(data, self._crc)
-            self._offset += len(data)
+        self._file.write(data)
+        self._crc = zlib.crc32(data, self._crc)
+        self._offset += len(data)
         return start
 
     def add_stream(self, stream: Stream) -> int:

@@ -7,14 +7,20 @@ file called `.mcap` is always whole, and the `.part` file of a killed recorder c
 What was written is held in memory until it has waited `FLUSH_AFTER_S` or spans that much data time,
 then it goes to the operating system as one chunk for each stream. What the operating system has,
 `kill -9` cannot take away; only a power cut can.
+
+A thread of the writer's own changes the file. Python raises KeyboardInterrupt in the main thread
+alone, whichever thread the signal reaches, so no interrupt comes between bytes in the file and
+their checksum, and none loses a block that is being written.
 """
 
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Self
+from threading import Lock
+from typing import ParamSpec, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +44,9 @@ FLUSH_AFTER_S = 0.2
 
 CHUNK_BYTES = 1 << 20
 """The most a chunk holds, unpacked; a recording written in one go is cut into such chunks."""
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 class LogExistsError(UsageError):
@@ -93,30 +102,39 @@ class LogWriter:
         run_metadata = to_metadata(run)
         self._clock = clock
         self._pending: dict[str, list[NDArray[np.void]]] = {}
+        self._pending_lock = Lock()
         self._waiting_since_s = 0.0
         self._closed = False
         try:
             self._file = self.part.open("xb")
         except OSError as error:
             raise LogWriteError(f"The log {self.part} cannot be made.", str(error)) from None
+        self._thread = ThreadPoolExecutor(1, "log")
         try:
-            with self._giving_to_system():
-                self._container = Container(self._file, f"{LIBRARY} {__version__}")
-                self._container.add_metadata(*run_metadata)
-                self._channels = {s.topic: self._container.add_stream(s) for s in streams}
-                for attached in attachments:
-                    self._container.add_attachment(attached, run.started_at_ns or 0)
-                self._file.flush()
+            self._in_turn(self._begin, streams, run_metadata, attachments, run.started_at_ns or 0)
         except LogWriteError:
             self.discard()
             raise
+
+    def _begin(
+        self,
+        streams: Sequence[Stream],
+        run_metadata: tuple[str, Mapping[str, str]],
+        attachments: Sequence[Attached],
+        started_at_ns: int,
+    ) -> None:
+        with self._giving_to_system():
+            self._container = Container(self._file, f"{LIBRARY} {__version__}")
+            self._container.add_metadata(*run_metadata)
+            self._channels = {s.topic: self._container.add_stream(s) for s in streams}
+            for attached in attachments:
+                self._container.add_attachment(attached, started_at_ns)
+            self._file.flush()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: object, _: object) -> None:
-        if self._closed:
-            return
         reason = "" if kind is None else f"{kind.__name__}: {error}".strip(": ")
         self.close(RunEnd(clean=kind is None, reason=reason))
 
@@ -146,10 +164,11 @@ class LogWriter:
         messages = message_records(
             stream, payload, log_time_ns, self._channels[topic], self.received[topic]
         )
-        if not self._pending:
-            self._waiting_since_s = self._clock()
-        self._pending.setdefault(topic, []).append(messages)
         self.received[topic] += payload.size
+        with self._pending_lock:
+            if not self._pending:
+                self._waiting_since_s = self._clock()
+            self._pending.setdefault(topic, []).append(messages)
         if self._spans_ns() >= FLUSH_AFTER_S * 1e9:
             self.flush()
         self.poll()
@@ -166,7 +185,11 @@ class LogWriter:
 
     def flush(self) -> None:
         """Hand everything written so far to the operating system."""
-        pending, self._pending = self._pending, {}
+        self._in_turn(self._flush)
+
+    def _flush(self) -> None:
+        with self._pending_lock:
+            pending, self._pending = self._pending, {}
         with self._giving_to_system():
             for topic, blocks in pending.items():
                 messages = np.concatenate(blocks)
@@ -183,6 +206,9 @@ class LogWriter:
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
         """Write a metadata record of any name at once."""
+        self._in_turn(self._add_metadata, name, data)
+
+    def _add_metadata(self, name: str, data: Mapping[str, str]) -> None:
         with self._giving_to_system():
             self._container.add_metadata(name, data)
             self._file.flush()
@@ -190,24 +216,35 @@ class LogWriter:
     def close(self, end: RunEnd | None = None) -> Path:
         """Write what is known at the end, a clean one when None, and give the file its name.
 
+        A log that is closed, or could not be written, stays as it is.
+
         Raises:
             LogWriteError: The operating system refused the data; what it took is in the `.part`.
         """
         end_metadata = to_metadata(end or RunEnd())
-        self.flush()
+        if not self._closed:
+            self._in_turn(self._close, *end_metadata)
+        self._thread.shutdown()
+        return self.path
+
+    def _close(self, name: str, data: Mapping[str, str]) -> None:
+        if self._closed:
+            return
+        self._flush()
         with self._giving_to_system():
-            self._container.add_metadata(*end_metadata)
+            self._container.add_metadata(name, data)
             self._container.finish()
             self._file.flush()
             os.fsync(self._file.fileno())
             self._abandon()
             self.part.rename(self.path)
             sync_folder(self.path.parent)
-        return self.path
 
     def discard(self) -> None:
         """Close and delete what was written: for a log that is a copy of something else."""
-        self._abandon()
+        if not self._closed:
+            self._in_turn(self._abandon)
+        self._thread.shutdown()
         self.part.unlink(missing_ok=True)
 
     def _abandon(self) -> None:
@@ -215,6 +252,14 @@ class LogWriter:
         self._closed = True
         with suppress(OSError):  # the first error is more useful than that of flushing
             self._file.close()
+
+    def _in_turn(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Do something in the thread that changes the file, after what was begun before."""
+        try:
+            return self._thread.submit(work, *args, **kwargs).result()
+        except LogWriteError:
+            self._thread.shutdown()
+            raise
 
     @contextmanager
     def _giving_to_system(self) -> Iterator[None]:
