@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 from estimation.causes.equations import Equation
 from estimation.causes.joint import Joint
 from estimation.causes.laid import TINY
+from estimation.causes.layout import Layout
+from estimation.causes.numbers import Numbers
 from estimation.derived import measured_channels
+from estimation.diagnosis.split import Sealed
 from estimation.recording import FloatArray
 
 ALIKE, FACTOR = 0.7, 2.0
@@ -92,6 +95,23 @@ def apart(joint: Joint) -> list[Apart]:
         out.append(min(costs, key=costs.__getitem__))
     apart = [one for k, one in _found(joint, out) if k in out]
     return list(dict.fromkeys(apart))
+
+
+def reversed_runs(layout: Layout, sealed: Sealed, numbers: Numbers) -> list[Apart]:
+    """Return the runs in which a channel has the opposite sign, before the search.
+
+    Such a run spoils what is found in all others. The training runs are compared with one another,
+    then the test runs with them.
+    """
+    train = [one for one in apart(_joint(layout, sealed.discover, numbers)) if one.factor < 0.0]
+    wrong = {one.run for one in train}
+    rest = [name for name in (*sealed.discover, *sealed.confirm) if name not in wrong]
+    found = apart(_joint(layout, rest, numbers))
+    return train + [one for one in found if one.factor < 0.0 and one.run in sealed.confirm]
+
+
+def _joint(layout: Layout, names: Sequence[str], numbers: Numbers) -> Joint:
+    return Joint(layout.select(names), numbers)
 
 
 def _cost(joint: Joint, without: Sequence[int]) -> float:

@@ -22,13 +22,15 @@ from estimation.recording import Recording
 from estimation.signals import Signals
 
 
-def apart(layout: Layout, found: Iterable[Apart]) -> Iterator[str]:
+def apart(found: Iterable[Apart], is_left_out: bool = False) -> Iterator[str]:
     """Yield the runs of which a channel is in another sign or unit than the others predict."""
+    what = (
+        "The run is left out; correct the sign in it to use it."
+        if is_left_out
+        else "Check its sign and unit in this run, or exclude the run."
+    )
     for channel, run, factor in found:
-        yield (
-            f"{run}: {channel} is {factor:.2g} times what the other runs predict for it. Check its"
-            " sign and unit in this run, or exclude the run."
-        )
+        yield f"{run}: {channel} is {factor:.2g} times what the other runs predict for it. {what}"
 
 
 def late(found: Mapping[str, float], signals: Signals) -> Iterator[str]:

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from estimation.causes import remarks
 from estimation.causes.acting import Moved
 from estimation.causes.angles import signals_of
+from estimation.causes.apart import reversed_runs
 from estimation.causes.candidates import Candidate
 from estimation.causes.findings import (
     Kept,
@@ -87,11 +88,13 @@ def answer(
     began = time.perf_counter()
     on_stage("fitting the declared equations")
     timed = on_one_clock(recordings)
-    layout = lay_out(models, timed, sealed.discover)
+    layout, sealed = _laid_out(models, timed, sealed, numbers)
+    wrong = reversed_runs(layout, sealed, numbers)
+    if wrong:
+        names = {one.run for one in wrong}
+        timed, sealed = [r for r in timed if r.name not in names], sealed.without(names)
+        layout, sealed = _laid_out(models, timed, sealed, numbers)
     timed = [r for r in timed if r.name not in layout.left_out]
-    sealed = sealed.without(layout.left_out)
-    layout = with_levels(layout, sealed.discover, numbers)
-    add_instruments(layout, sealed.discover)
     on_stage("searching the training runs for what they lack")
     with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
         found = search(layout.select(sealed.discover), numbers)
@@ -117,7 +120,8 @@ def answer(
     read = {name for kept, _ in judged for name in kept.scored.candidate.cause.reads}
     found_in = [(kept.scored.candidate, f.runs_affected) for kept, f in judged]
     said = [
-        *remarks.apart(layout, held_out.apart(found_in)),
+        *remarks.apart(wrong, is_left_out=True),
+        *remarks.apart(held_out.apart(found_in)),
         *filter(None, [claim(sealed)]),
         *remarks.late(found.noticed, signals_of(layout)),
         *remarks.left(layout, left, over_noise, explained),
@@ -139,6 +143,17 @@ def answer(
     )
     kept = tuple(one for one, _ in judged)
     return Answer(diagnosis, layout, found, kept, refits, tuple(written))
+
+
+def _laid_out(
+    models: Sequence[Model], recordings: Sequence[Recording], sealed: Sealed, numbers: Numbers
+) -> tuple[Layout, Sealed]:
+    """Return the equations on all runs that are long enough, and the split of these."""
+    layout = lay_out(models, recordings, sealed.discover)
+    sealed = sealed.without(layout.left_out)
+    layout = with_levels(layout, sealed.discover, numbers)
+    add_instruments(layout, sealed.discover)
+    return layout, sealed
 
 
 @dataclass(frozen=True)

@@ -33,12 +33,19 @@ def test_slow_runs_are_not_remarked_on_where_a_finding_explains_them() -> None:
     assert not [note for note in found.notes if REMARK in note]
 
 
-def test_a_run_with_a_swapped_sign_is_the_first_note() -> None:
-    runs = turning(lambda angle, speed, acceleration: 0.0 * speed)[:6]
-    runs[4] = runs[4].with_columns(crank_torque_n_m=-runs[4]["crank_torque_n_m"])
-    found = diagnose(runs, [axis()], split(runs))
-    assert found.notes[0].startswith(f"04: crank_torque_n_m is -1 {REMARK}")
+@pytest.mark.parametrize("place", [3, 4])
+def test_a_run_with_a_swapped_sign_is_the_first_note_and_takes_no_part(place: int) -> None:
+    runs = turning(lambda angle, speed, acceleration: 0.0 * speed)[:8]
+    wrong = runs[place].with_columns(crank_torque_n_m=-runs[place]["crank_torque_n_m"])
+    with_it, without = [*runs[:place], wrong, *runs[place + 1 :]], split(runs)
+    found = diagnose(with_it, [axis()], without)
+    note = f"{wrong.name}: crank_torque_n_m is -1 {REMARK} for it. The run is left out;"
+    assert found.notes[0].startswith(note)
     assert len(found.notes) > 1
+    kept = [run for run in runs if run.name != wrong.name]
+    alone = diagnose(kept, [axis()], without.without({wrong.name}))
+    assert found.errors == alone.errors
+    assert found.findings == alone.findings == ()
 
 
 @pytest.mark.parametrize(
