@@ -26,11 +26,15 @@ so many times that of half of the runs. A run in which another effect dominates 
 
 
 class Apart(NamedTuple):
-    """A channel of a run that is a factor times what the other runs predict for it."""
+    """A channel of a run that is a factor times what the other runs predict for it.
+
+    `unexplained` is the share of the run's variation that the factor does not explain.
+    """
 
     channel: str
     run: str
     factor: float
+    unexplained: float
 
 
 class _Factors(NamedTuple):
@@ -103,11 +107,19 @@ def reversed_runs(layout: Layout, sealed: Sealed, numbers: Numbers) -> list[Apar
     Such a run spoils what is found in all others. The training runs are compared with one another,
     then the test runs with them.
     """
-    train = [one for one in apart(_joint(layout, sealed.discover, numbers)) if one.factor < 0.0]
+    train = [*filter(_is_reversed, apart(_joint(layout, sealed.discover, numbers)))]
     wrong = {one.run for one in train}
     rest = [name for name in (*sealed.discover, *sealed.confirm) if name not in wrong]
-    found = apart(_joint(layout, rest, numbers))
-    return train + [one for one in found if one.factor < 0.0 and one.run in sealed.confirm]
+    found = filter(_is_reversed, apart(_joint(layout, rest, numbers)))
+    return train + [one for one in found if one.run in sealed.confirm]
+
+
+def _is_reversed(one: Apart) -> bool:
+    """Whether minus one explains the run: with another factor, or less well, it has other causes.
+
+    A run of an arm whose equation lacks the motion of the other joints may look reversed.
+    """
+    return 1.0 / FACTOR < -one.factor < FACTOR and one.unexplained < UNEXPLAINED
 
 
 def _joint(layout: Layout, names: Sequence[str], numbers: Numbers) -> Joint:
@@ -139,7 +151,8 @@ def _found(joint: Joint, out: Sequence[int]) -> Iterator[tuple[int, Apart]]:
             least, most = (float(slope[k]) for slope in best.slopes(whole))
             factor = math.copysign(math.sqrt(least * most), least)
             factor = factor if best.is_target else 1.0 / factor
-            yield k, Apart(best.channel, joint.runs[k].name, factor)
+            rest = float(best.rest(whole)[k])
+            yield k, Apart(best.channel, joint.runs[k].name, factor, rest)
 
 
 def _tried(joint: Joint, equation: Equation, base: FloatArray) -> Iterator[_Factors]:

@@ -29,8 +29,9 @@ def apart(found: Iterable[Apart], is_left_out: bool = False) -> Iterator[str]:
         if is_left_out
         else "Check its sign and unit in this run, or exclude the run."
     )
-    for channel, run, factor in found:
-        yield f"{run}: {channel} is {factor:.2g} times what the other runs predict for it. {what}"
+    for one in found:
+        factor = f"{one.factor:.2g} times what the other runs predict for it"
+        yield f"{one.run}: {one.channel} is {factor}. {what}"
 
 
 def late(found: Mapping[str, float], signals: Signals) -> Iterator[str]:
