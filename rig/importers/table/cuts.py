@@ -1,5 +1,8 @@
 """Where the runs of a file begin: at gaps, laps, trials or marks, as the mapping states."""
 
+import re
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +28,7 @@ def edges_of(raw: Raw, mapping: ColumnMapping, time_s: FloatArray) -> list[int]:
         begins[1:] |= steps > rules.gap_s
     if rules.resets:
         begins[1:] |= steps < 0
-    for name in (*rules.changes, *([TRIAL] if data.trials else [])):
+    for name in _of_trials(mapping):
         values = _cutting(raw, mapping, "changes", name)
         begins[1:] |= values[1:] != values[:-1]
     if rules.falls:
@@ -42,6 +45,28 @@ def edges_of(raw: Raw, mapping: ColumnMapping, time_s: FloatArray) -> list[int]:
         at += laps.tolist()
     begins[[k for k in np.searchsorted(since_s, np.array(at) - 1e-9) if k < len(begins)]] = True
     return sorted({first, *np.flatnonzero(begins[:end]).tolist(), max(first, end)})
+
+
+def labels_of(raw: Raw, mapping: ColumnMapping, begins: Sequence[int]) -> list[str]:
+    """Return the trial of each run, as the run is named by it.
+
+    Empty where not one column states it, or where two runs would have the same name.
+    """
+    names = _of_trials(mapping)
+    if len(names) != 1:
+        return []
+    found = [_cutting(raw, mapping, "changes", names[0])[place] for place in begins]
+    if all(isinstance(x, np.number) and float(x).is_integer() for x in found):
+        width = max(2, *(len(f"{x:.0f}") for x in found))
+        labels = [f"{float(x):0{width}.0f}" for x in found]
+    else:
+        labels = [re.sub(r"[^\w.]+", "-", str(x)).strip("-").lower() for x in found]
+    return labels if all(labels) and len({*labels}) == len(labels) else []
+
+
+def _of_trials(mapping: ColumnMapping) -> list[str]:
+    """Return the columns a new value of which begins a run."""
+    return [*mapping.data.runs.changes, *([TRIAL] if mapping.data.trials else [])]
 
 
 def _cutting(raw: Raw, mapping: ColumnMapping, rule: str, name: str) -> NDArray[np.generic]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from estimation.recording import Flag, FloatArray, Recording, RecordingError, Stretch
 from rig.errors import DataError
 from rig.importers.table.channels import Samples
+from rig.importers.table.cuts import labels_of
 from rig.importers.table.mapping import ColumnMapping, worked_out
 from rig.importers.table.raw import Remark, Values
 from rig.output.table import counted
@@ -36,9 +37,11 @@ def recordings(samples: Samples, remarks: list[Remark]) -> Iterator[Recording]:
         few = "1 part" if short == 1 else f"{short} parts"
         remarks.append((samples.raw.path.name, f"{few} too short for a run left out"))
     width = max(2, len(str(len(kept))))
-    for number, part in enumerate(kept):
-        name = f"{stem}-{number:0{width}d}" if len(kept) > 1 else stem
-        yield _run(samples, part, name, remarks)
+    labels = labels_of(samples.raw, samples.mapping, [part.start for part in kept]) or [
+        f"{number:0{width}d}" for number in range(len(kept))
+    ]
+    for label, part in zip(labels, kept, strict=True):
+        yield _run(samples, part, f"{stem}-{label}" if len(kept) > 1 else stem, remarks)
 
 
 def _is_long_enough(samples: Samples, part: slice) -> bool:

@@ -328,6 +328,26 @@ def test_a_counter_that_starts_again_does_so_in_each_run_for_itself(tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ("trials", "names"),
+    [
+        ([1, 1, 1, 2, 2, 2], ["run-01", "run-02"]),
+        ([9, 9, 9, 110, 110, 110], ["run-009", "run-110"]),
+        (["Tag 3", "Tag 3", "Tag 3", "b/c", "b/c", "b/c"], ["run-tag-3", "run-b-c"]),
+        ([1.5, 1.5, 1.5, 2.5, 2.5, 2.5], ["run-1.5", "run-2.5"]),
+        (["a+", "a+", "a+", "a-", "a-", "a-"], ["run-00", "run-01"]),  # the same in a name
+        ([1, 1, 2, 2, 1, 1], ["run-00", "run-01", "run-02"]),
+    ],
+)
+def test_runs_are_named_by_their_trial_where_each_has_its_own(tmp_path, trials, names):
+    path = tmp_path / "run.csv"
+    rows = [f"{0.1 * k},{k},{trial}\n" for k, trial in enumerate(trials)]
+    path.write_text("".join(["t,enc,trial\n", *rows]))
+    text = SECONDS + 'motor_angle_rad = "enc:deg"\n[data.runs]\nchanges = ["trial"]\n'
+    runs = open_table(path, machine(tmp_path, text))
+    assert [run.name for run in runs] == names
+
+
 def test_each_run_is_on_a_clock_of_its_own_and_a_short_rest_is_left_out(tmp_path):
     path = tmp_path / "run.csv"
     text_table(path, {"t": [0.1 * k for k in range(7)], "enc": list(range(7))})
