@@ -47,18 +47,26 @@ def audit(recordings: Sequence[Recording], read: Set[str] = frozenset()) -> list
 
     What an effect that was found reads is not a limit: between runs it was decided.
     """
-    said = []
-    for recording in recordings:
-        begins, lengths, _ = _gaps(recording)
-        if begins.size:
-            longest = int(np.argmax(lengths))
-            said.append(
-                f"The clock of run {recording.name} skips {begins.size} times, the longest by"
-                f" {lengths[longest]:.3g} s at {begins[longest] - recording.time_s[0]:.3g} s:"
-                " an effect of time or history is not decided across it."
-            )
+    said = _skipping(recordings)
     others = [name for name in shared_columns(recordings) if name not in read]
     return said + [line for name in others if (line := _held(name, recordings))]
+
+
+def _skipping(recordings: Sequence[Recording]) -> list[str]:
+    """Return a sentence on the runs whose clock skips, or nothing."""
+    runs = [(r, *_gaps(r)[:2]) for r in recordings]
+    runs = [one for one in runs if one[1].size]
+    if not runs:
+        return []
+    worst, begins, lengths = max(runs, key=lambda one: float(one[2].max()))
+    k = int(np.argmax(lengths))
+    times = sum(len(found) for _, found, _ in runs)
+    where = f"run {worst.name}" if len(runs) == 1 else f"{len(runs)} runs"
+    place = f"{begins[k] - worst.time_s[0]:.3g} s" + ("" if len(runs) == 1 else f" of {worst.name}")
+    return [
+        f"The clock of {where} skips {times} time{'s' if times > 1 else ''}, the longest by"
+        f" {lengths[k]:.3g} s at {place}: an effect of time or history is not decided across it."
+    ]
 
 
 def _held(name: str, recordings: Sequence[Recording], steady: float = 1e-3) -> str:
