@@ -132,10 +132,10 @@ class UnitError(EstimationError):
 
 
 def _powers(symbol: str) -> Powers:
-    """Read `N m s/rad` or `rad/s^2` as powers of its base symbols."""
+    """Read `N m s/rad`, `rad/(N m)` or `rad/N m` as powers of its base symbols."""
     powers: Powers = {}
     for place, part in enumerate(symbol.split("/")):
-        for factor in part.split():
+        for factor in part.removeprefix("(").removesuffix(")").split():
             match = re.fullmatch(r"([A-Za-z%]+|1)(?:\^(\d+))?", factor)
             if match is None:
                 raise UnitError(f"The unit {symbol!r} cannot be read at {factor!r}.")
@@ -151,7 +151,17 @@ def _symbol(powers: Powers) -> str:
 
     above = product({n: p for n, p in powers.items() if p > 0}) or "1"
     below = product({n: -p for n, p in powers.items() if p < 0})
-    return f"{above}/{below}" if below else above
+    if not below:
+        return above
+    return f"{above}/({below})" if " " in below else f"{above}/{below}"
+
+
+def is_same(one: str, other: str) -> bool:
+    """Whether two unit symbols are one, however they are written: `rad/N m` is `rad/(N m)`."""
+    try:
+        return _powers(one) == _powers(other)
+    except UnitError:
+        return False
 
 
 def evaluate(expression: str, symbols: Mapping[str, str]) -> str:

@@ -29,6 +29,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, cast, get_args
 
+from estimation.channels import is_same
 from estimation.effects import effect
 from estimation.errors import EstimationError, UnknownNameError, nearest
 from estimation.files import not_utf8, write_text_atomic
@@ -269,7 +270,7 @@ def _check_units(term: Term, target: str, stated: Mapping[str, str]) -> None:
     for parameter in term.parameters:
         unit = term.unit(parameter, target)
         written = stated.get(parameter.name, unit)
-        if SAME_UNIT.get(written, written) != unit:
+        if not is_same(SAME_UNIT.get(written, written), unit):
             raise ModelError(
                 f"{term.effect.id}: {parameter.name} is stated in {stated[parameter.name]!r},"
                 f" not in {unit!r}.",

@@ -23,7 +23,7 @@ from rig.protocols import trajectory
 AMPLITUDE_RAD = 0.15
 FREQUENCY_HZ = 0.5
 GAIN_A_N_M = 3.0
-"""Change of load a period for an error, A/N m; below one over the load motor's constant it settles
+"""Change of load a period for an error, A/(N m); below one over the motor's constant it settles
 whatever that constant is."""
 SLEW_A_S = 0.4
 SHARE = 0.8

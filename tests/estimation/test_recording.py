@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimation.campaign import Campaign, CampaignError, Run
-from estimation.channels import UnknownUnitError, unit_of
+from estimation.channels import UnknownUnitError, evaluate, is_same, unit_of
 from estimation.recording import (
     Flag,
     MissingChannelError,
@@ -88,6 +88,12 @@ def test_rate_and_duration():
 def test_a_compliance_has_the_unit_of_an_angle_by_a_torque():
     assert unit_of("compliance_rad_n_m") == "rad/(N m)"
     assert unit_of("stiffness_n_m_rad") == "N m/rad"
+    units = {"target": unit_of("spindle_angle_rad"), "load": unit_of("spindle_torque_n_m")}
+    assert evaluate("target / load", units) == "rad/(N m)"
+    assert evaluate("1 / compliance", {"compliance": "rad/(N m)"}) == "N m/rad"
+    assert is_same("rad/N m", "rad/(N m)")
+    assert not is_same("rad/N m", "rad m/N")
+    assert not is_same("rad/?", "rad")
 
 
 def test_a_campaign_is_walked_run_by_run():
