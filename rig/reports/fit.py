@@ -1,7 +1,10 @@
 """A fitted model's parameters as a table, and its error on held-out runs in a sentence."""
 
+import math
+
 from estimation.cross_validation import HeldOutError
-from estimation.model import Model
+from estimation.effects import Parameter
+from estimation.model import Estimate, Model
 from rig.output.table import TextTable, counted
 from rig.reports.diagnosis_words import display, in_unit
 
@@ -15,7 +18,7 @@ def parameter_table(model: Model) -> TextTable:
             unit = term.unit(parameter, model.target)
             sign = "+" if term.sign == 1 else "-"
             name = f"{term.effect.id}, {parameter.name}"
-            interval = "" if known.ci95 is None else "{:.4g} to {:.4g}".format(*known.ci95)
+            interval = _interval(known, parameter)
             rows.append([name, sign, f"{known.value:.4g}", interval, unit])
     evidence = model.evidence
     note = ""
@@ -26,9 +29,18 @@ def parameter_table(model: Model) -> TextTable:
             f" {in_unit(scale * evidence.rmse, unit)} with each run's mean removed,"
             f" {in_unit(scale * evidence.rmse_with_means, unit)} with means. Sign: + adds to the"
             " target, - subtracts from it. 95 %: interval of a bootstrap over runs; empty at a"
-            " bound or with one run."
+            " bound or with one run, and 'any' where the runs allow every value within the bounds."
         )
     return TextTable("Fitted model", ["parameter", "sign", "value", "95 %", "unit"], rows, note)
+
+
+def _interval(known: Estimate, parameter: Parameter) -> str:
+    if known.ci95 is None:
+        return ""
+    bounds = (parameter.lower, parameter.upper)
+    if all(math.isclose(*ends, rel_tol=0.01) for ends in zip(known.ci95, bounds, strict=True)):
+        return "any"
+    return "{:.4g} to {:.4g}".format(*known.ci95)
 
 
 def held_out_sentence(model: Model, error: HeldOutError) -> str:

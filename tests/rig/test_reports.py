@@ -14,7 +14,7 @@ from estimation.causes.isolability import Isolable
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.split import Sealed
 from estimation.effects import catalogue
-from estimation.model import Estimate, Term
+from estimation.model import Estimate, Model, Term
 from estimation.recording import Flag, Mark, Recording
 from rig.diagnosis import plan
 from rig.log.convert import write_recording
@@ -23,6 +23,7 @@ from rig.output.provenance import Provenance, commit
 from rig.output.table import TextTable, to_markdown, to_rich
 from rig.reports.diagnosis import card, parameter_table
 from rig.reports.diagnosis_words import check_of, meaning, meaning_of, sentences, sizes_of
+from rig.reports.fit import parameter_table as fitted_table
 from tests.rig.browser import Opened, chromium
 
 pytestmark = pytest.mark.integration
@@ -305,3 +306,20 @@ def test_a_run_that_cannot_be_read_may_be_skipped(folder, said):
     said(*words, code=5)
     assert "002-c" in said(*words, "--skip-bad").err
     assert "001-b" in (folder / "p.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("ci95", "shown"),
+    [
+        (None, ""),
+        ((0.4, 1.2), "0.4 to 1.2"),
+        ((0.001, 99.96), "any"),
+        ((0.001, 50.0), "0.001 to 50"),
+    ],
+)
+def test_an_interval_that_is_the_bounds_is_stated_as_any(ci95, shown):
+    effect = catalogue()["friction.coulomb"]
+    values = {"friction": Estimate(0.7), "width": Estimate(1.0, ci95=ci95)}
+    model = Model("m", "motor", "motor_torque_n_m", (Term(effect, values=values),))
+    (_, (_, _, _, interval, unit)) = fitted_table(model).rows
+    assert (interval, unit) == (shown, "rad/s")
