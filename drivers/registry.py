@@ -16,6 +16,7 @@ from pydantic import Field
 from drivers.device import Clocked, Device
 from drivers.errors import DriverError, LinkError
 from drivers.guarded import blaming, guarded
+from drivers.transport import open_line
 from drivers.transport.faulty import Faults
 
 RateOption = Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False)]
@@ -86,6 +87,37 @@ def made(way: Way, make: Callable[[Way], Made], title: str) -> Made:
         if isinstance(error, ValueError):
             raise LinkError(f"No {title} can be used so: {error}.") from error
         raise
+
+
+def opener(
+    make: Callable[..., Made],
+    title: str,
+    open_way: Callable[..., Clocked] = open_line,
+    baud_rate: int | None = None,
+) -> Callable[..., Made]:
+    """Return the function that opens a device by URL; its options are the device's own.
+
+    Args:
+        make: Makes the device on an open way: its class, which annotates the options.
+        title: The device in messages.
+        open_way: Opens the way by URL.
+        baud_rate: Of a serial line, which is a further option then; None for another way.
+    """
+    options = list(inspect.signature(make).parameters.values())
+    options[0] = inspect.Parameter("url", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=str)
+    if baud_rate is not None:
+        place = inspect.Parameter.KEYWORD_ONLY
+        options.append(
+            inspect.Parameter("baud_rate", place, default=baud_rate, annotation=BaudOption)
+        )
+
+    def open_it(url: str, **given: Any) -> Made:
+        line = {} if baud_rate is None else {"baud_rate": given.pop("baud_rate", baud_rate)}
+        return made(open_way(url, **line), lambda way: make(way, **given), title)
+
+    open_it.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
+    open_it.__wrapped__ = make  # type: ignore[attr-defined]
+    return open_it
 
 
 OpenFake = Callable[[Faults], Device]

@@ -11,8 +11,7 @@ from drivers.counters import silent
 from drivers.device import Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkTimeoutError
 from drivers.polling import PolledDevice
-from drivers.registry import BaudOption, Driver, RateOption, made
-from drivers.transport import open_line
+from drivers.registry import Driver, RateOption, opener
 from drivers.transport.transport import Transport, arriving
 
 REPLY_TIMEOUT_S = 0.01
@@ -57,10 +56,10 @@ class Amt21(PolledDevice):
     def __init__(
         self,
         transport: Transport,
-        address: int = protocol.DEFAULT_ADDRESS,
+        address: Annotated[int, Field(ge=0, le=252, multiple_of=4)] = protocol.DEFAULT_ADDRESS,
         multi_turn: bool = False,
-        rate_hz: float = 200.0,
-        top_speed_rad_s: float = TOP_SPEED_RAD_S,
+        rate_hz: RateOption = 200.0,
+        top_speed_rad_s: Annotated[float, Field(gt=0)] = TOP_SPEED_RAD_S,
     ) -> None:
         super().__init__(transport, rate_hz)
         self._transport = transport
@@ -189,24 +188,9 @@ class Amt21(PolledDevice):
         self._counters.discarded_bytes += len(data)
 
 
-def open_amt21(
-    url: str,
-    address: Annotated[int, Field(ge=0, le=252, multiple_of=4)] = protocol.DEFAULT_ADDRESS,
-    multi_turn: bool = False,
-    rate_hz: RateOption = 200.0,
-    baud_rate: BaudOption = 2_000_000,
-    top_speed_rad_s: Annotated[float, Field(gt=0)] = TOP_SPEED_RAD_S,
-) -> Amt21:
-    """Open the encoder on a serial adapter.
-
-    Options are those of `Amt21`, and the bit rate: 2 Mbit/s for types A to D; types E to H are set
-    to 9600 to 115200.
-    """
-    return made(
-        open_line(url, baud_rate),
-        lambda line: Amt21(line, address, multi_turn, rate_hz, top_speed_rad_s=top_speed_rad_s),
-        "AMT21",
-    )
-
-
-DRIVER = Driver("amt21", "Same Sky AMT21 absolute encoder, RS-485", open_amt21)
+DRIVER = Driver(
+    "amt21",
+    "Same Sky AMT21 absolute encoder, RS-485",
+    opener(Amt21, "AMT21", baud_rate=2_000_000),
+)
+"""The bit rate is that of types A to D; types E to H are set to 9600 to 115200."""

@@ -14,7 +14,7 @@ from drivers.counters import TRIES
 from drivers.device import Channel, DeviceIdentity, SampleFlag, wrench_channels
 from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.polling import PolledDevice
-from drivers.registry import CanUse, Driver, RateOption, made
+from drivers.registry import CanUse, Driver, RateOption, opener
 from drivers.transport.can_bus import CanBus
 from drivers.transport.python_can import open_can
 from drivers.transport.transport import time_left
@@ -31,7 +31,8 @@ class AtiCan(PolledDevice):
     Args:
         base: The sensor's base identifier, 0 to 127.
         calibration: Which of its 16 calibrations to use.
-        rate_hz: Polling rate. A request without an answer is a gap in `sequence`.
+        rate_hz: Polling rate. A request without an answer is a gap in `sequence`; at 250 kbit/s it
+            takes above 1 ms of the bus.
     """
 
     name = "ati-can"
@@ -39,9 +40,9 @@ class AtiCan(PolledDevice):
     def __init__(
         self,
         bus: CanBus,
-        base: int = protocol.DEFAULT_BASE,
-        calibration: int = 0,
-        rate_hz: float = 200.0,
+        base: Annotated[int, Field(ge=0, le=127)] = protocol.DEFAULT_BASE,
+        calibration: Annotated[int, Field(ge=0, le=15)] = 0,
+        rate_hz: RateOption = 200.0,
     ) -> None:
         if not 0 <= base <= protocol.HIGHEST_BASE:
             raise ValueError(f"a base identifier lies in 0..127, not {base}")
@@ -238,20 +239,6 @@ class AtiCan(PolledDevice):
         return None
 
 
-def open_ati_can(
-    url: str,
-    base: Annotated[int, Field(ge=0, le=127)] = protocol.DEFAULT_BASE,
-    calibration: Annotated[int, Field(ge=0, le=15)] = 0,
-    rate_hz: RateOption = 200.0,
-) -> AtiCan:
-    """Open the sensor on a CAN bus.
-
-    Options are those of `AtiCan`; at 250 kbit/s a question takes above 1 ms of the bus. A URL is
-    e.g. `can:socketcan:can0`.
-    """
-    return made(open_can(url), lambda bus: AtiCan(bus, base, calibration, rate_hz), "NETCANOEM")
-
-
 def _identifiers(options: Mapping[str, Any]) -> frozenset[int]:
     return frozenset(range(options["base"] << 4, (options["base"] << 4) + 16))
 
@@ -259,6 +246,6 @@ def _identifiers(options: Mapping[str, Any]) -> frozenset[int]:
 DRIVER = Driver(
     "ati-can",
     "ATI force/torque sensor on CAN (NETCANOEM)",
-    open_ati_can,
+    opener(AtiCan, "NETCANOEM", open_can),
     CanUse(_identifiers, 250_000),
 )

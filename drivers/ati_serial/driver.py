@@ -1,7 +1,8 @@
 """The driver of a digital F/T: its calibration is read and activated, then it streams."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -13,7 +14,7 @@ from drivers.ati_serial import protocol
 from drivers.device import DeviceIdentity, flags_of
 from drivers.errors import DriverError
 from drivers.modbus import StreamedSensor
-from drivers.registry import BaudOption, Driver, RateOption, made
+from drivers.registry import Driver, RateOption, opener
 from drivers.streaming import QUIET_S
 from drivers.transport import open_line
 from drivers.transport.transport import Transport
@@ -21,32 +22,19 @@ from drivers.transport.transport import Transport
 GAUGE_LIMIT = 32767
 
 
-@dataclass(frozen=True, slots=True)
-class Assumptions:
-    """What may differ on a digital F/T of another make-up.
-
-    As it stands here it is in the public driver named in the README.
-
-    Attributes:
-        matrix_by_rows: The calibration's matrix comes row by row, Fx first; else column by column.
-        force_unit: Code of the force unit, in place of the one read from the sensor; 0 for that.
-        torque_unit: Code of the torque unit, likewise.
-        lock_answers: The sensor answers the function that locks its storage (0x6A).
-    """
-
-    matrix_by_rows: bool = True
-    force_unit: int = 0
-    torque_unit: int = 0
-    lock_answers: bool = True
-
-
 class AtiSerial(StreamedSensor):
     """One sensor on an RS-485 line.
+
+    The last four may differ on one of another make-up; as they stand here they are in the public
+    driver named in the README. A known weight checks them.
 
     Args:
         calibration: Which of its 16 calibrations to use, from 1.
         rate_hz: Frames a second it sends.
-        assumed: What is taken for granted about it.
+        matrix_by_rows: The calibration's matrix comes row by row, Fx first; else column by column.
+        force_unit: Code of the force unit, in place of the one read from the sensor; 0 for that.
+        torque_unit: Code of the torque unit, likewise.
+        lock_answers: The sensor answers the function that locks its storage (0x6A).
 
     Raises:
         DriverError: No such calibration.
@@ -64,15 +52,20 @@ class AtiSerial(StreamedSensor):
     def __init__(
         self,
         transport: Transport,
-        calibration: int = 1,
-        rate_hz: float = 7000.0,
-        assumed: Assumptions = Assumptions(),
+        calibration: Annotated[int, Field(ge=1, le=16)] = 1,
+        rate_hz: RateOption = 7000.0,
+        matrix_by_rows: bool = True,
+        force_unit: Annotated[int, Field(ge=0, le=6)] = 0,
+        torque_unit: Annotated[int, Field(ge=0, le=6)] = 0,
+        lock_answers: bool = True,
     ) -> None:
         if not 1 <= calibration <= 16:
             raise DriverError(f"A digital F/T has calibrations 1 to 16, none {calibration}.")
         super().__init__(transport, rate_hz)
         self._number = calibration
-        self._assumed = assumed
+        self._matrix_by_rows = matrix_by_rows
+        self._units = force_unit, torque_unit
+        self._lock_answers = lock_answers
         self._calibration: protocol.Calibration | None = None
         self._matrix = np.full((6, 6), np.inf)
 
@@ -94,11 +87,12 @@ class AtiSerial(StreamedSensor):
             self.read_registers(first + offset, count) for offset, count in protocol.PIECES
         )
         told = protocol.decode_calibration(registers)
+        force_unit, torque_unit = self._units
         found = replace(
             told,
-            matrix=told.matrix if self._assumed.matrix_by_rows else told.matrix.T,
-            force_unit=self._assumed.force_unit or told.force_unit,
-            torque_unit=self._assumed.torque_unit or told.torque_unit,
+            matrix=told.matrix if self._matrix_by_rows else told.matrix.T,
+            force_unit=force_unit or told.force_unit,
+            torque_unit=torque_unit or told.torque_unit,
         )
         if found.force_unit not in N_PER_UNIT or found.torque_unit not in N_M_PER_UNIT:
             raise DriverError(
@@ -128,7 +122,7 @@ class AtiSerial(StreamedSensor):
 
     def _set_lock(self, state: bytes) -> None:
         message = protocol.encode(protocol.STORAGE, state)
-        if self._assumed.lock_answers:
+        if self._lock_answers:
             answer = self.ask(message)
             if answer != protocol.SUCCESS:
                 raise self.refused(protocol.STORAGE, answer)
@@ -141,27 +135,9 @@ class AtiSerial(StreamedSensor):
         return int.from_bytes(self.read_registers(protocol.STATUS, 1), "big")
 
 
-def open_ati_serial(
-    url: str,
-    calibration: Annotated[int, Field(ge=1, le=16)] = 1,
-    rate_hz: RateOption = 7000.0,
-    baud_rate: BaudOption = 1_250_000,
-    matrix_by_rows: bool = True,
-    force_unit: Annotated[int, Field(ge=0, le=6)] = 0,
-    torque_unit: Annotated[int, Field(ge=0, le=6)] = 0,
-    lock_answers: bool = True,
-) -> AtiSerial:
-    """Open the sensor on an RS-485 adapter, 8 bits, even parity.
-
-    Options are those of `AtiSerial` and its `Assumptions`, which a known weight checks, and the bit
-    rate: 1250000 as delivered; 115200 and 19200 can be set.
-    """
-    assumed = Assumptions(matrix_by_rows, force_unit, torque_unit, lock_answers)
-    return made(
-        open_line(url, baud_rate, "E"),
-        lambda line: AtiSerial(line, calibration, rate_hz, assumed),
-        "digital F/T",
-    )
-
-
-DRIVER = Driver("ati-serial", "ATI digital F/T over RS-485, Modbus and stream", open_ati_serial)
+DRIVER = Driver(
+    "ati-serial",
+    "ATI digital F/T over RS-485, Modbus and stream",
+    opener(AtiSerial, "digital F/T", partial(open_line, parity="E"), 1_250_000),
+)
+"""8 bits, even parity; the bit rate is as delivered, 115200 and 19200 can be set."""

@@ -16,8 +16,7 @@ from drivers.dynamixel import protocol
 from drivers.dynamixel.protocol import Register
 from drivers.errors import CodedError, DriverError, FrameError
 from drivers.polling import PolledDrive
-from drivers.registry import BaudOption, Driver, RateOption, made
-from drivers.transport import open_line
+from drivers.registry import Driver, RateOption, opener
 from drivers.transport.transport import Transport, time_left
 
 REPLY_TIMEOUT_S = 0.02
@@ -119,10 +118,10 @@ class Dynamixel(PolledDrive):
     def __init__(
         self,
         transport: Transport,
-        device_id: int = 1,
-        rate_hz: float = 100.0,
-        watchdog_ms: int = 200,
-        current_unit_a: float = 0.0,
+        device_id: Annotated[int, Field(ge=0, le=protocol.HIGHEST_ID)] = 1,
+        rate_hz: RateOption = 100.0,
+        watchdog_ms: Annotated[int, Field(ge=20, le=LONGEST_WATCHDOG_MS)] = 200,
+        current_unit_a: Annotated[float, Field(ge=0, le=0.1)] = 0.0,
     ) -> None:
         if not 0 <= device_id <= protocol.HIGHEST_ID:
             raise ValueError(f"an identifier lies in 0..{protocol.HIGHEST_ID}, not {device_id}")
@@ -283,23 +282,9 @@ _SPEED = protocol.RAD_S_PER_COUNT
 _ZERO_K = 273.15
 
 
-def open_dynamixel(
-    url: str,
-    device_id: Annotated[int, Field(ge=0, le=protocol.HIGHEST_ID)] = 1,
-    rate_hz: RateOption = 100.0,
-    baud_rate: BaudOption = 57_600,
-    watchdog_ms: Annotated[int, Field(ge=20, le=LONGEST_WATCHDOG_MS)] = 200,
-    current_unit_a: Annotated[float, Field(ge=0, le=0.1)] = 0.0,
-) -> Dynamixel:
-    """Open the drive on a serial adapter.
-
-    Options are those of `Dynamixel`, and the bit rate: 57600 from the factory.
-    """
-    return made(
-        open_line(url, baud_rate),
-        lambda line: Dynamixel(line, device_id, rate_hz, watchdog_ms, current_unit_a),
-        "Dynamixel",
-    )
-
-
-DRIVER = Driver("dynamixel", "ROBOTIS Dynamixel X servo, Protocol 2.0", open_dynamixel)
+DRIVER = Driver(
+    "dynamixel",
+    "ROBOTIS Dynamixel X servo, Protocol 2.0",
+    opener(Dynamixel, "Dynamixel", baud_rate=57_600),
+)
+"""The bit rate is that from the factory."""

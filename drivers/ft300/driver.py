@@ -7,8 +7,7 @@ from drivers.device import DeviceIdentity, flags_of
 from drivers.errors import DriverError
 from drivers.ft300 import protocol
 from drivers.modbus import WRITE, StreamedSensor, write_registers
-from drivers.registry import BaudOption, Driver
-from drivers.transport import open_line
+from drivers.registry import Driver, opener
 from drivers.transport.transport import Transport
 
 RATE_HZ = 100.0
@@ -58,9 +57,9 @@ class Ft300(StreamedSensor):
         return values, flags_of((np.abs(values) > RANGE).any(axis=1))
 
 
-def open_ft300(url: str, baud_rate: BaudOption = 19_200) -> Ft300:
-    """Open the sensor on an RS-485 adapter, 8 bits, no parity; Robotiq's driver has 19200 bit/s."""
-    return Ft300(open_line(url, baud_rate))
-
-
-DRIVER = Driver("ft300", "Robotiq FT 300 force and torque sensor, RS-485", open_ft300)
+DRIVER = Driver(
+    "ft300",
+    "Robotiq FT 300 force and torque sensor, RS-485",
+    opener(Ft300, "FT 300", baud_rate=19_200),
+)
+"""8 bits, no parity; the bit rate is that of Robotiq's driver."""

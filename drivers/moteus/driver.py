@@ -16,7 +16,7 @@ from drivers.errors import DriverError, FrameError, LinkTimeoutError
 from drivers.moteus import protocol
 from drivers.moteus.protocol import State
 from drivers.polling import PolledDrive
-from drivers.registry import Driver, RateOption, made
+from drivers.registry import Driver, RateOption, opener
 from drivers.transport import open_transport
 from drivers.transport.transport import Transport, time_left
 
@@ -101,10 +101,10 @@ class Moteus(PolledDrive):
     def __init__(
         self,
         transport: Transport,
-        device_id: int = 1,
-        rate_hz: float = 200.0,
-        torque_limit_n_m: float = 0.1,
-        watchdog_s: float = 0.1,
+        device_id: Annotated[int, Field(ge=1, le=protocol.HIGHEST_ID)] = 1,
+        rate_hz: RateOption = 200.0,
+        torque_limit_n_m: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.1,
+        watchdog_s: Annotated[float, Field(gt=0, le=1)] = 0.1,
     ) -> None:
         if not 1 <= device_id <= protocol.HIGHEST_ID:
             raise ValueError(f"an identifier lies in 1..{protocol.HIGHEST_ID}, not {device_id}")
@@ -250,22 +250,9 @@ class Moteus(PolledDrive):
         )
 
 
-def open_moteus(
-    url: str,
-    device_id: Annotated[int, Field(ge=1, le=protocol.HIGHEST_ID)] = 1,
-    rate_hz: RateOption = 200.0,
-    torque_limit_n_m: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.1,
-    watchdog_s: Annotated[float, Field(gt=0, le=1)] = 0.1,
-) -> Moteus:
-    """Open the controller behind an fdcanusb.
-
-    The URL is the fdcanusb's port; options are those of `Moteus`.
-    """
-    return made(
-        open_transport(url),
-        lambda link: Moteus(link, device_id, rate_hz, torque_limit_n_m, watchdog_s),
-        "moteus",
-    )
-
-
-DRIVER = Driver("moteus", "mjbots moteus brushless controller, by fdcanusb", open_moteus)
+DRIVER = Driver(
+    "moteus",
+    "mjbots moteus brushless controller, by fdcanusb",
+    opener(Moteus, "moteus", open_transport),
+)
+"""Its URL is the fdcanusb's port."""

@@ -10,9 +10,8 @@ from drivers.counters import silent
 from drivers.device import Channel, DeviceIdentity, flags_of
 from drivers.errors import DriverError
 from drivers.qia128 import protocol
-from drivers.registry import BaudOption, Driver, RateOption
+from drivers.registry import Driver, RateOption, opener
 from drivers.streaming import Samples, SlidingFrames, StreamedDevice
-from drivers.transport import open_line
 from drivers.transport.transport import Transport, arriving
 
 RATE_HZ = 1300.0
@@ -38,9 +37,9 @@ class Qia128(StreamedDevice):
     def __init__(
         self,
         transport: Transport,
-        rated_load: float = 1.0,
+        rated_load: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0,
         unit: Unit = "1",
-        rate_hz: float = RATE_HZ,
+        rate_hz: RateOption = RATE_HZ,
         serial: str = "",
     ) -> None:
         super().__init__(transport, rate_hz, "QIA128")
@@ -117,19 +116,9 @@ class Qia128(StreamedDevice):
         raise silent("QIA128", self._transport.url, REPLY_TIMEOUT_S, check)
 
 
-def open_qia128(
-    url: str,
-    rated_load: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0,
-    unit: Unit = "1",
-    rate_hz: RateOption = RATE_HZ,
-    baud_rate: BaudOption = 320_000,
-    serial: str = "",
-) -> Qia128:
-    """Open the amplifier on a serial adapter.
-
-    Options are those of `Qia128`, and the bit rate of its UART; no public source gives it.
-    """
-    return Qia128(open_line(url, baud_rate), rated_load, unit, rate_hz, serial)
-
-
-DRIVER = Driver("qia128", "FUTEK QIA128 digital amplifier, UART", open_qia128)
+DRIVER = Driver(
+    "qia128",
+    "FUTEK QIA128 digital amplifier, UART",
+    opener(Qia128, "QIA128", baud_rate=320_000),
+)
+"""No public source gives the bit rate of its UART."""

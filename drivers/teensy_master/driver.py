@@ -1,6 +1,6 @@
 """The master's three potentiometers, read by the converter of a Teensy that drives no motor."""
 
-from drivers.registry import Driver
+from drivers.registry import Driver, opener
 from drivers.teensy.device import TeensyDevice, raw_channel
 from drivers.teensy.grasper import GRASPER
 from drivers.transport import open_transport
@@ -24,9 +24,8 @@ class TeensyMaster(TeensyDevice):
         super().__init__(transport, POTS, GRASPER)
 
 
-def open_master(url: str) -> TeensyMaster:
-    """Open the master at a serial port or a USB identity."""
-    return TeensyMaster(open_transport(url))
-
-
-DRIVER = Driver("teensy-master", "The 3-DOF grasper's master, potentiometers", open_master)
+DRIVER = Driver(
+    "teensy-master",
+    "The 3-DOF grasper's master, potentiometers",
+    opener(TeensyMaster, "master", open_transport),
+)

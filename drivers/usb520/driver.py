@@ -7,9 +7,8 @@ from pydantic import Field
 
 from drivers.device import Channel, DeviceIdentity
 from drivers.errors import FrameError, LinkTimeoutError
-from drivers.registry import BaudOption, Driver
+from drivers.registry import Driver, opener
 from drivers.streaming import Samples, StreamedDevice
-from drivers.transport import open_line
 from drivers.transport.transport import Transport
 from drivers.usb520 import protocol
 
@@ -21,12 +20,14 @@ class Usb520(StreamedDevice):
     """One amplifier on USB, sending lines by itself.
 
     Args:
-        rate_hz: Lines a second, at most 10.
+        rate_hz: Lines a second.
     """
 
     name = "usb520"
 
-    def __init__(self, transport: Transport, rate_hz: float = 10.0) -> None:
+    def __init__(
+        self, transport: Transport, rate_hz: Annotated[float, Field(gt=0, le=10)] = 10.0
+    ) -> None:
         super().__init__(transport, rate_hz, "USB520")
         self._unit: str | None = None
         self._held = b""
@@ -112,11 +113,9 @@ class Usb520(StreamedDevice):
         return value, unit
 
 
-def open_usb520(
-    url: str, rate_hz: Annotated[float, Field(gt=0, le=10)] = 10.0, baud_rate: BaudOption = 115_200
-) -> Usb520:
-    """Open the amplifier's virtual serial port; one user reads it at 9600 bit/s."""
-    return Usb520(open_line(url, baud_rate), rate_hz)
-
-
-DRIVER = Driver("usb520", "FUTEK USB520 amplifier, text mode", open_usb520)
+DRIVER = Driver(
+    "usb520",
+    "FUTEK USB520 amplifier, text mode",
+    opener(Usb520, "USB520", baud_rate=115_200),
+)
+"""One user reads its virtual serial port at 9600 bit/s."""

@@ -16,7 +16,7 @@ from pymodbus.pdu.register_message import (
 
 from drivers import modbus
 from drivers.ati_serial import protocol
-from drivers.ati_serial.driver import Assumptions, AtiSerial
+from drivers.ati_serial.driver import AtiSerial
 from drivers.ati_serial.fake import AtiSerialFake, example_calibration
 from drivers.errors import DriverError, FrameError
 from drivers.transport.faulty import FaultyTransport
@@ -174,8 +174,8 @@ def test_what_may_differ_can_be_set():
     fake.receive(bytes(14))
     fake.receive(protocol.write_registers(0, (1, 2)))  # its storage is locked again
     assert protocol.decode(fake.transmit()) == (modbus.WRITE | protocol.FAILED, b"\x02")
-    assumed = Assumptions(matrix_by_rows=False, force_unit=4, torque_unit=4, lock_answers=False)
-    device = started(AtiSerial, fake, assumed=assumed)
+    other = {"matrix_by_rows": False, "force_unit": 4, "torque_unit": 4, "lock_answers": False}
+    device = started(AtiSerial, fake, **other)
     began = np.arange(fake._sent, fake._sent + 20)
     expected = fake.gauges(began) @ example_calibration().matrix / 1e6 * np.repeat([1e3, 1e-3], 3)
     assert np.allclose(gathered(device, 1)[0][:20], expected)
@@ -193,9 +193,7 @@ def answering(function: int, answer: bytes) -> AtiSerialFake:
 
 
 def test_a_sensor_that_does_not_answer_the_lock_still_starts():
-    device = started(
-        AtiSerial, answering(protocol.STORAGE, b""), assumed=Assumptions(lock_answers=False)
-    )
+    device = started(AtiSerial, answering(protocol.STORAGE, b""), lock_answers=False)
     assert len(device.read(0.1)) > 100
 
 

@@ -113,7 +113,7 @@ def test_it_is_documented(name):
     assert isinstance(driver, Driver)
     assert driver.description
     assert all(default is not inspect.Parameter.empty for default in driver.options.values())
-    readme = Path(inspect.getfile(driver.open)).with_name("README.md").read_text()
+    readme = Path(inspect.getfile(inspect.unwrap(driver.open))).with_name("README.md").read_text()
     for heading in ("## Wiring", "## Limits", "## Source"):
         assert heading in readme
     limits = readme.split("## Limits")[1].split("\n## ")[0]
