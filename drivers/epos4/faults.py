@@ -19,6 +19,7 @@ _LIMITS = "Check limits and targets."
 ERRORS: dict[int, tuple[str, str, str]] = {
     0x0000: ("No error.", "", ""),
     0x1000: ("The drive has an error without a name.", "", _MAKER),
+    **dict.fromkeys(range(0x1080, 0x1089), ("The drive did not start properly.", "", _MAKER)),
     0x1090: ("The firmware does not fit the hardware.", "", "Load the firmware of this drive."),
     0x2310: ("The motor current was too high.", "A short, or controller gains too high.", _WIRING),
     0x2320: ("The power stage protected itself.", "A short or overload of its output.", _WIRING),
@@ -27,10 +28,13 @@ ERRORS: dict[int, tuple[str, str, str]] = {
     0x4210: ("The power stage is too hot.", "", _LOAD),
     0x4380: ("The motor is too hot.", "Its I2t model has reached the limit.", _LOAD),
     0x5113: ("The logic supply is too low.", "", _SUPPLY),
+    0x5280: ("The drive's hardware failed.", "", _MAKER),
     0x5281: ("The hardware's parts do not fit one another.", "", _MAKER),
     0x5282: ("The STO card was not recognised.", "It is not fully in.", "Push the card in fully."),
+    **dict.fromkeys(range(0x5480, 0x5484), ("The drive's hardware failed.", "", _MAKER)),
     0x6080: ("The sign of life is missing.", "", _BUS),
     0x6081: ("The external watchdog ran out.", "", _BUS),
+    **dict.fromkeys(range(0x6180, 0x61F1), ("The drive's firmware failed.", "", _MAKER)),
     0x6320: ("A parameter is out of range.", "", _SETTINGS),
     0x6380: ("The stored parameters are damaged.", "", _SETTINGS),
     0x7320: ("The position sensor failed.", "", _SENSOR),
@@ -46,6 +50,7 @@ ERRORS: dict[int, tuple[str, str, str]] = {
     ),
     0x738C: ("The SSI sensor could not be read.", "", _SENSOR),
     0x738D: ("The SSI sensor's frames are wrong.", "Their start or stop bits do not fit.", _SENSOR),
+    **dict.fromkeys(range(0x7390, 0x7393), ("A position sensor failed.", "", _SENSOR)),
     0x8110: ("The drive lost CAN frames.", "Its receive buffer overran.", _BUS),
     0x8111: ("The drive lost CAN frames.", "A receive buffer overran.", _BUS),
     0x8120: ("The drive's CAN is error passive.", "Many frames are damaged.", _BUS),
@@ -55,6 +60,7 @@ ERRORS: dict[int, tuple[str, str, str]] = {
         "Check that the program reads without pauses, and the cable.",
     ),
     0x8150: ("A PDO's identifier is used twice.", "", "Give every PDO its own identifier."),
+    **dict.fromkeys(range(0x8180, 0x8184), ("The drive's EtherCAT failed.", "", _BUS)),
     0x81FD: ("The drive's CAN is bus-off.", "It could not get its frames through.", _BUS),
     0x81FE: ("The drive's CAN receive queue overran.", "", _BUS),
     0x81FF: ("The drive's CAN transmit queue overran.", "", _BUS),
@@ -69,18 +75,12 @@ ERRORS: dict[int, tuple[str, str, str]] = {
     0xFF02: ("The drive's watchdog ran out.", "", _MAKER),
     0xFF0B: ("The peak load was too high.", "", _LOAD),
     0xFF10: ("A controller gain is out of range.", "", _SETTINGS),
+    **dict.fromkeys(
+        range(0xFF11, 0xFF25),
+        ("Auto-tuning failed.", "", "Tune again with the axis free to move."),
+    ),
 }
 """What, why and what to do, by error code."""
-
-_RANGES: tuple[tuple[range, tuple[str, str, str]], ...] = (
-    (range(0x1080, 0x1089), ("The drive did not start properly.", "", _MAKER)),
-    (range(0x5280, 0x5281), ("The drive's hardware failed.", "", _MAKER)),
-    (range(0x5480, 0x5484), ("The drive's hardware failed.", "", _MAKER)),
-    (range(0x6180, 0x61F1), ("The drive's firmware failed.", "", _MAKER)),
-    (range(0x7390, 0x7393), ("A position sensor failed.", "", _SENSOR)),
-    (range(0x8180, 0x8184), ("The drive's EtherCAT failed.", "", _BUS)),
-    (range(0xFF11, 0xFF25), ("Auto-tuning failed.", "", "Tune again with the axis free to move.")),
-)
 
 
 class DriveFaultError(CodedError):
@@ -89,12 +89,9 @@ class DriveFaultError(CodedError):
 
 def explain(code: int) -> tuple[str, str, str]:
     """Return the meaning of an error code: what, why, what to do."""
-    if code in ERRORS:
-        return ERRORS[code]
-    for codes, words in _RANGES:
-        if code in codes:
-            return words
-    return ("The drive has an unknown error.", "", "Look it up in the drive's manual.")
+    return ERRORS.get(
+        code, ("The drive has an unknown error.", "", "Look it up in the drive's manual.")
+    )
 
 
 def fault(code: int) -> DriveFaultError:

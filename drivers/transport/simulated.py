@@ -115,7 +115,3 @@ class SimulatedTransport(HostLink):
         """Hand `data` to the board."""
         self._require_link()
         self.board.receive(data)
-
-    def close(self) -> None:
-        """Let go of the board; its time stands still."""
-        self._closes()

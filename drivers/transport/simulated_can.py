@@ -67,10 +67,6 @@ class SimulatedCanBus(HostLink):
             self._exchange()
         return self._waiting.popleft() if self._waiting else None
 
-    def close(self) -> None:
-        """Let go of the bus; its time stands still."""
-        self._closes()
-
     def _exchange(self) -> None:
         sent = [(node, frame) for node in self._nodes for frame in node.transmit()]
         while sent:

@@ -70,6 +70,10 @@ class HostLink:
         self._lost = self._lost or LinkLostError(f"{self.url} is closed.")
         return was_open
 
+    def close(self) -> None:
+        """Let go of the other end; the time of a fake stands still."""
+        self._closes()
+
     def _require_link(self) -> None:
         if self._lost is not None:
             raise type(self._lost)(self._lost.what, self._lost.why, self._lost.fix)
