@@ -122,15 +122,13 @@ def main(arguments: list[str] | None = None) -> int:
         return stop.exit_code
     except SystemExit:  # how typer and rich exit when the reader of stdout is closed
         return 141
-    except KeyboardInterrupt:
-        sys.stderr.write("Interrupted.\n")
-        return 130
+    except (KeyboardInterrupt, typer.Abort):
+        result = 130
     except Exception as error:
-        if _is_of_interrupt(error):
-            sys.stderr.write("Interrupted.\n")
-            return 130
-        return _report(error, words)
-    if result == 130:  # what typer makes of Ctrl-C
+        if not _is_of_interrupt(error):
+            return _report(error, words)
+        result = 130
+    if result == 130:  # as typer returns after Ctrl-C
         sys.stderr.write("Interrupted.\n")
     return int(result) if isinstance(result, int) else 0
 
@@ -155,9 +153,6 @@ def _report(error: Exception, words: list[str]) -> int:
     from rig.errors import KNOWN_ERRORS, PAGE, ExitCode, anchor_of, exit_code_of
     from rig.output.console import emit_json
 
-    if isinstance(error, typer.Abort):
-        sys.stderr.write("Interrupted.\n")
-        return 130
     if isinstance(error, TyperException):
         # a word on the command line that typer itself refused
         getattr(error, "show", lambda **_: None)(file=sys.stderr)
