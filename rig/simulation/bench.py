@@ -202,14 +202,9 @@ class SimulatedBench:
     def advance_with_board(
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
-        """Run ticks with a board in the loop, called by pointer from the compiled loop.
+        """Run ticks with a board in the loop; see `drivers.teensy.core.FirmwareBench`.
 
-        Args:
-            ticks: Number of ticks of 1 ms.
-            tick_address: Address of `void tick(void *board, uint32_t tick_us, const int32_t
-                *inputs, int32_t *outputs)`: seven counts in, command_e4 and load_ma out.
-            board_address: First argument of that function; may be 0 if the function takes that.
-            tick_us: Device clock at the first tick; 1000 is added each tick, wrapping at 2^32.
+        The compiled loop calls it by pointer; the address may be 0 if the function takes that.
 
         Raises:
             BenchInputError: The function's address is null or the number of ticks negative.
