@@ -13,12 +13,9 @@ from calibration.quality import BadDataError
 from calibration.record import Fit
 from estimation.recording import FloatArray
 
-BISECTIONS = 60
-"""Halvings of the voltage range in the inverse: more than a double has bits."""
-
 
 class FsrRangeError(CalibrationError):
-    """A voltage or a force outside what was calibrated."""
+    """A voltage outside what was calibrated."""
 
 
 def is_monotone(coefficients: Sequence[float] | FloatArray, low: float, high: float) -> bool:
@@ -59,24 +56,15 @@ class FsrCurve:
             FsrRangeError: One lies outside the range.
         """
         volts = np.asarray(fsr_v, dtype=np.float64)
-        _refuse_outside(volts, self.low_v, self.high_v, "V")
+        outside = ~((volts >= self.low_v) & (volts <= self.high_v))
+        if outside.any():
+            raise FsrRangeError(
+                f"{int(outside.sum())} of {volts.size} values lie outside"
+                f" {self.low_v:g} .. {self.high_v:g} V.",
+                "A polynomial is not valid beyond the calibrated range.",
+                "Calibrate over a wider range, or exclude those samples.",
+            )
         return np.asarray(polynomial.polyval(volts, np.array(self.coefficients)))
-
-    def fsr_v(self, force_n: ArrayLike) -> FloatArray:
-        """Return the voltage at forces, any shape: the inverse, by bisection.
-
-        Raises:
-            FsrRangeError: One lies outside the range.
-        """
-        forces = np.asarray(force_n, dtype=np.float64)
-        ends = self.force_n([self.low_v, self.high_v])
-        _refuse_outside(forces, float(ends[0]), float(ends[1]), "N")
-        low, high = np.full(forces.shape, self.low_v), np.full(forces.shape, self.high_v)
-        for _ in range(BISECTIONS):
-            middle = (low + high) / 2
-            is_below = self.force_n(middle) < forces
-            low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
-        return np.asarray((low + high) / 2)
 
     def interval_n(self, fsr_v: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return the 95 % interval of one force at voltages, any shape.
@@ -100,13 +88,3 @@ class FsrCurve:
 
 ZHANG_2022 = FsrCurve((0.105, 2.57, -4.63, 3.71), 0.0, 1.0)
 """Equation 5 of Zhang et al. 2022; x from 0 to 1 V."""
-
-
-def _refuse_outside(values: FloatArray, low: float, high: float, unit: str) -> None:
-    outside = ~((values >= low) & (values <= high))
-    if outside.any():
-        raise FsrRangeError(
-            f"{int(outside.sum())} of {values.size} values lie outside {low:g} .. {high:g} {unit}.",
-            "A polynomial is not valid beyond the calibrated range.",
-            "Calibrate over a wider range, or exclude those samples.",
-        )
