@@ -3,7 +3,6 @@
 import os
 import signal
 import subprocess
-import sys
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -32,6 +31,7 @@ from rig.machines.choose import machine_of
 from rig.machines.reading import Reading
 from rig.protocols.protocol import Protocol
 from rig.recording.campaign import open_campaign_folder, record_campaign
+from tests.rig.playing import playing
 
 pytestmark = pytest.mark.integration
 
@@ -217,25 +217,13 @@ def test_a_drive_that_cannot_be_reached_is_reported_with_what_to_type():
         open_logger(settings)
 
 
-HOST = """
-import numpy as np
-from pathlib import Path
-from rig.configuration.config import load_config
-from rig.bench.logger import open_logger
-from rig.bench.session import Session
-
-config = load_config(Path("canopen_virtual")).changed(devices={}, safety={"watchdog_s": 1.0})
-link = open_logger(config)
-with Session(config, link) as session:
-    for reading in session.play(np.full(60000, -1.04), np.zeros(60000)):
-        if reading.setpoint.max() > 0:
-            print(link.process.pid, flush=True)
-"""
+def standing() -> list[str]:
+    return playing("canopen_virtual", load_a=0.0, devices={}, safety={"watchdog_s": 1.0})
 
 
 def test_a_host_that_is_killed_leaves_no_process_behind():
     with subprocess.Popen(
-        [sys.executable, "-c", HOST], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        standing(), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ) as host:
         worker = int(host.stdout.readline())
         host.kill()
@@ -249,7 +237,7 @@ def test_a_host_that_is_killed_leaves_no_process_behind():
 
 def test_ctrl_c_of_the_whole_group_lets_the_host_disarm_first():
     with subprocess.Popen(
-        [sys.executable, "-c", HOST],
+        standing(),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -21,28 +21,14 @@ from rig.canopen.process import CanopenProcess
 from rig.configuration.config import load_config
 from rig.errors import SafetyTripError
 from rig.simulation.firmware_process import FirmwareProcess
+from tests.rig.playing import playing
 
 pytestmark = pytest.mark.integration
 
-HOST = """
-import sys
-import numpy as np
-from pathlib import Path
-from drivers.transport import open_transport
-from rig.configuration.config import load_config
-from rig.bench.session import Session
-
-config = load_config(Path("pty")).changed(safety={"watchdog_s": 0.05, "safe_state": sys.argv[2]})
-with Session(config, open_transport(sys.argv[1])) as session:
-    for reading in session.play(np.full(60000, -1.04), np.full(60000, 0.1)):
-        if reading.setpoint.max() > 0:
-            print("playing", flush=True)
-"""
-
 
 @pytest.mark.parametrize("safe_state", ["release", "hold"])
-def test_a_host_that_is_killed_leaves_a_board_that_makes_itself_safe(port, safe_state):
-    words = [sys.executable, "-c", HOST, port, safe_state]
+def test_a_host_that_is_killed_leaves_a_board_that_makes_itself_safe(port, board, safe_state):
+    words = playing(board, safety={"watchdog_s": 0.05, "safe_state": safe_state})
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as host:
         assert host.stdout.readline().strip() == "playing"
         host.kill()

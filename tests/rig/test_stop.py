@@ -21,23 +21,10 @@ from rig.bench.holding import holder, holding
 from rig.configuration.config import load_config
 from rig.errors import ExitCode, SafetyTripError, UsageError
 from rig.machines.choose import machine_of
+from tests.rig.playing import playing
 
 pytestmark = pytest.mark.integration
 
-SESSION = """
-import sys
-import numpy as np
-from pathlib import Path
-from drivers.transport import open_transport
-from rig.configuration.config import load_config
-from rig.bench.session import Session
-
-config = load_config(Path(sys.argv[1])).changed(safety={"watchdog_s": 1.0})
-with Session(config, open_transport(config.logger.url)) as session:
-    for reading in session.play(np.full(600000, -1.04), np.full(600000, 0.1)):
-        if reading.setpoint.max() > 0:
-            print("playing", flush=True)
-"""
 FOREIGN = """
 import sys
 from pathlib import Path
@@ -50,9 +37,9 @@ sys.stdin.read()
 """
 
 
-def started(script: str, config: Path) -> subprocess.Popen[str]:
+def started(*words: str) -> subprocess.Popen[str]:
     pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-    process = subprocess.Popen([sys.executable, "-c", script, str(config)], text=True, **pipes)
+    process = subprocess.Popen(words, text=True, **pipes)
     assert process.stdout.readline()
     return process
 
@@ -68,7 +55,7 @@ def is_armed(config: Path) -> bool:
 def test_a_session_that_has_the_rig_is_asked_to_end_and_killed_if_it_hangs(
     board, answered, monkeypatch, hangs
 ):
-    with started(SESSION, board) as session:
+    with started(*playing(board, safety={"watchdog_s": 1.0})) as session:
         if hangs:
             monkeypatch.setattr("rig.bench.holding.ENDS_S", 0.2)
             os.kill(session.pid, signal.SIGSTOP)
@@ -81,7 +68,7 @@ def test_a_session_that_has_the_rig_is_asked_to_end_and_killed_if_it_hangs(
 
 
 def test_a_program_of_another_maker_is_named_and_left_alone(board, said, answered):
-    with started(FOREIGN, board) as other:
+    with started(sys.executable, "-c", FOREIGN, str(board)) as other:
         told = said("stop -c", board, code=ExitCode.SAFETY).err
         assert other.poll() is None
         other.communicate("")
