@@ -40,8 +40,6 @@ class Calibration(ati_net.Calibration):
     """Conversion of gauges to forces and torques.
 
     Attributes:
-        serial: Serial number.
-        part_number: Part number.
         matrix: Counts of force and torque a gauge count, shape (6, 6); rows Fx to Tz.
         gains: To be copied to the active gains, shape (6,).
         offsets: To be copied to the active offsets, shape (6,).

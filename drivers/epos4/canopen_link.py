@@ -29,11 +29,7 @@ class ObjectRefusedError(CodedError):
 
 
 class CanopenLink:
-    """One node's objects and frames.
-
-    Args:
-        node_id: The node.
-    """
+    """One node's objects and frames."""
 
     def __init__(self, bus: CanBus, node_id: int, counters: DeviceCounters) -> None:
         self.bus = bus

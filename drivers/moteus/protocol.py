@@ -55,14 +55,12 @@ class State:
     """What a controller answers in every cycle.
 
     Attributes:
-        mode: Its mode.
         position_rev: Angle of the output, turns.
         velocity_rev_s: Speed of the output, turns a second.
         torque_n_m: Torque at the output.
         current_a: Motor current in quadrature.
         voltage: Supply, 0.5 V.
         temperature: Board, degrees Celsius.
-        fault: Its fault code.
     """
 
     mode: int

@@ -23,7 +23,6 @@ class BoardLogic:
     """How the samples of one profile are made.
 
     Attributes:
-        profile: The profile.
         counted: Fields of a sample in the order of a bench's columns: inputs, then commands.
         converted: Field of each converter to the counts from which down and up it is saturated.
         stands: Setpoint that follows a count to that count, which it is while nothing is asked.

@@ -170,7 +170,6 @@ class TripReport:
         code: What it was.
         channel: Name of the count that crossed; empty where it was none.
         value: That count; for the host's silence its length, us; for heat, counts^2 s.
-        limit: The crossed limit.
         tick_us: Board clock at the trip.
         late_us: How long the crossing had lasted by then.
     """

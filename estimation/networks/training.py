@@ -34,7 +34,6 @@ class Settings:
     """Settings of the training.
 
     Attributes:
-        nodes: Hidden nodes.
         iterations: Accepted steps at the most.
         patience: Converged when the error fell by less than `tolerance` over so many steps.
         tolerance: Relative fall of the root mean square error.

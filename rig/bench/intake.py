@@ -34,7 +34,6 @@ class Intake:
     """Takes in the samples of a logger that streams.
 
     Args:
-        logger: The logger.
         way: The way to it, for its clock.
         gathers: Whether samples come by themselves, as time passes.
     """

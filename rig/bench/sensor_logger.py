@@ -130,11 +130,7 @@ class RateWatch:
 
 
 class SensorLogger:
-    """A device without motors, with the calls of `TeensyLogger` that a session makes.
-
-    Args:
-        way: The device.
-    """
+    """A device without motors, with the calls of `TeensyLogger` that a session makes."""
 
     def __init__(self, way: SensorWay) -> None:
         self._way = way

@@ -126,9 +126,6 @@ class _Held:
 
     Those that came with a block are spread evenly over it, and the last one is held in the next: a
     display shows them late by a block. A log has them at their own times.
-
-    Args:
-        companions: The devices.
     """
 
     def __init__(self, companions: Sequence[Companion]) -> None:

@@ -18,7 +18,6 @@ class Page:
     """A page of a result.
 
     Attributes:
-        title: Title of the Markdown.
         paragraphs: The result in a few sentences, then remarks for a comparison.
         figures: Draws the figures, by the name of their file.
     """

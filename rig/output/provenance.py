@@ -30,7 +30,6 @@ class Provenance:
     Attributes:
         date: Day and time, UTC, ISO 8601 to the minute.
         commit: As `commit` returns it.
-        version: Version of rig.
         seed: Seed of everything random.
         command: Command line; of an absolute path only the last part, since the others are the
             machine's own.

@@ -47,9 +47,6 @@ class RunResult:
     """Outcome of one run.
 
     Attributes:
-        name: Name of the run.
-        path: Its log.
-        samples: Samples recorded.
         expected: Samples the plan asked for.
         lost: Samples lost on the way from the logger.
         drift: Zero before against zero after, for each judged sensor.

@@ -18,7 +18,6 @@ class LiveRecorder:
     """Writes readings of a session to a log while it is on.
 
     Args:
-        session: The session.
         folder: Folder of the logs.
         kind: What is recorded; a log is named after it.
         further: Columns that readings have in addition to those of the session.

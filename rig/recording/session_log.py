@@ -28,7 +28,6 @@ class SessionLog(LogWriter):
     The log carries the session's configuration and calibrations.
 
     Args:
-        session: The session.
         path: Path of the log, ending in `.mcap`.
         run: What is known of the run beyond what the session states; its start is known.
         further: Columns that readings have in addition to those of the session.

@@ -136,8 +136,6 @@ class SimulatedBench:
     """A rig in virtual time: the same seed gives the same counts however the calls are cut.
 
     Args:
-        parameters: The plant.
-        sensors_parameters: The sensors.
         effects: Hidden effects that are switched on.
         seed: Seed of the sensors' noise and drift.
         start_count: Spindle encoder count at which the rig stands at rest, with no torque.
