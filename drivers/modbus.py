@@ -67,7 +67,6 @@ class StreamedSensor(StreamedDevice):
     """
 
     slave: int
-    """Its address."""
     title: str
     """The sensor in messages."""
     check: str

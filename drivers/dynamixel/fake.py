@@ -33,7 +33,6 @@ class DynamixelFake(Outbox):
         self._silent_ms = 0
         self._speed = self._position = 0.0
         self.table = bytearray(256)
-        """The control table."""
         self._reset()
 
     def receive(self, data: bytes) -> None:

@@ -33,9 +33,7 @@ class MoteusFake(Outbox):
         self._prepares_ms = 0
         self._command: dict[int, float] = {}
         self.mode = protocol.STOPPED
-        """Its mode."""
         self.fault = 0
-        """Its fault code."""
 
     def receive(self, data: bytes) -> None:
         """Take lines; a frame to this controller is carried out and answered."""

@@ -64,7 +64,6 @@ class PythonCanBus(HostLink):
         self._bus = bus
         self._own: deque[tuple[int, bytes]] | None = deque(maxlen=_ECHOES_KEPT) if echoes else None
         self.counters = CanCounters()
-        """Counters of the bus."""
 
     def send(self, frame: CanFrame) -> None:
         """Send one frame."""

@@ -39,7 +39,6 @@ class SimulatedCanBus(HostLink):
         self._ticks = 0
         self._waiting: deque[CanFrame] = deque()
         self.counters = CanCounters()
-        """Counters of the bus."""
 
     @property
     def now_s(self) -> float:
@@ -89,7 +88,6 @@ class LiveCanBus:
     def __init__(self, bus: CanBus, theirs: CanBus, nodes: Sequence[CanNode]) -> None:
         self.url = bus.url
         self.counters = bus.counters
-        """Counters of the bus."""
         self._bus = bus
         self._theirs = theirs
         self._nodes = list(nodes)
