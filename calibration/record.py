@@ -229,9 +229,7 @@ class CalibrationRecord:
 def record_of_line(line: LinearCalibration, **rest: Any) -> CalibrationRecord:
     """Return the record of a line whose numbers come from a certificate or a datasheet.
 
-    Args:
-        line: The line.
-        rest: The other fields of the record: `kind`, `made_at`, `operator` and more.
+    The rest are the other fields of the record: `kind`, `made_at`, `operator` and more.
     """
     fit = Fit(LINE, {"slope": line.slope, "zero": line.zero_counts})
     own = {"notes": line.source, "tared": line.tared, **rest}

@@ -109,12 +109,9 @@ class CalibrationStore:
         return _read(paths[0])
 
     def use(self, start: str, at: str, by: str) -> CalibrationRecord:
-        """Make a record the active one of its kind, channel and instrument.
+        """Make a record, named by the beginning of its hash, the active one.
 
-        Args:
-            start: Beginning of its hash.
-            at: When, ISO 8601.
-            by: Who chooses.
+        It is that of its kind, channel and instrument. `at` is in ISO 8601.
         """
         record = self.get(start)
         text = json.dumps(asdict(Choice(record.content_hash, at, by)), indent=1) + "\n"

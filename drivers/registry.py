@@ -97,11 +97,8 @@ def opener(
 ) -> Callable[..., Made]:
     """Return the function that opens a device by URL; its options are the device's own.
 
-    Args:
-        make: Makes the device on an open way: its class, which annotates the options.
-        title: The device in messages.
-        open_way: Opens the way by URL.
-        baud_rate: Of a serial line, which is a further option then; None for another way.
+    `make` makes the device on an open way: its class, which annotates the options. The baud rate
+    is of a serial line, which is a further option then; None for another way.
     """
     options = list(inspect.signature(make).parameters.values())
     options[0] = inspect.Parameter("url", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=str)

@@ -38,9 +38,7 @@ class BoardLogic:
     ) -> NDArray[np.void]:
         """Return samples of some ticks, cut to the range of their fields.
 
-        Args:
-            counts: A row a tick, as in `counted`.
-            setpoints: What is asked for in each, None while nothing is.
+        The counts are a row a tick, as in `counted`; setpoints are None while nothing is asked for.
         """
         given = dict(zip(self.counted, counts.T, strict=True))
         for place, name in enumerate(self.profile.setpoint_names):

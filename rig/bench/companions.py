@@ -191,11 +191,9 @@ class Companion:
 
 
 def refuse_shared_names(companions: Sequence[Companion], channels: Collection[str]) -> None:
-    """Refuse a further device with a channel that a recording has of another one already.
+    """Refuse an identified device with a channel that a recording has of another one already.
 
-    Args:
-        companions: The devices, identified.
-        channels: Channels of the device in the logger's place.
+    The channels are those of the device in the logger's place.
 
     Raises:
         UsageError: Names the channel and the device.

@@ -23,12 +23,7 @@ from rig.logic.link import LogicLink
 
 
 class DriveLogger(TeensyLogger):
-    """The logger whose logic runs in this computer, with all that its drive measures.
-
-    Args:
-        link: The logic, and the drive behind it.
-        profile: The drive's profile.
-    """
+    """The logger whose logic runs in this computer, with all that its drive measures."""
 
     def __init__(self, link: LogicLink, profile: Profile) -> None:
         super().__init__(link, profile)

@@ -126,9 +126,7 @@ def build_for(board: str) -> Path:
 def flash(board: str, serial: str = "") -> Board:
     """Build for a Teensy and write it to the one that is plugged in; return which that was.
 
-    Args:
-        board: Which image.
-        serial: Serial number the board must have; any when empty.
+    `board` is the image; the serial number is that of the Teensy, any when it is empty.
 
     Raises:
         UsageError: No such image, no source tree, no PlatformIO, or not exactly one board.

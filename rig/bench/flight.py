@@ -17,9 +17,7 @@ from rig.log.streams import FLIGHT_BYTES, FLIGHT_STREAM
 class FlightRecorder:
     """A transport that keeps what is written. Has the interface of `Transport`.
 
-    Args:
-        way: The way to the board.
-        tick_us: The board's clock now, us, as far as it is known.
+    `tick_us` returns the board's clock now, us, as far as it is known.
     """
 
     def __init__(self, way: Transport, tick_us: Callable[[], int]) -> None:
@@ -41,11 +39,7 @@ class FlightRecorder:
         self._way.write(data)
 
     def rows(self, since: int) -> tuple[NDArray[np.void], int]:
-        """Return the sendings as rows of the log's stream, and how many sendings there are.
-
-        Args:
-            since: Number of the first sending to return.
-        """
+        """Return the sendings since a number as rows of the log, and how many there are."""
         pieces = [
             (tick_us, data[cut : cut + FLIGHT_BYTES])
             for tick_us, data in self._sent[since:]

@@ -36,14 +36,10 @@ class StopNotFoundError(UsageError):
 
 
 def drive_to_stop(config: Config, closing: bool) -> float:
-    """Drive the spindle against its stop and release it there.
+    """Drive the spindle against its closed or open stop and release it there.
 
-    Args:
-        config: A rig with one motor and no object in its jaw; its motor is powered.
-        closing: Whether the stop is the closed one.
-
-    Returns:
-        How far the spindle turned, rad, closing positive.
+    The rig has one motor, which is powered, and no object in its jaw. Returns how far the spindle
+    turned, rad, closing positive.
 
     Raises:
         UsageError: A rig of several motors, or one without a board.

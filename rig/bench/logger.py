@@ -90,12 +90,7 @@ def held_logger(config: Config) -> Iterator[TeensyLogger]:
 
 
 def read_for(logger: TeensyLogger, duration_s: float, is_alive: bool = False) -> SampleBatch:
-    """Read for a while by the board's clock.
-
-    Args:
-        logger: The board, streaming.
-        duration_s: How long.
-        is_alive: Whether the board gets a sign of life meanwhile.
+    """Read a streaming board for a while by its clock; with `is_alive` it gets signs of life.
 
     Raises:
         DriverError: Nothing comes.

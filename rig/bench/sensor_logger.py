@@ -66,11 +66,7 @@ class SensorWay:
 
 
 def require_units(name: str, channels: Sequence[Channel]) -> None:
-    """Refuse a channel whose name ends in another unit than it has.
-
-    Args:
-        name: The driver in messages.
-        channels: Its channels.
+    """Refuse a channel of a driver whose name ends in another unit than it has.
 
     Raises:
         DriverError: Names the channel.
@@ -86,12 +82,7 @@ def require_units(name: str, channels: Sequence[Channel]) -> None:
 
 
 class RateWatch:
-    """Compares the rate at which samples arrive with the one that makes their times.
-
-    Args:
-        name: The device in messages.
-        rate_hz: Its nominal rate.
-    """
+    """Compares the rate at which samples arrive with the nominal one, which makes their times."""
 
     def __init__(self, name: str, rate_hz: float) -> None:
         self._name = name

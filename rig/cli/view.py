@@ -73,12 +73,10 @@ def chosen_runs(campaign: "Campaign", names: list[str]) -> "Campaign":
 
 
 def with_model(campaign: "Campaign", model: Path | None) -> "Campaign":
-    """Return a campaign whose recordings have a model's estimate.
+    """Return a campaign whose recordings have the estimate of a model's file.
 
-    Args:
-        campaign: The runs.
-        model: Model file; None for the model in use for each recording's rig, where there is one
-            and it can estimate that recording.
+    None is the model in use for each recording's rig, where there is one and it can estimate that
+    recording.
 
     Raises:
         EstimationError: The named model cannot estimate a recording.

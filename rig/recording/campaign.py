@@ -181,12 +181,8 @@ def record_campaign(
 ) -> Iterator[RunResult]:
     """Record runs one after the other; yields each as soon as its log is complete.
 
-    Args:
-        session: An open session.
-        plans: The runs.
-        folder: Folder of the logs.
-        notes: Operator's notes, stored in every log.
-        on_progress: Called as the samples come.
+    The session is open, the notes are the operator's and stored in every log, and `on_progress` is
+    called as the samples come.
 
     Raises:
         UsageError: Another program records into the folder.

@@ -53,9 +53,7 @@ class CoreReplay:
 def replay_core(path: Path, config: Config | None = None) -> CoreReplay:
     """Run the compiled core and the simulated plant again with a log's commands.
 
-    Args:
-        path: The log.
-        config: Configuration in place of the log's, which states no hidden effects.
+    A configuration is in place of the log's, which states no hidden effects.
 
     Raises:
         DataError: The log has no commands, or no configuration.

@@ -51,12 +51,8 @@ def diagnose_all(
     """Diagnose each folder's campaign, or take the kept result.
 
     Page and result are written before the access log, and nothing is returned that it lacks.
-
-    Args:
-        folders: Folders of logs.
-        ledger: The access log.
-        start: Starts what the work is given to: processes, a cluster, or None for this process.
-        on_done: Called with each folder that was diagnosed.
+    `start` starts what the work is given to: processes, a cluster, or None for this process;
+    `on_done` is called with each folder that was diagnosed.
 
     Raises:
         LedgerError: The access log cannot be read or written.

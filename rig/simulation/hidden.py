@@ -220,10 +220,8 @@ def table(effects: Iterable[HiddenEffect]) -> NDArray[np.void]:
 def chosen(words: Sequence[str] | None, seed: int) -> dict[str, float]:
     """Return the hidden effects requested by the user: effect to strength.
 
-    Args:
-        words: `effect` or `effect=strength`; `none` alone for nothing; one drawn by seed when there
-            are no words.
-        seed: Seed of the draw.
+    The words are `effect` or `effect=strength`; `none` alone is for nothing; one is drawn by the
+    seed when there are no words.
 
     Raises:
         UnknownHiddenEffectError: A name is unknown or a strength is not a number.

@@ -79,9 +79,8 @@ def part_of(path: Path, instrument: str) -> Path:
 def pose_runs(folder: Path | None, pose: str) -> Campaign | None:
     """Return the runs of the five folders of a pose at the paper's frequency, if all are there.
 
-    Args:
-        folder: Folder that may hold the folders or archives of experiment 3, or be next to them.
-        pose: `pitch` or `roll`.
+    The folder may hold the folders or archives of experiment 3, or be next to them; the pose is
+    `pitch` or `roll`.
 
     Raises:
         DataError: A run is damaged.
