@@ -24,12 +24,12 @@ from estimation.signals import Signals
 
 def apart(found: Iterable[Apart], is_left_out: bool = False) -> Iterator[str]:
     """Yield the runs of which a channel is in another sign or unit than the others predict."""
-    what = (
-        "The run is left out; correct the sign in it to use it."
-        if is_left_out
-        else "Check its sign and unit in this run, or exclude the run."
-    )
     for one in found:
+        what = (
+            "The run is left out; correct the sign in it to use it."
+            if is_left_out
+            else f"Check its sign and unit in this run, or exclude the run: --exclude {one.run}."
+        )
         factor = f"{one.factor:.2g} times what the other runs predict for it"
         yield f"{one.run}: {one.channel} is {factor}. {what}"
 

@@ -1,6 +1,7 @@
 """`rig diagnose | diff | loop`: what a declared model lacks, what changed, what to record next."""
 
 import shlex
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -49,6 +50,7 @@ def diagnose(
         ),
     ] = False,
     skip_bad: options.SkipBad = False,
+    exclude: options.ExcludeOption = None,
     format_: options.FormatOption = None,
 ) -> None:
     """Identify the effect that the declared model lacks, and confirm it on held-out test runs."""
@@ -77,7 +79,7 @@ def diagnose(
     looks = Ledger(ledger or default_ledger())
     with engine(workers, scheduler) as executor:
         asked = subject(path, model, balance, format_, machine, skip_bad)
-        options.say_left_out(path, asked.campaign)
+        asked = replace(asked, campaign=options.without(path, asked.campaign, exclude))
         with timed_stages(asked, quick) as on_stage:
             done, look = run_diagnosis(
                 asked, looks, seed=seed, executor=executor, quick=quick, on_stage=on_stage

@@ -121,6 +121,7 @@ def fit(
     ] = "motor_current_a",
     live: Annotated[bool, Option("--live", help="Fit for use live; with --model states.")] = False,
     skip_bad: options.SkipBad = False,
+    exclude: options.ExcludeOption = None,
     format_: options.FormatOption = None,
     json_: JsonFlag = False,
 ) -> None:
@@ -137,8 +138,7 @@ def fit(
     from rig.reports.fit import held_out_sentence, parameter_table
 
     options.require_new(out)
-    campaign = open_recordings(path, machine, format_, skip_bad)
-    options.say_left_out(path, campaign)
+    campaign = options.without(path, open_recordings(path, machine, format_, skip_bad), exclude)
     folds = _folds(folds, len(campaign.evidence))
     if model in ("states", "network"):
         _learn(_recipe(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)

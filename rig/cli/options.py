@@ -137,6 +137,9 @@ FormatOption = Annotated[
 SkipBad = Annotated[
     bool, Option("--skip-bad", help="Leave out runs that cannot be read, and name them.")
 ]
+ExcludeOption = Annotated[
+    list[str] | None, Option("--exclude", help="Run to exclude; may be given several times.")
+]
 EquationOption = Annotated[
     str | None, Option("--equation", help="Only this equation, such as motor.")
 ]
@@ -238,6 +241,17 @@ def require_machine(file: Path | None) -> None:
 
     if file is not None:
         read_machine(file)
+
+
+def without(path: Path, campaign: "Campaign", names: list[str] | None) -> "Campaign":
+    """Return a campaign in which runs are excluded too, and print on stderr all that are.
+
+    Raises:
+        CampaignError: The campaign has no such run.
+    """
+    campaign = campaign.exclude(dict.fromkeys(names or (), "--exclude"))
+    say_left_out(path, campaign)
+    return campaign
 
 
 def say_left_out(path: Path, campaign: "Campaign") -> None:

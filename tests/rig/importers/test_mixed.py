@@ -79,6 +79,8 @@ def test_a_damaged_run_stops_a_command_unless_it_is_asked_to_skip_it(
     err = said(words, folder, "--skip-bad").err
     assert "Run 003 does not count:" in err
     assert "003.TXT" in err
+    assert "has no run '004'" in said(words, folder, "--skip-bad --exclude 004", code=5).err
+    assert "Run 002 does not count" in said(words, folder, "--skip-bad --exclude 002").err
 
 
 def test_a_folder_without_recordings_is_described(tmp_path, said):
