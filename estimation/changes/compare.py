@@ -103,7 +103,7 @@ def compare(
             causes, ranked = hypothesis(ranking, best[:1])
     random = np.random.default_rng(seed)
     found = [
-        stated(one, shares(names, prior, numbers), joint, causes, random)
+        stated(one, _is_later(one, is_b), shares(names, prior, numbers), joint, causes, random)
         for one, names in zip(causes, ranked, strict=True)
     ]
     changes = {change.name: change for change in reversed(found)}
@@ -113,10 +113,17 @@ def compare(
             name: tuple(r.name.removeprefix(mark) for r in runs)
             for name, mark, runs in (("a", A, first), ("b", B, second))
         },
-        predicted=_predicted(layout, late, causes) if third else {},
+        predicted=_predicted(layout, late, [(x, _is_later(x, is_b)) for x in causes])
+        if third
+        else {},
         notes=_notes(first, second),
         seed=seed,
     )
+
+
+def _is_later(one: Scored, is_b: Sequence[bool]) -> bool:
+    """Whether a change acts in the runs of the second campaign, which may have earlier dates."""
+    return any(b and acts for b, acts in zip(is_b, one.candidate.acts or (), strict=True))
 
 
 def _named(recordings: Iterable[Recording], mark: str) -> list[Recording]:
@@ -231,17 +238,19 @@ def _differs(one: Scored, joint: Joint, folds: Folds) -> bool:
 
 
 def _predicted(
-    layout: Layout, late: Sequence[Claim], causes: Sequence[Scored]
+    layout: Layout, late: Sequence[Claim], causes: Sequence[tuple[Scored, bool]]
 ) -> dict[str, Predicted]:
-    """Return the errors on the third campaign's runs, by four models."""
+    """Return the errors on the third campaign's runs, by four models.
+
+    Each change has whether it acts in the second campaign.
+    """
     names = [run.name for run in layout.runs]
     of = {mark: np.array([float(n.startswith(mark)) for n in names]) for mark in (A, B, ON)}
     plain = with_skews(Joint(layout, is_one_machine=False), late)
     errors = [_rms(plain, plain.fitted_on(of[side]), of[ON]) for side in (A, B)]
     for taken_as in (A, B):
         grown = plain
-        for one in causes:
-            later = bool((one.candidate.acts or ())[-1])
+        for one, later in causes:
             own = {A: not later, B: later, ON: (taken_as == B) == later}
             acts = tuple(own[name[:2]] for name in names)
             laid = laid_out(plain, replace(Claim(one.candidate.cause), acts=acts, given=True))

@@ -44,6 +44,7 @@ def shares(ranked: Sequence[Scored], prior: float, numbers: Numbers) -> dict[str
 
 def stated(
     one: Scored,
+    is_later: bool,
     probability: Mapping[str, float],
     joint: Joint,
     causes: Sequence[Scored],
@@ -51,14 +52,15 @@ def stated(
 ) -> Change:
     """Return a change as it is reported, next to all others that were found.
 
-    `probability` is that of each name that competes in its place, the likeliest first; `joint` is
-    the regression without changes. The runs of its interval are random.
+    `is_later` is whether it acts in the second campaign, `probability` that of each name that
+    competes in its place, the likeliest first; `joint` is the regression without changes. The runs
+    of its interval are random.
     """
     source, acts = _source(one), one.candidate.acts
     assert acts is not None  # noqa: S101 - every candidate acts in the runs of one campaign
     name = _name(source)
     sure = probability[name] >= SURE
-    how = "moved" if isinstance(source, Changed) else ("came" if acts[-1] else "went")
+    how = "moved" if isinstance(source, Changed) else ("came" if is_later else "went")
     term = Term(source.effect, channels=dict(source.channels))
     chosen = [source.effect.amplitudes[k] for k in source.parts]
     labels = [p.name for p in chosen]

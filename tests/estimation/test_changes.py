@@ -136,17 +136,27 @@ def test_a_gain_of_the_cell_is_named_where_all_terms_differ_by_one_factor():
     assert change.parameters["gain"] == pytest.approx(0.05, abs=0.005)
 
 
+def dated(runs: Sequence[Recording], day: int) -> list[Recording]:
+    """Return runs that were recorded at noon of a day, an hour apart."""
+    return [replace(r, started_at_ns=(24 * day + k) * int(36e11)) for k, r in enumerate(runs)]
+
+
 @pytest.mark.parametrize(
-    ("before", "after", "verdict", "family"),
+    ("before", "after", "day", "verdict", "family"),
     [
-        ({}, {"asymmetry": 2.0}, "came", "friction.viscous_asymmetry"),
-        ({"asymmetry": 2.0}, {}, "went", "friction.viscous_asymmetry"),
-        ({}, {"knock": 1.0}, "came", "change.step"),  # of the sensor, in every run
+        ({}, {"asymmetry": 2.0}, 5, "came", "friction.viscous_asymmetry"),
+        ({"asymmetry": 2.0}, {}, 3, "went", "friction.viscous_asymmetry"),  # recorded before
+        ({}, {"knock": 1.0}, 3, "came", "change.step"),  # of the sensor, in every run
     ],
 )
-def test_an_effect_that_came_and_one_that_went(before, after, verdict, family):
-    (found,) = compare(record(1, **before), record(2, **after), [axis()]).changes
+def test_an_effect_that_came_and_one_that_went(before, after, day, verdict, family):
+    first, second = dated(record(1, **before), 4), dated(record(2, **after), day)
+    third = dated(record(3, **after), 6)
+    difference = compare(first, second, [axis()], on=third)
+    (found,) = difference.changes
     assert (found.verdict, found.family) == (verdict, family)
+    predicted = difference.predicted["motor"]
+    assert predicted.as_b < 0.9 * predicted.as_a
 
 
 def test_a_ripple_that_came_is_stated_with_its_period():
