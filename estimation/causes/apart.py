@@ -16,13 +16,14 @@ from estimation.derived import measured_channels
 from estimation.diagnosis.split import Sealed
 from estimation.recording import FloatArray
 
-ALIKE, FACTOR = 0.7, 2.0
-"""Correlation from which a run follows the prediction of the others, and the factor from which it
-is remarked on."""
+FACTOR, UNEXPLAINED = 2.0, 0.1
+"""Factor of the prediction of the other runs from which a run is remarked on, and the share of its
+own variation that the factor may not explain. A run in which another effect dominates has more."""
 
-UNEXPLAINED, AS_USUAL = 0.1, 1.5
-"""Share of a run's own variation that the prediction times a factor may not explain: the first, or
-so many times that of half of the runs. A run in which another effect dominates has more."""
+LARGER, MINORITY = 2.0, 0.5
+"""Factor by which the error of a run that is apart is larger than that of every other one, and the
+share of runs that are fewer. Where the equation lacks an effect, its share of a slow or light run
+looks like a factor."""
 
 
 class Apart(NamedTuple):
@@ -119,7 +120,7 @@ def _is_reversed(one: Apart) -> bool:
 
     A run of an arm whose equation lacks the motion of the other joints may look reversed.
     """
-    return 1.0 / FACTOR < -one.factor < FACTOR and one.unexplained < UNEXPLAINED
+    return 1.0 / FACTOR < -one.factor < FACTOR
 
 
 def _joint(layout: Layout, names: Sequence[str], numbers: Numbers) -> Joint:
@@ -138,13 +139,13 @@ def _found(joint: Joint, out: Sequence[int]) -> Iterator[tuple[int, Apart]]:
     """Yield the place of each run that is apart from those that are neither it nor taken out."""
     base = joint.left_out([sorted({*out, k}) for k in range(len(joint.runs))]).base
     for name, equation in joint.layout.equations.items():
-        within = joint.gram[name, "within"]
+        within, samples = joint.gram[name, "within"], joint.samples[name, "within"]
         whole = within
         if not equation.model.run_offsets:
-            samples = joint.samples[name, "within"]
             whole = within + samples[:, None, None] * joint.gram[name, "between"]
         tried = [*_tried(joint, equation, base)]
-        fits = np.array([_is_apart(one, whole, within) for one in tried])
+        fits = np.array([_is_factor(one, whole, within) for one in tried])
+        fits &= _is_large(np.asarray(fits.any(axis=0)), base, whole / samples[:, None, None])
         errors = np.where(fits, [one.left(whole) for one in tried], np.inf)
         for k in np.flatnonzero(fits.any(axis=0)).tolist():
             best = tried[int(np.argmin(errors[:, k]))]
@@ -176,17 +177,27 @@ def _tried(joint: Joint, equation: Equation, base: FloatArray) -> Iterator[_Fact
         yield _Factors(channel, own, np.hstack([-base, ones]) + own, False)
 
 
-def _is_apart(tried: _Factors, whole: FloatArray, within: FloatArray) -> NDArray[np.bool_]:
-    """Whether a factor that is not about one explains a run as closely as most, shape (runs,).
+def _is_factor(tried: _Factors, whole: FloatArray, within: FloatArray) -> NDArray[np.bool_]:
+    """Whether a run follows the prediction of the others times a factor not about one, (runs,).
 
     The run's mean alone does not show it, where the motion within the run has the usual factor.
     """
-    rest = tried.rest(whole)
-    most = max(UNEXPLAINED, AS_USUAL * float(np.median(rest)))
-    explained = (rest < 1.0 - ALIKE**2) & (rest < most)
     least, largest = tried.slopes(within)
     usual = (least > 1.0 / FACTOR) & (largest < FACTOR)
-    return np.asarray(explained & tried.is_far(whole) & ~usual)
+    return np.asarray((tried.rest(whole) < UNEXPLAINED) & tried.is_far(whole) & ~usual)
+
+
+def _is_large(fits: NDArray[np.bool_], base: FloatArray, gram: FloatArray) -> NDArray[np.bool_]:
+    """Whether a run's error is larger than that of all others that are predicted as usual, (runs,).
+
+    Each is predicted by the fit without the run. Where most runs look apart, one spoils the others.
+    """
+    vector = np.hstack([-base, np.ones((len(base), 1))])
+    squared = np.einsum("ki,rij,kj->kr", vector, gram, vector)
+    others = ~np.eye(len(base), dtype=bool)
+    if fits.mean() < MINORITY:
+        others &= ~fits
+    return np.asarray(squared.diagonal() > LARGER**2 * np.where(others, squared, 0.0).max(axis=1))
 
 
 def _products(first: FloatArray, gram: FloatArray, second: FloatArray) -> FloatArray:
