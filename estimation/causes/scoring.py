@@ -23,7 +23,8 @@ from estimation.derived import origin_of
 from estimation.recording import FloatArray
 
 MOST_CHANGE = 2.0
-"""Factor by which the largest linear term of an equation may change next to a cause."""
+"""Factor by which the largest linear term of an equation may become smaller next to a cause. It may
+become larger by any: without the cause it is as wrong as the cause is large."""
 
 DIGITS = 4
 """Decimals of a score and of a probability: causes with the same columns tie."""
@@ -234,7 +235,7 @@ def _in_readings(
             if origin_of(channel)[1]:  # a speed or an acceleration: no motion reads the target
                 other &= np.array([_reads_effort(joint, name, one) for one in candidates])
             seen = np.where(other, np.minimum(seen, change), seen)
-            replaces |= other & ((change < 1.0 / MOST_CHANGE) | (change > MOST_CHANGE))
+            replaces |= other & (change < 1.0 / MOST_CHANGE)
         seen = np.where(moved, 1.0, seen)
         unit = np.maximum(1.0, np.maximum(seen, 1e-3) ** -2.0)
         for family in outcome.errors:

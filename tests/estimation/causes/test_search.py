@@ -40,6 +40,8 @@ from tests.estimation.causes.synthetic import (
     cabled,
     gearbox,
     geared,
+    hoist,
+    hoisted,
     motor,
     recordings,
     turning,
@@ -199,6 +201,20 @@ def test_a_declared_term_may_differ_in_some_of_the_runs(other, family, change):
         names, change = {run.name for run in runs} - names, -change
     assert finding.parameters["change"].value == pytest.approx(change, rel=0.1)
     assert len(names ^ {*finding.runs_affected}) <= 1
+
+
+@pytest.mark.parametrize("stiffness_n_m_rad", [6.0, 10.0])
+def test_a_spring_that_spoils_the_fit_of_the_drive_is_found(stiffness_n_m_rad: float) -> None:
+    runs = [
+        run.with_columns(
+            drive_command_v=run["drive_command_v"] + stiffness_n_m_rad * run["drum_angle_rad"] / 3.0
+        )
+        for run in hoisted()
+    ]
+    (finding,) = diagnose(runs, [hoist()], split(runs)).findings
+    assert finding.family == "spring.position"
+    assert finding.parameters["stiffness"].value == pytest.approx(400 * stiffness_n_m_rad, rel=0.02)
+    assert finding.rmse_after < 0.05 * finding.rmse_before
 
 
 def test_a_drive_that_saturates_is_found_where_it_is_the_target() -> None:
