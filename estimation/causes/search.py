@@ -191,6 +191,8 @@ def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]
     near = [
         c for s in best[:REFINED] for c in (*_neighbours(joint.layout, s.candidate), *_as_late(s))
     ]
+    # late by more than a whole reading at every point of the grid: between two of them by one
+    near += [c for s in best_of_each(all_runs) if not s.is_possible for c in _as_late(s)]
     best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
     bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
     more = assessed(joint, groups_of(joint, bent), folds)

@@ -194,13 +194,15 @@ def _worked_out(
             for step in (ANGLE_STEP_RAD, -ANGLE_STEP_RAD)
         ]
         columns = read(load)[:, None] * (ends[0] - ends[1]) / (2.0 * ANGLE_STEP_RAD)
-    reads_itself = source.ahead and tuple(names) == tuple(c for _, c in source.channels)
-    if source.odd or reads_itself:
+    reads_itself = tuple(names) == tuple(c for _, c in source.channels)
+    is_late = source.ahead or (source.odd and source.place.kind != "actuator")
+    if reads_itself and is_late and effect.id == "sensor.lag":
+        # its time times the rate of the reading, which is odd in time
+        columns = -source.shape[0] * _derived(seen["reading"][:, None], run, 1, is_wave=False)
+    elif source.odd or (source.ahead and reads_itself):
         back = {r: x[::-1] if r not in CLOCKS else x[-1] - x[::-1] for r, x in seen.items()}
         earlier = -effect.columns(back, source.shape)[::-1]
-        # the error of a lag is its time times the rate of its reading, which is odd in time
-        is_odd = source.odd or effect.id == "sensor.lag"
-        columns = 0.5 * (columns + earlier) if is_odd else earlier
+        columns = 0.5 * (columns + earlier) if source.odd else earlier
     if not np.isfinite(columns).all():
         return None
     if source.is_wave:

@@ -35,7 +35,7 @@ class SensorCreep(Remembering):
     id = "sensor.creep"
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1}
     roles: ClassVar = {"clock": "time_s", "creeping": "motor_load_n_m"}
-    amplitudes = (Parameter("creep", "target / creeping", "fraction that is slow", -1.0, 1.0),)
+    amplitudes = (Parameter("creep", "target / creeping", "fraction that is slow"),)
     shape = (
         Parameter("time_constant", "clock", "time to reach 63 %", 0.3, 60.0, points=7),
         SETTLED,

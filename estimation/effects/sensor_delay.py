@@ -63,8 +63,7 @@ class SensorDelay(Remembering):
     id = "sensor.delay"
     balances = READING
     roles: ClassVar = {"clock": "time_s", "reading": "motor_current_a"}
-    # a late reading has the weight of the reading: 1 for the target, at most 1.5 on the rig
-    amplitudes = (Parameter("gain", "target / reading", "weight of the late reading", -2.0, 2.0),)
+    amplitudes = (Parameter("gain", "target / reading", "weight of the late reading"),)
     shape = (Parameter("delay", "clock", "transport delay", 2e-4, 5e-2, points=6),)
     walk = _walk
     rest = (0.0,) * (_VALUES + PLACES)

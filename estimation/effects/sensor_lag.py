@@ -25,7 +25,7 @@ class SensorLag(Remembering):
     balances = READING
     roles: ClassVar = {"clock": "time_s", "reading": "motor_current_a"}
     # a late reading has the weight of the reading: 1 for the target, at most 1.5 on the rig
-    amplitudes = (Parameter("gain", "target / reading", "weight of the late reading", -2.0, 2.0),)
+    amplitudes = (Parameter("gain", "target / reading", "weight of the late reading"),)
     shape = (Parameter("time_constant", "clock", "time constant of the lag", 5e-4, 0.2, points=6),)
     walk = behind
     rest = AT_REST

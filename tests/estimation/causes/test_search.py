@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import signal
 from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.rigs import draw
@@ -34,6 +35,7 @@ from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
 from tests.estimation.causes.synthetic import (
     AXIS,
+    RATE_HZ,
     RATIO,
     axis,
     cable,
@@ -101,6 +103,25 @@ def test_what_is_late_in_part_is_stated_by_how_much_it_is_late(late_s: float) ->
     finding = _only(runs, axis())
     assert finding.family in ("sensor.delay", "sensor.lag")
     assert finding.parameters["lateness"].value == pytest.approx(late_s, rel=0.2)
+
+
+def test_a_filtered_reading_of_a_fast_load_is_one_finding_that_removes_its_error() -> None:
+    lag_s, runs = 0.05, []
+    for k, run in enumerate(cabled()):
+        fast = sum(0.02 * np.sin(2 * np.pi * f * run.time_s + k + f) for f in (0.7, 1.9, 3.3))
+        kept = np.exp(-1.0 / (RATE_HZ * lag_s))
+        distal = run["distal_torque_n_m"] + fast
+        late, _ = signal.lfilter([1 - kept], [1, -kept], distal, zi=[kept * distal[0]])
+        loaded = {
+            "distal_torque_n_m": late,
+            "proximal_torque_n_m": run["proximal_torque_n_m"] + RATIO * fast,
+            "jaw_angle_rad": run["jaw_angle_rad"] - fast / 20.0,
+        }
+        runs.append(run.with_columns(**loaded))
+    (finding,) = diagnose(runs, cable(), split(runs)).findings
+    assert (finding.verdict, finding.family) == ("identified", "sensor.lag")
+    assert finding.parameters["lateness"].value == pytest.approx(lag_s, rel=0.1)
+    assert finding.rmse_after < 0.05 * finding.rmse_before
 
 
 def test_a_cause_of_some_runs_has_its_size() -> None:
