@@ -61,7 +61,7 @@ def opposed(fitted: Model, campaign: Campaign) -> str:
     left = 100.0 * errors[best] / evidence.rmse
     return (
         f"{best} has the opposite sign of what the motion needs: with it negated, the residual is"
-        f" {left:.2g} % of what it was."
+        f" {left:.2g} % of what it was. An effect larger than all declared terms can look the same."
     )
 
 

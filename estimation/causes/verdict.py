@@ -103,7 +103,10 @@ def answer(
         held_out = HeldOut(layout, sealed, numbers, found.late)
         judged, notes = _judged(found, held_out, refits)
         written, errors = refits.models(), refits.errors()
-    left = {name: error.after for name, error in errors.items()}
+    left = {
+        name: error.after if layout.equations[name].model.run_offsets else error.with_means_after
+        for name, error in errors.items()
+    }
     findings = [
         replace(f, parameters=parameters_of(kept, f, written, refits)) for kept, f in judged
     ]

@@ -1,6 +1,7 @@
 """Notes of a diagnosis: runs that are not as the others predict, and what nothing explains."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -159,3 +160,16 @@ def test_what_nothing_explains_is_stated_with_the_terms_at_their_bounds() -> Non
     ratio = re.search(r"the error on the test runs is (\S+) times the noise", found.notes[0])
     assert float(ratio[1]) > 5.0
     assert "at a bound: inertia.missing inertia" in found.notes[1]
+
+
+@pytest.mark.parametrize(("offset_n_m", "word"), [(0.0, "is noise"), (0.03, "no explanation")])
+def test_errors_of_means_count_where_runs_have_no_offsets_of_their_own(
+    offset_n_m: float, word: str
+) -> None:
+    random, runs = np.random.default_rng(0), []
+    for run in turning(lambda *_: 0.0):
+        torque = run["crank_torque_n_m"] + random.normal(0.0, offset_n_m)
+        runs.append(run.with_columns(crank_torque_n_m=torque))
+    found = diagnose(runs, [replace(axis(), run_offsets=False)], split(runs))
+    assert found.findings == ()
+    assert word in found.notes[0]
