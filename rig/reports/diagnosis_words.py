@@ -100,12 +100,13 @@ def _named(finding: Finding) -> str:
     if finding.confidence is not None:
         sizes.append(f"confidence {confidence(finding.confidence)}")
     plain = meaning_of(finding)
-    size = f", {', '.join(sizes)}" if sizes else ""
+    where = f" ({finding.place})" if finding.place != finding.balance else ""
+    named = f"[{finding.family}]{where}" + (f", {', '.join(sizes)}" if sizes else "")
     if finding.family in WORDS:
         term = _first_line(finding.family).partition(": ")[0].lower()
-        return f"declared term that differs between runs: {term} [{finding.family}]{size}"
+        return f"declared term that differs between runs: {term} {named}"
     claim = " identified" if finding.verdict == "identified" else ", most likely"
-    return f"unmodelled effect{claim}: {plain or finding.family} [{finding.family}]{size}"
+    return f"unmodelled effect{claim}: {plain or finding.family} {named}"
 
 
 def meaning_of(finding: Finding) -> str:
