@@ -109,6 +109,10 @@ class Errors:
         """Root mean square of each run, its mean removed."""
         return {n: float(np.sqrt(x / self.samples[n])) for n, x in self.centred.items()}
 
+    def with_means(self) -> "Errors":
+        """Return the errors that count where runs have no offsets of their own."""
+        return replace(self, centred=self.raw)
+
 
 class Refit:
     """One equation, fitted on the training runs, on all runs, which have the campaign's time.

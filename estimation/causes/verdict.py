@@ -242,6 +242,8 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
         refits.parts, refits.open = parts, uncounted
         return None
     old, new = before[stated], after[stated]
+    if not refits.layout.equations[stated].model.run_offsets:
+        old, new = old.with_means(), new.with_means()
     finding = replace(
         named(one, sealed.may_name),
         error_of=stated,

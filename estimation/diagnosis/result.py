@@ -58,7 +58,8 @@ class Finding:
         parameters: Name to value.
         error_of: Equation whose error is stated: its own, or another one whose error falls most
             where its own does not fall.
-        rmse_before: That error on the test runs before this finding, after those found earlier.
+        rmse_before: That error on the test runs before this finding, after those found earlier:
+            each run's mean removed, unless the equation has no offsets of runs.
         rmse_after: The same after it.
         runs_improved: Test runs whose error it lowers.
         runs_total: Test runs.
