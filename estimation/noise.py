@@ -61,9 +61,11 @@ def noise_width(values: FloatArray, known: Reading) -> float:
 
     Unless stated: third differences hold noise and nearly no motion; a tenth of the blocks, in
     which a contact or a reversal may show, is left out. At rest counts stand still, in motion they
-    are noise.
+    are noise. Three values show none.
     """
-    if known.noise is None:
+    if known.noise is None and len(values) <= 3:
+        usual = 0.0
+    elif known.noise is None:
         squared = np.diff(values, 3) ** 2 / 20.0
         blocks = [float(np.mean(b)) for b in np.array_split(squared, max(1, len(squared) // 50))]
         usual = float(np.nanmean(np.sort(blocks)[: max(1, round(0.9 * len(blocks)))]))

@@ -102,7 +102,7 @@ def import_(
     mapping = read_mapping(None if machine is None else place_of(machine), flags)
     said: list[Remark] = []
     try:
-        recordings = list(read_runs(path, mapping, said))
+        recordings = list(read_runs(path, mapping, said, asks=preview))
     except NotMappedError as error:
         if not preview:
             raise

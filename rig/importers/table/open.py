@@ -90,13 +90,18 @@ def require_runs(runs: Sequence[Recording], path: Path, mapping: ColumnMapping) 
 
 
 def read_runs(
-    path: Path, mapping: ColumnMapping, remarks: list[Remark], bad: list[Run] | None = None
+    path: Path,
+    mapping: ColumnMapping,
+    remarks: list[Remark],
+    bad: list[Run] | None = None,
+    asks: bool = False,
 ) -> Iterator[Recording]:
     """Yield the runs of a table, one file in memory at a time, without the check of derivatives.
 
     Of files in several folders, the name of a run begins with those of its file: `monday-run1`.
     `remarks` gets a sentence on everything that was assumed, left out or filled in, and `bad` the
-    files that cannot be read; without it the first of these is an error.
+    files that cannot be read; without it the first of these is an error. With `asks` a file that
+    is cut into many tiny parts is read, with a question.
     """
     taken: set[str] = set()
     files = files_at(path, mapping)
@@ -104,7 +109,7 @@ def read_runs(
     for file in files:
         folders = file.relative_to(path).parts[:-1] if several else ()
         try:
-            runs = _runs_of(file, mapping, remarks)
+            runs = _runs_of(file, mapping, remarks, asks)
         except DataError as error:
             if bad is None:
                 if isinstance(error, NoColumnError) and not mapping.data.files and len(files) > 1:
@@ -132,11 +137,13 @@ def _not_this(error: NoColumnError, files: Sequence[Path]) -> str:
     return f"{error.fix} If {name} is not a recording, write files = {pattern!r} under [data]{own}."
 
 
-def _runs_of(file: Path, mapping: ColumnMapping, remarks: list[Remark]) -> list[Recording]:
+def _runs_of(
+    file: Path, mapping: ColumnMapping, remarks: list[Remark], asks: bool
+) -> list[Recording]:
     samples = to_samples(read_raw(file, mapping), mapping)
     said = (*samples.raw.remarks, *samples.remarks)
     remarks += [(file.name, remark) for remark in said]
-    return list(recordings(samples, remarks))
+    return list(recordings(samples, remarks, asks))
 
 
 def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:

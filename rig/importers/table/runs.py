@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from estimation.recording import Flag, FloatArray, Recording, RecordingError, Stretch
 from rig.errors import DataError
 from rig.importers.table.channels import Samples
-from rig.importers.table.cuts import labels_of
+from rig.importers.table.cuts import labels_of, torn
 from rig.importers.table.mapping import ColumnMapping, worked_out
 from rig.importers.table.raw import Remark, Values
 from rig.output.table import counted
@@ -22,14 +22,19 @@ KEPT_OF_A_LAP = 0.5
 """A last lap that is shorter is left out where no shortest run is stated."""
 
 
-def recordings(samples: Samples, remarks: list[Remark]) -> Iterator[Recording]:
+def recordings(samples: Samples, remarks: list[Remark], asks: bool = False) -> Iterator[Recording]:
     """Yield the runs of a file, each on a clock that begins at 0.
 
-    `remarks` gets a sentence on everything that is left out or filled in.
+    `remarks` gets a sentence on everything that is left out or filled in. A file that is cut into
+    many tiny parts is a doubt of each run if `asks`, else an error.
 
     Raises:
-        DataError: Time goes back inside a run, or a condition changes inside one.
+        DataError: Time goes back inside a run, a condition changes inside one, or it is cut so.
     """
+    if wrong := torn(samples.raw, samples.mapping, samples.time_s, samples.edges):
+        if not asks and samples.mapping.data.runs.least_s is None:
+            raise DataError(*wrong)
+        samples = replace(samples, doubts=(*samples.doubts, " ".join(wrong)))
     parts = [slice(a, b) for a, b in itertools.pairwise(samples.edges)]
     kept = [part for part in parts if _is_long_enough(samples, part)]
     stem, short = samples.raw.path.stem.lower(), len(parts) - len(kept)

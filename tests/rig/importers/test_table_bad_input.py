@@ -460,3 +460,24 @@ def test_lines_after_the_samples_are_left_out_where_the_error_states_how(tmp_pat
     (run,) = open_table(tmp_path / "run.csv", mapping)
     assert len(run) == 100
     assert run.valid.all()
+
+
+def test_rows_of_trials_that_alternate_are_an_error_and_in_a_preview_a_question(tmp_path, said):
+    """Trials 1 and 2 alternate in what would be cut into two hundred parts; trial 3 is whole."""
+    path = tmp_path / "both.csv"
+    trials = [1 + k % 2 for k in range(200)] + [3] * 200
+    rows = (f"{k // 2 if k < 200 else k},{k % 7},{trial}\n" for k, trial in enumerate(trials))
+    path.write_text("t,enc,trial\n" + "".join(rows))
+    file = tmp_path / "m.toml"
+    file.write_text(
+        '[data.columns]\ntime_s = "t:ms"\nmotor_angle_rad = "enc:deg"\n'
+        '[data.runs]\nchanges = ["trial"]\n'
+    )
+    err = " ".join(said("import", path, "--machine", file, "--preview").err.split())
+    assert "Check: both.csv is cut into 201 parts, 200 of them of fewer than 10 samples" in err
+    assert "sort the file by 'trial', then by time" in err
+    with pytest.raises(DataError, match="201 parts") as error:
+        open_table(path, read_mapping(file, []))
+    assert "a new value of 'trial'" in error.value.why
+    with_least = read_mapping(file, [(("runs", "least_s"), 0.001, "")])
+    assert any("201 parts" in doubt for run in open_table(path, with_least) for doubt in run.doubts)
