@@ -1,7 +1,6 @@
 """A channel whose sign contradicts the other channels of its equation."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -40,17 +39,10 @@ def opposed(fitted: Model, campaign: Campaign) -> str:
         or evidence.rmse < UNEXPLAINED * size_of_target(fitted, campaign)
     ):
         return ""
-    recorded = shared_columns(list(campaign.evidence))
     errors = {}
-    for channel in {fitted.target, *fitted.channels} & {*recorded}:
-        if unit_of(channel) in MOTION:
-            continue
-        runs = [
-            replace(run, columns={**run.columns, channel: -run[channel]})
-            for run in campaign.evidence
-        ]
+    for channel in signed(fitted, campaign):
         try:
-            turned = fit(fitted, Campaign.of(runs), bootstrap=0)
+            turned = fit(fitted, negated(campaign, channel), bootstrap=0)
         except EstimationError:
             continue
         if turned.evidence is not None:
@@ -63,6 +55,18 @@ def opposed(fitted: Model, campaign: Campaign) -> str:
         f"{best} has the opposite sign of what the motion needs: with it negated, the residual is"
         f" {left:.2g} % of what it was. An effect larger than all declared terms can look the same."
     )
+
+
+def signed(model: Model, campaign: Campaign) -> list[str]:
+    """Return the recorded channels of an equation whose sign may be wrong: those of no motion."""
+    recorded = shared_columns(list(campaign.evidence))
+    names = dict.fromkeys((model.target, *model.channels))
+    return [name for name in names if name in recorded and unit_of(name) not in MOTION]
+
+
+def negated(campaign: Campaign, channel: str) -> Campaign:
+    """Return the runs that count with a channel negated."""
+    return Campaign.of(r.with_columns(**{channel: -r[channel]}) for r in campaign.evidence)
 
 
 def driven_back(fitted: Model, campaign: Campaign) -> Iterator[str]:

@@ -27,6 +27,7 @@ from estimation.recording import Recording, move_condition, shared_columns
 from estimation.separable import inseparable
 from estimation.signals import Reading
 from estimation.travel import FOLLOWS, other_ratio, slope
+from estimation.turned import turned_runs
 
 ALIKE = 3.0
 """Factor between a noise that is stated and that of the recordings."""
@@ -183,7 +184,8 @@ def _fitted(
     if not is_none and (contradicted := opposed(fitted, campaign)):
         found = replace(found, trouble=f"{contradicted} {FIX}")
     else:
-        found = replace(found, limits=(*limits, *driven_back(fitted, campaign)))
+        signs = (*driven_back(fitted, campaign), *turned_runs(fitted, campaign))
+        found = replace(found, limits=(*limits, *signs))
     if not fitted.run_offsets:
         return replace(found, relative_error=evidence.rmse_with_means / size)
     means = between_runs(evidence)

@@ -163,13 +163,15 @@ def _doubts(fitted: "Model", campaign: "Campaign") -> list[str]:
     from estimation.opposed import FIX, driven_back, opposed
     from estimation.separable import inseparable
     from estimation.travel import off_ratio
+    from estimation.turned import turned_runs
 
     if contradicted := off_ratio(fitted, list(campaign.evidence)):
         found = [f"{contradicted} The values above describe that: correct the ratio first."]
     elif contradicted := opposed(fitted, campaign):
         found = [f"{contradicted} {FIX}"]
     else:
-        found = [f"Check: {line}" for line in driven_back(fitted, campaign)]
+        signs = (*driven_back(fitted, campaign), *turned_runs(fitted, campaign))
+        found = [f"Check: {line}" for line in signs]
     if shared := inseparable(fitted, campaign):
         found.append(f"Check: {fitted.balance}: {shared}")
     return found
