@@ -21,6 +21,9 @@ class FilterError(EstimationError):
 SHARE = 0.2
 """Usual cutoff, share of the sample rate."""
 
+UNLIKELY = 10.0
+"""Cutoff over the sample rate from which the rate is wrong, not the cutoff."""
+
 POINTS, EXACT_DEGREE = 11, 4
 """Of the derivative: the published counts of the measured data (308,117 and 962,936 closing
 samples) come out with them."""
@@ -51,8 +54,10 @@ class LowPass:
                 f"A {self.cutoff_hz} Hz low-pass of order {self.order} cannot be made at"
                 f" {sample_rate_hz:.6g} samples a second.",
                 "The cutoff must lie between 0 and half the sample rate, the order at 1 or more.",
-                f"Write, for example, cutoff_hz = {SHARE * sample_rate_hz:.3g} under [machine] of"
-                " the machine's file, or under [processing] of the model's.",
+                "Correct the unit of time_s in the machine's file."
+                if self.cutoff_hz > UNLIKELY * sample_rate_hz
+                else f"Write, for example, cutoff_hz = {SHARE * sample_rate_hz:.3g} under [machine]"
+                " of the machine's file, or under [processing] of the model's.",
             )
         sections: FloatArray = signal.butter(
             self.order, self.cutoff_hz, fs=sample_rate_hz, output="sos"

@@ -106,6 +106,14 @@ def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list
         if places.size:
             runs.append(FitRun(whole, places, whole.at(places)))
     if not runs:
+        longest_s = max((recording.duration_s for recording in campaign.evidence), default=0.0)
+        if 0.0 < longest_s < model.low_pass.reach_s:
+            raise FitError(
+                f"No valid samples to fit model {model.name!r}.",
+                f"The longest run lasts {longest_s:.3g} s, and the filter reaches"
+                f" {model.low_pass.reach_s:.3g} s from each end of it.",
+                "Correct the unit of time_s in the machine's file, or record longer runs.",
+            )
         flagged = [1.0 - float(recording.valid.mean()) for recording in campaign.evidence]
         raise FitError(
             f"No valid samples to fit model {model.name!r}.",

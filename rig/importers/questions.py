@@ -14,6 +14,7 @@ from estimation.copies import copies
 from estimation.recording import FloatArray, Recording
 from estimation.zeros import moved_zeros
 from rig.importers.apart import in_another_unit, of_another_sign
+from rig.importers.clock import implausible_clocks
 from rig.output.table import counted
 
 PLAUSIBLE: dict[str, tuple[float, str]] = {
@@ -76,6 +77,7 @@ def of_runs(recordings: Sequence[Recording]) -> Iterator[str]:
             f"{', '.join((first, *names))}: these runs are the same, sample by sample, and count"
             " once; was a file copied?"
         )
+    yield from implausible_clocks(recordings)
     yield from in_another_unit(recordings)
     yield from of_another_sign(recordings)
     yield from (zero.sentence for zero in moved_zeros(recordings))

@@ -93,6 +93,13 @@ def run_of(keep: np.ndarray | slice = slice(None)) -> Recording:
     )
 
 
+@pytest.mark.parametrize(("rate_hz", "fix"), [(0.25, "unit of time_s"), (80.0, "cutoff_hz = 16 ")])
+def test_a_cutoff_far_above_the_rate_is_a_wrong_clock(rate_hz, fix):
+    with pytest.raises(FilterError) as error:
+        zero_phase(np.zeros(100), rate_hz, LowPass(cutoff_hz=50.0, order=3))
+    assert fix in error.value.fix
+
+
 def test_every_channel_of_a_recording_gets_the_same_filter():
     rows = np.random.default_rng(0).normal(size=2000)
     run = Recording("r", np.arange(2000) * PERIOD_S, {"fsr_v": rows, "motor_current_a": 3 * rows})

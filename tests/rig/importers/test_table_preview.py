@@ -226,6 +226,20 @@ def test_what_looks_wrong_with_the_clock_is_asked(tmp_path, case):
     assert ("gap_s" in question) == ("gap_s" in words)
 
 
+@pytest.mark.parametrize(
+    ("factor", "question"),
+    [
+        (0.9e-3, "time_s: 1.111e+05 samples a second over 0.00719 s in every run; is s taken for"),
+        (1e3, "time_s: 0.1 samples a second over 7.99e+03 s in every run; is ms taken for s,"),
+        (1.0, None),
+    ],
+)
+def test_a_time_in_another_unit_is_asked_about(tmp_path, factor, question):
+    found = questions(tmp_path, time_s=factor * TIME, motor_angle_rad=WAVE)
+    assert len(found) == (question is not None)
+    assert all(one.startswith(question) for one in found)
+
+
 def test_the_same_question_about_several_runs_is_asked_once(tmp_path):
     for number in range(3):
         gap = np.where(TIME > 4, TIME + 1 + number, TIME)
