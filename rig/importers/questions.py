@@ -33,8 +33,8 @@ PLAUSIBLE: dict[str, tuple[float, str]] = {
 The sizes are those of machines that fit a room: 32 turns of a shaft, 20000 revolutions a minute."""
 
 MOST_LONE, FAR_OUT = 3, 10.0
-"""Most samples that are far beyond all others together, and how many times as far from the median
-as any other sample they are."""
+"""Most values that are far beyond all others together, and how many times as far from the median
+as any other value they are. A value may be that of many samples, such as -9999 of no reading."""
 
 COLDEST_K, HOTTEST_K = 200.0, 600.0
 
@@ -78,14 +78,15 @@ def of_runs(recordings: Sequence[Recording]) -> Iterator[str]:
             " once; was a file copied?"
         )
     yield from implausible_clocks(recordings)
-    yield from in_another_unit(recordings)
-    yield from of_another_sign(recordings)
+    read = _without_lone(recordings)
+    yield from in_another_unit(read)
+    yield from of_another_sign(read)
     yield from (zero.sentence for zero in moved_zeros(recordings))
 
 
 def of_channel(name: str, recordings: Sequence[Recording]) -> list[str]:
     """Return the doubts about a channel over all runs: questions."""
-    parts = [np.where(r.valid, r[name], np.nan) for r in recordings if name in r]
+    parts = _parts(name, recordings)
     values = np.concatenate([part[np.isfinite(part)] for part in parts])
     if not values.size:
         return []
@@ -107,12 +108,18 @@ def of_channel(name: str, recordings: Sequence[Recording]) -> list[str]:
     return wrong
 
 
+def _parts(name: str, recordings: Sequence[Recording]) -> list[FloatArray]:
+    """Return a channel of the runs that have it, NaN where a sample is flagged."""
+    return [np.where(r.valid, r[name], np.nan) for r in recordings if name in r]
+
+
 def _lone(values: FloatArray) -> tuple[list[float], str]:
-    """Return the values of few samples far beyond all others, and how far these are, as a formula.
+    """Return the few values far beyond all others, and how far these are, as a formula.
 
     There are none in a channel that is constant otherwise: they may be pulses.
     """
     median = float(np.median(values))
+    values = np.unique(values)
     far = np.abs(values - median)
     order = np.argsort(far)[::-1]
     for count in range(min(MOST_LONE, len(values) - 1), 0, -1):
@@ -123,20 +130,43 @@ def _lone(values: FloatArray) -> tuple[list[float], str]:
     return [], ""
 
 
+def _without_lone(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the runs without the channels that hold values far beyond all others.
+
+    Their size there is that of these values.
+    """
+    found = list(recordings)
+    for name in dict.fromkeys(name for r in recordings for name in r.columns):
+        values = np.concatenate([part[np.isfinite(part)] for part in _parts(name, recordings)])
+        lone = _lone(values)[0] if values.size else []
+        for k, run in enumerate(found) if lone else ():
+            if name in run and np.isin(run[name], lone).any():
+                found[k] = run.with_columns(**{name: np.full(len(run), np.nan)})
+    return found
+
+
 def _outlier(
     name: str, unit: str, lone: Sequence[float], usual: str, recordings: Sequence[Recording]
 ) -> str:
     """Return a question about samples far beyond all others, with their places and the remedy."""
     places = [
-        f"{with_unit(float(r[name][k]), unit)} at {r.time_s[k]:.4g} s of {r.name}"
+        (float(r[name][k]), f"{r.time_s[k]:.4g} s of {r.name}")
         for r in recordings
         if name in r
         for k in np.flatnonzero(np.isin(r[name], lone) & r.valid)
     ]
+    if len(places) > MOST_LONE:
+        values = " and ".join(with_unit(value, unit) for value in sorted(lone))
+        shown = f"exactly {values}, from {places[0][1]} to {places[-1][1]}"
+        asked, reason = "does that mean that nothing was read", "no reading"
+    else:
+        shown = ", ".join(f"{with_unit(value, unit)} at {place}" for value, place in places)
+        asked, reason = "was it so", "spike"
+    answer = "If so" if len(places) > MOST_LONE else "If not"
     return (
-        f"{counted(len(places), 'sample')} far beyond all others, {', '.join(places)}; was it so?"
-        f" If not, flag it: [[data.invalid]] with when = 'abs({name} - {usual}', reason = 'spike',"
-        " missing = true"
+        f"{counted(len(places), 'sample')} far beyond all others, {shown}; {asked}?"
+        f" {answer}, flag it: [[data.invalid]] with when = 'abs({name} - {usual}',"
+        f" reason = '{reason}', missing = true"
     )
 
 

@@ -71,6 +71,23 @@ def test_a_single_sample_far_beyond_all_others_is_named_with_its_remedy(tmp_path
     assert questions(tmp_path, time_s=TIME, load_force_n=force) == []
 
 
+def test_a_value_that_stands_for_no_reading_is_named_with_its_remedy_alone(tmp_path):
+    """The size of the run is not asked about: this value is most of it."""
+    for number in range(6):
+        columns = {"motor_angle_rad": WAVE, "motor_current_a": 0.1 + 0.02 * number * WAVE}
+        if number == 3:
+            columns["motor_angle_rad"] = spiked(WAVE, **{f"k{k}": -174.5 for k in range(100, 110)})
+        text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
+    recordings = list(read_runs(tmp_path, read_mapping(None, []), []))
+    (found,) = (q for q in preview(recordings, []).questions if "same" not in q)
+    assert found.startswith("motor_angle_rad: 10 samples far beyond all others, exactly -174.5 rad")
+    assert "from 1 s of run3 to 1.09 s of run3; does that mean that nothing was read?" in found
+    when = re.search(r"when = '(.*?)'", found)[1]
+    flags = [(("invalid",), [{"when": when, "reason": "no reading", "missing": True}], "")]
+    runs = list(read_runs(tmp_path, read_mapping(None, flags), []))
+    assert [int((~run.valid).sum()) for run in runs] == [0, 0, 0, 10, 0, 0]
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("huge", [1e300, -3.4e38])
 def test_a_number_that_cannot_be_a_reading_is_an_empty_cell(tmp_path, huge):
