@@ -144,8 +144,8 @@ def fit(
         _learn(_recipe(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)
         return
     done = _fitted(declared_models(model, machine), campaign, folds, seed)
-    derived = () if machine is None else read_machine(machine).integrals
-    asked = questions(list(campaign.evidence), derived)
+    plant = None if machine is None else read_machine(machine)
+    asked = questions(list(campaign.evidence), () if plant is None else plant.integrals, plant)
     said: list[str | TextTable] = [f"Check: {line}" for line in asked]
     one = "One run: there is no error on runs that it was not fitted on."
     for fitted, error in done:

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +15,7 @@ from rig.output.console import JsonFlag, present, remarks
 from rig.output.table import TextTable, listed
 
 if TYPE_CHECKING:
+    from estimation.plant import Plant
     from estimation.recording import Recording
     from rig.importers.table.mapping import ColumnMapping
     from rig.importers.table.preview import Preview
@@ -109,7 +111,7 @@ def import_(
         present_columns(error.raw, path, json)
         return
     require_runs(recordings, path, mapping)
-    found = look(recordings, said)
+    found = look(recordings, said, None if machine is None else _plant_of(machine))
     written = [] if preview or out is None else write_logs(recordings, out)
     lines = [f"Note: {line}." for line in found.remarks]
     lines += [] if found.questions else ["Nothing looks wrong."]
@@ -121,6 +123,16 @@ def import_(
         remarks().print(f"Check: {line}")
     data = {"preview": found, "written": written, "plots": plots}
     present(json, data, *_tables(found, mapping), *lines)
+
+
+def _plant_of(machine: Path) -> "Plant | None":
+    """Return the machine of a file; None of one that maps the table alone."""
+    from estimation.plant_file import PlantFileError
+    from rig.machines.shipped import read_machine
+
+    with suppress(PlantFileError):
+        return read_machine(machine)
+    return None
 
 
 def _flags(

@@ -86,7 +86,8 @@ def check(
     found = check_plant(plant, campaign, file, recorded_channels(file))
     if data is not None and campaign is not None:
         say_left_out(data, campaign)
-    asked = [] if campaign is None else questions(list(campaign.evidence), plant.integrals)
+    runs = [] if campaign is None else list(campaign.evidence)
+    asked = questions(runs, plant.integrals, plant)
     result = {"machine": plant.name, "check": found, "sound": found.is_sound, "questions": asked}
     present(json_, result, *check_lines(plant, found), *(f"Check: {line}" for line in asked))
     return ExitCode.OK if found.is_sound else ExitCode.FAILED

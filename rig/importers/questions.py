@@ -5,12 +5,13 @@ tables and of logs. Samples that are flagged do not count. Nothing is corrected 
 """
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from estimation.channels import unit_of
 from estimation.copies import copies
+from estimation.plant import Plant
 from estimation.recording import FloatArray, Recording
 from estimation.zeros import moved_zeros
 from rig.importers.apart import in_another_unit, of_another_sign
@@ -51,15 +52,21 @@ COMMAND = re.compile(r"(^|_)(command|target)_")
 """In the name of a channel that was commanded, not measured: it may be held constant."""
 
 
-def questions(recordings: Sequence[Recording], derived: Collection[str] = ()) -> list[str]:
+def questions(
+    recordings: Sequence[Recording], derived: Collection[str] = (), plant: Plant | None = None
+) -> list[str]:
     """Return the doubts about the channels and zeros of runs: questions, each with its channel.
 
     Args:
         recordings: The runs.
         derived: Channels that were not read but follow from others; nothing is asked about them.
+        plant: The machine, which states what is in front of a gear.
     """
     names = dict.fromkeys(name for r in recordings for name in r.columns if name not in derived)
-    found = [f"{n}: {text}" for n in names for text in of_channel(n, recordings)]
+    limits = {} if plant is None else travels(plant)
+    found = [
+        f"{n}: {text}" for n in names for text in of_channel(n, recordings, limits.get(n, 0.0))
+    ]
     return [*found, *of_runs(recordings)]
 
 
@@ -84,8 +91,21 @@ def of_runs(recordings: Sequence[Recording]) -> Iterator[str]:
     yield from (zero.sentence for zero in moved_zeros(recordings))
 
 
-def of_channel(name: str, recordings: Sequence[Recording]) -> list[str]:
-    """Return the doubts about a channel over all runs: questions."""
+def travels(plant: Plant) -> dict[str, float]:
+    """Return the size above which each position is unusual: that of the slowest axis, geared up."""
+    sizes = {axis.name: PLAUSIBLE[axis.unit][0] for axis in plant.axes}
+    geared = [one for one in plant.transmissions if one.ratio]
+    for one in geared * len(geared):  # in whichever order they are stated
+        sizes[one.input] = max(sizes[one.input], abs(one.ratio or 1.0) * sizes[one.output])
+    read = [sensor for sensor in plant.sensors if sensor.reads == "position"]
+    return {sensor.name: sizes[sensor.axis] for sensor in read if sensor.axis in sizes}
+
+
+def of_channel(name: str, recordings: Sequence[Recording], travel: float = 0.0) -> list[str]:
+    """Return the doubts about a channel over all runs: questions.
+
+    A position up to `travel` is not unusual, if that is more than without a gear.
+    """
     parts = _parts(name, recordings)
     values = np.concatenate([part[np.isfinite(part)] for part in parts])
     if not values.size:
@@ -97,12 +117,13 @@ def of_channel(name: str, recordings: Sequence[Recording]) -> list[str]:
         parts = [np.where(np.isin(part, lone), np.nan, part) for part in parts]
         values = np.concatenate([part[np.isfinite(part)] for part in parts])
     least, greatest = float(values.min()), float(values.max())
-    wrong += _implausible(unit, least, greatest)
+    wrong += _implausible(unit, least, greatest, travel)
     if least == greatest:
         if COMMAND.search(name):
             return wrong
         return [*wrong, f"it is constant at {with_unit(least, unit)}; is the sensor connected?"]
-    wrong += _clipped(parts, least, greatest, unit)
+    names = [r.name for r in recordings if name in r]
+    wrong += _clipped(dict(zip(names, parts, strict=True)), least, greatest, unit)
     if unit in ("rad", "m"):
         wrong += _wrapped(parts, least, greatest, unit)
     return wrong
@@ -170,22 +191,23 @@ def _outlier(
     )
 
 
-def _implausible(unit: str, least: float, greatest: float) -> Iterator[str]:
+def _implausible(unit: str, least: float, greatest: float, travel: float) -> Iterator[str]:
     if unit == "K":
         if least < COLDEST_K or greatest > HOTTEST_K:
             yield f"{least:g} to {greatest:g} K is unusual; is the column in degC?"
     elif unit in PLAUSIBLE:
         limit, instead = PLAUSIBLE[unit]
         size = max(abs(least), abs(greatest))
-        if size > limit:
+        if size > max(limit, travel):
             turns = f", {size / (2 * np.pi):.0f} turns," if unit == "rad" else ""
             yield f"{with_unit(size, unit)}{turns} is unusually large; is the column in {instead}?"
 
 
 def _clipped(
-    parts: Sequence[FloatArray], least: float, greatest: float, unit: str
+    runs: Mapping[str, FloatArray], least: float, greatest: float, unit: str
 ) -> Iterator[str]:
     """Yield the ends of the range that are reached abruptly and held: a limit, not a standstill."""
+    parts = [*runs.values()]
     steps = np.concatenate([np.abs(np.diff(part)) for part in parts])
     moving = steps[steps > 0]
     usual = float(np.median(moving)) if moving.size else 0.0
@@ -193,11 +215,14 @@ def _clipped(
     if len(np.unique(values[np.isfinite(values)])) <= PLATEAU:  # a switch
         return
     for end, word in ((least, "least"), (greatest, "greatest")):
-        held = sum(_held(part, end, usual / 2) for part in parts)
-        if held > CLIPPED * len(values):
+        held = {name: _held(part, end, usual / 2) for name, part in runs.items()}
+        share = sum(held.values()) / len(values)
+        if share > CLIPPED:
+            places = [name for name, count in held.items() if count]
+            where = f" in {', '.join(places)}" if len(places) < len(runs) else ""
             yield (
-                f"{100 * held / len(values):.1f} % of the samples are held at the {word} value,"
-                f" {with_unit(end, unit)}; is it clipped?"
+                f"{100 * share:.1f} % of the samples are held at the {word} value,"
+                f" {with_unit(end, unit)}{where}; is it clipped?"
             )
 
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.channels import unit_of
+from estimation.plant import Plant
 from estimation.recording import FloatArray, Recording
 from rig.importers.derivatives import fault, pairs
-from rig.importers.questions import of_channel, of_runs
+from rig.importers.questions import of_channel, of_runs, travels
 from rig.importers.table.raw import Remark
 from rig.output.table import counted
 
@@ -93,12 +94,16 @@ class Preview:
         return [*found, *_grouped(of_runs, "runs"), *self.wrong]
 
 
-def preview(recordings: Sequence[Recording], remarks: Sequence[Remark]) -> Preview:
+def preview(
+    recordings: Sequence[Recording], remarks: Sequence[Remark], plant: Plant | None = None
+) -> Preview:
     """Return a look at the runs of a table, at least one, and at the first rows of the first run.
 
     The runs are not yet checked against their derivatives; `remarks` is what reading them remarked.
+    The machine, if known, states what is in front of a gear.
     """
     names = list(dict.fromkeys(name for r in recordings for name in r.columns))
+    limits = {} if plant is None else travels(plant)
     first = recordings[0]
     shown = {n: np.asarray(first[n])[:ROWS].tolist() for n in ("time_s", *first.columns)}
     together = [
@@ -106,7 +111,7 @@ def preview(recordings: Sequence[Recording], remarks: Sequence[Remark]) -> Previ
     ]
     return Preview(
         tuple(_run(recording) for recording in recordings),
-        tuple(_channel(name, recordings) for name in names),
+        tuple(_channel(name, recordings, limits.get(name, 0.0)) for name in names),
         shown,
         (*_grouped(together, "runs"), *of_runs(recordings)),
         tuple(_grouped(remarks, "files")),
@@ -173,9 +178,9 @@ def _clock(time_s: FloatArray) -> Iterator[str]:
         )
 
 
-def _channel(name: str, recordings: Sequence[Recording]) -> ChannelView:
+def _channel(name: str, recordings: Sequence[Recording], travel: float) -> ChannelView:
     values = np.concatenate([r[name] for r in recordings if name in r])
     values = values[np.isfinite(values)]
     least, greatest, mean = (float(f(values)) for f in (np.min, np.max, np.mean))
-    wrong = tuple(of_channel(name, recordings))
+    wrong = tuple(of_channel(name, recordings, travel))
     return ChannelView(name, unit_of(name), least, greatest, mean, wrong)

@@ -8,7 +8,9 @@ import pytest
 from scipy.io import savemat
 
 from estimation.files import write_text_atomic
+from estimation.plant_file import parse
 from rig.errors import ExitCode
+from rig.importers.questions import questions as questions_of
 from rig.importers.registry import left_out, open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
@@ -121,6 +123,49 @@ def test_a_run_that_is_there_twice_is_asked_about_and_counts_once(tmp_path, said
     assert left_out(logs, campaign) == [
         "Run c does not count: it is the same as a, sample by sample; delete one of them"
     ]
+
+
+def test_a_channel_that_is_clipped_in_some_runs_is_named_with_them(tmp_path):
+    for number in range(4):
+        force = np.minimum(WAVE, 0.8) if number == 2 else (0.7 + 0.01 * number) * WAVE
+        text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, "load_force_n": force})
+    (found,) = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    assert "held at the greatest value, 0.8 N in run2; is it clipped?" in found
+
+
+SCREW = """
+schema = "rig.machine/1"
+[machine]
+name = "lift"
+[[axis]]
+name = "motor"
+unit = "rad"
+[[axis]]
+name = "slide"
+unit = "m"
+[[transmission]]
+name = "screw"
+input = "motor"
+output = "slide"
+ratio = -628.0
+[[sensor]]
+name = "motor_angle_rad"
+axis = "motor"
+reads = "position"
+[data]
+"""
+
+
+@pytest.mark.parametrize(("size", "is_asked"), [(250.0, False), (20_000.0, True)])
+def test_the_travel_of_a_motor_counts_behind_its_gear(tmp_path, said, size, is_asked):
+    file = tmp_path / "lift.toml"
+    file.write_text(SCREW)
+    columns = {"time_s": TIME, "motor_angle_rad": size * WAVE}
+    path = text_table(tmp_path / "run.csv", columns)
+    shown = said("import", path, "--machine", file, "--preview").err
+    assert ("is unusually large" in shown) == is_asked
+    asked = questions_of(list(read_runs(path, read_mapping(file, []), [])), (), parse(SCREW))
+    assert bool(asked) == is_asked
 
 
 def test_a_run_whose_zero_moved_is_asked_about(tmp_path):
