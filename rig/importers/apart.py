@@ -39,13 +39,15 @@ def in_another_unit(recordings: Sequence[Recording]) -> Iterator[str]:
     Such a channel varies far more or less there than in most runs, while another one varies as
     usual: where a machine rightly moves less, its drive does less, too. Where runs have all sizes,
     the noise from sample to sample is compared, and the ratio must be that of a unit or of ten: a
-    faster motion has any.
+    faster motion has any. A condition that is as exceptional, such as no payload, explains a size.
     """
     runs: dict[tuple[str, str, str], list[tuple[str, float]]] = {}
     asked = set[tuple[str, str]]()
     for measure, how in ((_spread, ""), (_noise, " from sample to sample")):
         compared = _at_one_rate(recordings) if how else recordings
         for name, unit, run, ratio in _apart(compared, measure):
+            if not how and _is_explained(name, run, ratio, recordings):
+                continue
             if (name, run) not in asked and not (how and not unit and not _is_of_ten(ratio)):
                 asked.add((name, run))
                 runs.setdefault((name, unit, how), []).append((run, ratio))
@@ -55,6 +57,25 @@ def in_another_unit(recordings: Sequence[Recording]) -> Iterator[str]:
             f"{name}: it varies {places[0][1]:.3g} times as much{how} in {where} as in the other"
             f" runs, and other channels as usual; {unit or 'are unit and gain right'} there?"
         )
+
+
+def _is_explained(name: str, run: str, ratio: float, recordings: Sequence[Recording]) -> bool:
+    """Whether a condition of a run is unusual, too, and most runs with it are not apart from it."""
+    own = next(recording for recording in recordings if recording.name == run)
+    for key, value in own.conditions.items():
+        stated = [(r, r.conditions.get(key)) for r in recordings]
+        numbers = [abs(one) for _, one in stated if isinstance(one, float)]
+        if not isinstance(value, float) or len(numbers) < len(recordings):
+            continue
+        usual = float(np.median(numbers))
+        if not (abs(value) < usual / ALIKE if ratio < 1.0 else abs(value) > usual * ALIKE):
+            continue
+        same = [
+            _spread(r, name) for r, one in stated if one == value and r is not own and name in r
+        ]
+        if not same or _within(np.median(same), _spread(own, name), FAR):
+            return True
+    return False
 
 
 def _at_one_rate(recordings: Sequence[Recording]) -> list[Recording]:

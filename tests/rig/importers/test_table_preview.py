@@ -217,6 +217,26 @@ def test_a_run_that_moves_less_is_not_asked_about(tmp_path, angles, currents):
     assert of_runs(tmp_path, angles, currents) == []
 
 
+@pytest.mark.parametrize(
+    ("masses", "is_asked"),
+    [
+        ([0.0, 5.0, 9.0, 12.0, 0.0, 5.0, 9.0, 12.0], False),  # no payload explains it
+        ([12.0, 5.0, 9.0, 12.0, 0.0, 5.0, 9.0, 12.0], True),
+        ([0.0, 5.0, 9.0, 12.0, 5.0, 0.0, 9.0, 12.0], True),  # another one without it varies more
+    ],
+)
+def test_a_condition_explains_that_a_channel_varies_less(tmp_path, masses, is_asked):
+    forces = [1.0, 5.1, 9.3, 12.2, 1.1, 5.2, 9.0, 12.1]
+    for number, (mass, force) in enumerate(zip(masses, forces, strict=True)):
+        wave = np.sin(TIME * (2 + 0.1 * number))
+        columns = {"motor_angle_rad": wave, "rope_force_n": force * wave, "mass": 0 * TIME + mass}
+        text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
+    mapping = read_mapping(None, [(("conditions", "load_mass_kg"), "mass", "")])
+    found = preview(list(read_runs(tmp_path, mapping, [])), []).questions
+    assert bool(found) == is_asked
+    assert all("rope_force_n: it varies" in one for one in found)
+
+
 def of_all_sizes(tmp_path, odd=1.0, odd_name="drive_command_v", fast=1.0):
     """Return the questions about runs of all sizes with noise, a channel of one of them changed."""
     random = np.random.default_rng(2)
