@@ -4,7 +4,6 @@
 tables and of logs. Samples that are flagged do not count. Nothing is corrected here.
 """
 
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -16,6 +15,7 @@ from estimation.recording import FloatArray, Recording
 from estimation.zeros import moved_zeros
 from rig.importers.apart import in_another_unit, of_another_sign
 from rig.importers.clock import implausible_clocks
+from rig.importers.frozen import COMMAND, frozen
 from rig.output.table import counted
 
 PLAUSIBLE: dict[str, tuple[float, str]] = {
@@ -45,11 +45,11 @@ PLATEAU = 3
 CLIPPED = 0.005
 """Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
 
+MOST_NAMED = 6
+"""Most runs of a clipped channel that are named."""
+
 WHOLE = 0.75
 """Share of its range that no position crosses between two samples while it moves."""
-
-COMMAND = re.compile(r"(^|_)(command|target)_")
-"""In the name of a channel that was commanded, not measured: it may be held constant."""
 
 
 def questions(
@@ -88,6 +88,7 @@ def of_runs(recordings: Sequence[Recording]) -> Iterator[str]:
     read = _without_lone(recordings)
     yield from in_another_unit(read)
     yield from of_another_sign(read)
+    yield from frozen(recordings)
     yield from (zero.sentence for zero in moved_zeros(recordings))
 
 
@@ -219,7 +220,10 @@ def _clipped(
         share = sum(held.values()) / len(values)
         if share > CLIPPED:
             places = [name for name, count in held.items() if count]
-            where = f" in {', '.join(places)}" if len(places) < len(runs) else ""
+            shown = ", ".join(places[:MOST_NAMED])
+            if len(places) > MOST_NAMED:
+                shown += f" and {counted(len(places) - MOST_NAMED, 'other run')}"
+            where = f" in {shown}" if len(places) < len(runs) else ""
             yield (
                 f"{100 * share:.1f} % of the samples are held at the {word} value,"
                 f" {with_unit(end, unit)}{where}; is it clipped?"

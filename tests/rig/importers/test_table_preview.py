@@ -285,6 +285,38 @@ def test_runs_of_all_sizes_or_speeds_are_not_asked_about(tmp_path, fast):
     assert of_all_sizes(tmp_path, fast=fast) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "runs", "is_asked"),
+    [
+        ("slide_position_m", [3], True),
+        ("rope_force_n", [3], True),
+        ("slide_position_m", [], False),
+        ("rope_force_n", [1, 3, 5], False),  # so often that it is probably so
+        ("wrist_angle_rad", [3], False),  # an axis of its own may rest
+    ],
+)
+def test_a_channel_that_stands_still_while_the_machine_moves_is_named(
+    tmp_path, name, runs, is_asked
+):
+    random = np.random.default_rng(3)
+    for number in range(8):
+        wave = np.sin(TIME * (2 + 0.1 * number))
+        columns = {
+            "motor_angle_rad": 100 * wave,
+            "slide_position_m": 0.1 * wave,
+            "rope_force_n": 30 * wave + 3 * np.cos(7 * TIME),
+            "wrist_angle_rad": np.cos(TIME * (3 - 0.1 * number)),
+        }
+        for values in columns.values():
+            values += 0.01 * np.ptp(values) * random.normal(size=TIME.size)
+        if number in runs:
+            columns[name][300:500] = columns[name][300]
+        text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
+    found = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    assert len(found) == is_asked
+    assert all(one.startswith(f"{name}: it stands still in run3 from 3 to 4.99 s") for one in found)
+
+
 RANDOM = np.random.default_rng(1)
 CLOCKS = {
     "a gap": (np.where(TIME > 4, TIME + 1, TIME), ["1 gap in time", "gap_s"]),
