@@ -79,7 +79,9 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
         if not has_head:
             remarks.append("the first line holds numbers, so columns are named 1, 2, 3 and so on")
     first = [cell.strip() for cell in rows[0][1]]
-    names = _unique(first) if has_head else [str(k + 1) for k in range(len(first))]
+    if not has_head:
+        first = [str(k + 1) for k in range(len(first))]
+    names = _unique(first)
     body = rows[1:] if has_head else rows
     units, units_line = dict[str, str](), 0
     if has_head and _holds_units(body, decimal):
@@ -97,7 +99,8 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
         for place, name in enumerate(names)
     }
     first_line = body[0][0] if body else 0
-    return Raw(path, columns, {}, tuple(remarks), first_line, units, units_line, decimal)
+    repeated = {name: first.count(name) for name in first if name and first.count(name) > 1}
+    return Raw(path, columns, {}, tuple(remarks), first_line, units, units_line, decimal, repeated)
 
 
 def _without_last(lines: list[str], layout: Layout) -> list[str]:
@@ -207,6 +210,13 @@ def _above_samples(
         head -= 2  # names, and below them units
     elif head and holds(head - 1) == {"text"}:
         head -= 1
+    again = next((k for k in own[:head] if lines[k].strip() == lines[own[head]].strip()), None)
+    if again is not None:
+        raise DataError(
+            f"{path}, line {own[head] + 1}: the names of the columns are there again.",
+            f"They are in line {again + 1}, and samples in between would be left out.",
+            f"Delete line {own[head] + 1}, or what is above it.",
+        )
     return own[head], [f"the {own[head] - start} lines above line {own[head] + 1} are left out"]
 
 
@@ -345,4 +355,6 @@ def bad_cell(raw: Raw, name: str) -> tuple[str, str]:
     if _is_number(cell, ","):
         return what, "If numbers have a decimal comma, write decimal = ',' under [data]."
     meant = f"If {cell!r} means that nothing was read, write missing = [{cell!r}] under [data]."
+    if cell == name:
+        meant = "The name of the column is there again: delete that line."
     return what, " ".join(filter(None, (after_samples(raw, fits, index), meant)))

@@ -38,6 +38,7 @@ class Raw:
         units: Column to what a line of units below the head states of it; nothing where none does.
         units_line: That line.
         decimal: Decimal sign of a text table; empty for any other file.
+        repeated: Name that several columns have to how many; the second one is called `NAME.2`.
     """
 
     path: Path
@@ -48,6 +49,7 @@ class Raw:
     units: Mapping[str, str] = field(default_factory=dict)
     units_line: int = 0
     decimal: str = ""
+    repeated: Mapping[str, int] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))

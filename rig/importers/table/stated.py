@@ -58,7 +58,16 @@ def check_row_of_units(raw: Raw, where: str, name: str, column: str) -> None:
 
 
 def unit_doubts(raw: Raw, name: str, source: Source) -> Iterator[str]:
-    """Yield impossible numbers of a column, and another unit in its name or below the head."""
+    """Yield impossible numbers of a column, and another unit in its name or below the head.
+
+    Another column of its name is one more doubt.
+    """
+    if source.column in raw.repeated:
+        yield (
+            f"{name}: {raw.repeated[source.column]} columns are called {source.column!r}, and the"
+            f" first one is read; is it the right one? If so, rename the others; the second is"
+            f" {f'{source.column}.2'!r}"
+        )
     cells = raw.columns.get(source.column)
     if cells is not None and cells.dtype.kind == "f":
         huge = np.flatnonzero(np.isfinite(cells) & (np.abs(cells) > IMPOSSIBLE))

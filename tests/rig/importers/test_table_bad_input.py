@@ -481,3 +481,27 @@ def test_rows_of_trials_that_alternate_are_an_error_and_in_a_preview_a_question(
     assert "a new value of 'trial'" in error.value.why
     with_least = read_mapping(file, [(("runs", "least_s"), 0.001, "")])
     assert any("201 parts" in doubt for run in open_table(path, with_least) for doubt in run.doubts)
+
+
+def test_a_column_of_which_there_are_two_is_asked_about(tmp_path):
+    path = tmp_path / "two.csv"
+    path.write_text("t,q,q\n" + "".join(f"{0.1 * k},{k % 7},{k % 5}\n" for k in range(100)))
+    flags = [(("columns", "time_s"), "t", ""), (("columns", "motor_angle_rad"), "q:deg", "")]
+    (run,) = open_table(path, read_mapping(None, flags))
+    (doubt,) = run.doubts
+    assert doubt.startswith("motor_angle_rad: 2 columns are called 'q', and the first one is read;")
+    flags[1] = (("columns", "motor_angle_rad"), "q.2:deg", "")
+    (run,) = open_table(path, read_mapping(None, flags))
+    assert run.doubts == ()
+
+
+@pytest.mark.parametrize("above", ["", "bench 7\n"])
+def test_names_of_columns_among_the_samples_are_an_error_with_their_line(tmp_path, above):
+    """Below other lines the names are sought from the last sample on: half of them was lost."""
+    path = tmp_path / "again.csv"
+    rows = [f"{0.1 * k},{k % 7}\n" for k in range(100)]
+    path.write_text("".join([above, "t,q\n", *rows[:50], "t,q\n", *rows[50:]]))
+    flags = [(("columns", "time_s"), "t", ""), (("columns", "motor_angle_rad"), "q:deg", "")]
+    with pytest.raises(DataError, match=f"line {53 if above else 52}") as error:
+        open_table(path, read_mapping(None, flags))
+    assert "elete" in error.value.fix
