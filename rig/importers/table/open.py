@@ -106,6 +106,7 @@ def read_runs(
     taken: set[str] = set()
     files = files_at(path, mapping)
     several = len({file.parent for file in files}) > 1
+    absent = tuple(_absent(files, mapping)) if path.is_dir() else ()
     for file in files:
         folders = file.relative_to(path).parts[:-1] if several else ()
         try:
@@ -122,7 +123,22 @@ def read_runs(
             if name in taken:
                 name += file.suffix.lower()
             taken.add(name)
-            yield replace(run, name=name)
+            yield replace(run, name=name, doubts=(*run.doubts, *absent))
+
+
+def _absent(files: Sequence[Path], mapping: ColumnMapping) -> Iterator[str]:
+    """Yield the side files that have lines for recordings that are not there, as questions."""
+    for folder in dict.fromkeys(file.parent for file in files):
+        side = folder / mapping.data.side_file
+        if not side.is_file():  # none is stated, or its absence is an error of each file
+            continue
+        there = {name for file in folder.iterdir() for name in (file.name, file.stem)}
+        named = map(str, read_delimited(side, Layout()).columns.get("file", ()))
+        if absent := [name for name in named if name not in there]:
+            yield (
+                f"{side.name} has a line for {', '.join(absent)}, and there is no such file; is a"
+                " recording lost? If not, delete the line."
+            )
 
 
 def _not_this(error: NoColumnError, files: Sequence[Path]) -> str:

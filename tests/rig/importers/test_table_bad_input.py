@@ -505,3 +505,19 @@ def test_names_of_columns_among_the_samples_are_an_error_with_their_line(tmp_pat
     with pytest.raises(DataError, match=f"line {53 if above else 52}") as error:
         open_table(path, read_mapping(None, flags))
     assert "elete" in error.value.fix
+
+
+def test_a_line_of_the_side_file_without_its_recording_is_asked_about(tmp_path):
+    for name in ("a", "b"):
+        table = "t,q\n" + "".join(f"{0.1 * k},{k % 7 + ord(name)}\n" for k in range(100))
+        (tmp_path / f"{name}.csv").write_text(table)
+    (tmp_path / "runs.csv").write_text("file,load\na.csv,1\nb,2\nc.csv,3\n")
+    flags = [(("columns", "time_s"), "t", ""), (("columns", "motor_angle_rad"), "q:deg", "")]
+    mapping = read_mapping(None, [*flags, (("side_file",), "runs.csv", "")])
+    asked = questions(list(open_table(tmp_path, mapping)))
+    assert "runs.csv has a line for c.csv, and there is no such file; is a recording lost?" in (
+        " ".join(asked)
+    )
+    (tmp_path / "c.csv").write_text(table)
+    assert not any("no such file" in one for one in questions(list(open_table(tmp_path, mapping))))
+    assert open_table(tmp_path / "a.csv", mapping).runs[0].recording().doubts == ()
