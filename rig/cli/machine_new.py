@@ -117,14 +117,20 @@ def data_text(table: Path, plant: Plant) -> str:
     from rig.importers.table.open import files_at, read_raw
 
     mapping = ColumnMapping(Data())
-    raw = read_raw(files_at(table, mapping)[0], mapping)
+    first = files_at(table, mapping)[0]
+    raw = read_raw(first, mapping)
     channels = [*(a.name for a in plant.actuators), *(s.name for s in plant.sensors)]
     lines = ["", f"# Columns of {table.name}, with the first sample:"]
     lines += [f"#   {_line(name, x[0])}" for name, x in raw.columns.items() if len(x)]
     lines += [f"# Single value {_line(name, value)}" for name, value in raw.fields.items()]
     lines += [f"# Remark: {remark}." for remark in raw.remarks]
-    ending = f"*{table.suffix}" if table.is_file() else "*.csv"
-    lines += ["[data]", f'# files = "{ending}"  # of a folder', FILE_NAME, "", "[data.columns]"]
+    lines += [
+        "[data]",
+        f'# files = "*{first.suffix}"  # of a folder',
+        FILE_NAME,
+        "",
+        "[data.columns]",
+    ]
     for channel in ("time_s", *channels):
         if channel in raw.columns:
             lines.append(f"{channel} = {value_text(channel)}")

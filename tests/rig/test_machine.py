@@ -382,6 +382,15 @@ def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_te
     said("machine new", out, words, table, code=2)
 
 
+def test_a_new_file_suggests_the_ending_of_the_data(tmp_path, said):
+    folder, out = tmp_path / "runs", tmp_path / "m.toml"
+    folder.mkdir()
+    for name in ("a", "b"):
+        (folder / f"{name}.jsonl").write_text('{"t": 0.0, "q": 1.0}\n{"t": 0.1, "q": 2.0}\n')
+    said("machine new", out, "--axis motor:rad --sensor motor:motor_angle_rad --from", folder)
+    assert '# files = "*.jsonl"' in out.read_text()
+
+
 @pytest.mark.parametrize("both", [True, False])
 def test_a_transmission_bends_where_both_its_travels_are_read(tmp_path, said, both):
     words = "--axis motor:rad --axis slide:m --transmission motor:slide:200"
