@@ -51,20 +51,24 @@ def turned_runs(fitted: Model, campaign: Campaign) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class _Runs:
-    """The cross-products of each run's columns and target, by its name."""
+    """The cross-products of each run's columns and target, by its name, and of all runs."""
 
     problem: Problem
     grams: dict[str, FloatArray]
+    total: FloatArray
 
     def weights(self, without: Collection[str]) -> FloatArray:
         """Return the amplitudes of a fit without some runs."""
-        kept = [gram for name, gram in self.grams.items() if name not in without]
-        return solve(self.problem, np.sum(kept, axis=0))
+        return solve(self.problem, self._sum(without))
 
     def cost(self, without: Collection[str]) -> float:
         """Return the squared error of a fit without some runs, on the others."""
-        weights = self.weights(without)
-        return sum(_error(gram, weights) for n, gram in self.grams.items() if n not in without)
+        total = self._sum(without)
+        return _error(total, solve(self.problem, total))
+
+    def _sum(self, without: Collection[str]) -> FloatArray:
+        """Return the cross-products of the runs that are not left out."""
+        return self.total - sum(self.grams[name] for name in without)
 
     def size(self, name: str) -> float:
         """Return the square of a run's target."""
@@ -80,10 +84,11 @@ def _laid_out(model: Model, campaign: Campaign) -> _Runs:
     """Return the cross-products of the runs with the shapes of a fitted model."""
     problem = problem_of(model, prepared(model, campaign))
     shape = [x for term in model.terms for x in term.numbers(term.effect.shape)]
-    return _Runs(problem, {run.thin.name: problem.gram(run, shape) for run in problem.runs})
+    grams = {run.thin.name: problem.gram(run, shape) for run in problem.runs}
+    return _Runs(problem, grams, np.sum([*grams.values()], axis=0))
 
 
 def _error(gram: FloatArray, weights: FloatArray) -> float:
-    """Return the squared error of a run."""
+    """Return the squared error of runs."""
     vector = np.append(weights, -1.0)
     return float(vector @ gram @ vector)

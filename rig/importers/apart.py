@@ -99,7 +99,13 @@ def _apart(
             ratios[name] = found / usual
     for k, recording in enumerate(recordings):
         known = {n: r[k] for n, r in ratios.items() if np.isfinite(r[k])}
-        far = {n: ratio for n, ratio in known.items() if not _within(ratio, 1.0, FAR)}
+        near = [ratio for ratio in known.values() if _within(ratio, 1.0, FAR)]
+        far = {
+            n: ratio
+            for n, ratio in known.items()
+            # as little as a channel that is just within the limit: the run moves less
+            if not _within(ratio, 1.0, FAR) and not any(_within(ratio, one, SURE) for one in near)
+        }
         if far and any(_within(r[k], 1.0) for r in ratios.values()):
             units = {n: _unit(n, ratio, ratios[n]) for n, ratio in far.items()}
             name = next((n for n in far if units[n]), next(iter(far)))

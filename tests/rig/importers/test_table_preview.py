@@ -217,6 +217,18 @@ def test_a_run_that_moves_less_is_not_asked_about(tmp_path, angles, currents):
     assert of_runs(tmp_path, angles, currents) == []
 
 
+def test_a_run_in_which_two_motions_are_just_about_the_limit_is_not_asked_about(tmp_path):
+    """Friction is most of the current, which is as usual."""
+    for number in range(6):
+        wave = np.sin(TIME * (2 + 0.1 * number))
+        size, other = (0.19, 0.21) if number == 3 else (1.0, 1.0)
+        columns = {"load_angle_rad": size * wave, "motor_angle_rad": other * wave}
+        columns["motor_current_a"] = np.sign(wave) + 0.2 * wave
+        text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
+    found = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    assert not any("it varies" in one for one in found)
+
+
 @pytest.mark.parametrize(
     ("masses", "is_asked"),
     [
