@@ -97,19 +97,30 @@ def _apart(
         usual = np.nanmedian(found) if np.isfinite(found).any() else 0.0
         if unit_of(name) in CONFUSED and np.mean(_within(found, usual)) >= MOST:
             ratios[name] = found / usual
+    noises = {n: _to_usual([_noise(r, n) for r in recordings]) for n in ratios}
     for k, recording in enumerate(recordings):
         known = {n: r[k] for n, r in ratios.items() if np.isfinite(r[k])}
-        near = [ratio for ratio in known.values() if _within(ratio, 1.0, FAR)]
+        as_noisy = {n: r for n, r in known.items() if _within(noises[n][k], 1.0)}
         far = {
             n: ratio
             for n, ratio in known.items()
-            # as little as a channel that is just within the limit: the run moves less
-            if not _within(ratio, 1.0, FAR) and not any(_within(ratio, one, SURE) for one in near)
+            # two that vary as little, with noise as usual: the run moves less
+            if not _within(ratio, 1.0, FAR)
+            and not (
+                n in as_noisy and sum(_within(one, ratio, SURE) for one in as_noisy.values()) > 1
+            )
         }
         if far and any(_within(r[k], 1.0) for r in ratios.values()):
             units = {n: _unit(n, ratio, ratios[n]) for n, ratio in far.items()}
             name = next((n for n in far if units[n]), next(iter(far)))
             yield name, units[name], recording.name, far[name]
+
+
+def _to_usual(values: Sequence[float]) -> FloatArray:
+    """Return values over their median; none where it is zero or not known."""
+    found = np.array(values)
+    usual = float(np.nanmedian(found)) if np.isfinite(found).any() else 0.0
+    return found / usual if usual > 0.0 else np.full(len(found), np.nan)
 
 
 def _spread(recording: Recording, name: str) -> float:

@@ -217,16 +217,26 @@ def test_a_run_that_moves_less_is_not_asked_about(tmp_path, angles, currents):
     assert of_runs(tmp_path, angles, currents) == []
 
 
-def test_a_run_in_which_two_motions_are_just_about_the_limit_is_not_asked_about(tmp_path):
-    """Friction is most of the current, which is as usual."""
+@pytest.mark.parametrize(
+    ("size", "of_noise", "is_asked"),
+    [(0.16, 1.0, False), (0.16, 0.16, True), (0.16, None, True)],
+)
+def test_a_run_that_moves_less_by_friction_alone_is_known_by_its_noise(
+    tmp_path, size, of_noise, is_asked
+):
+    """Friction is most of the current. A unit would change the noise, too, or only one angle."""
+    random = np.random.default_rng(4)
     for number in range(6):
         wave = np.sin(TIME * (2 + 0.1 * number))
-        size, other = (0.19, 0.21) if number == 3 else (1.0, 1.0)
-        columns = {"load_angle_rad": size * wave, "motor_angle_rad": other * wave}
-        columns["motor_current_a"] = np.sign(wave) + 0.2 * wave
+        columns = {"motor_current_a": np.sign(wave) + 0.2 * wave}
+        for name in ("load_angle_rad", "motor_angle_rad"):
+            is_odd = number == 3 and (of_noise or name == "load_angle_rad")
+            noise = 0.01 * random.normal(size=TIME.size)
+            columns[name] = (size if is_odd else 1.0) * wave
+            columns[name] += (of_noise or 1.0 if is_odd else 1.0) * noise
         text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
     found = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
-    assert not any("it varies" in one for one in found)
+    assert any("load_angle_rad: it varies 0.1" in one for one in found) == is_asked
 
 
 @pytest.mark.parametrize(
