@@ -145,7 +145,7 @@ def fit(
         return
     done = _fitted(declared_models(model, machine), campaign, folds, seed)
     plant = None if machine is None else read_machine(machine)
-    asked = questions(list(campaign.evidence), () if plant is None else plant.integrals, plant)
+    asked = questions(list(campaign.evidence), plant)
     said: list[str | TextTable] = [f"Check: {line}" for line in asked]
     one = "One run: there is no error on runs that it was not fitted on."
     for fitted, error in done:

@@ -87,7 +87,7 @@ def check(
     if data is not None and campaign is not None:
         say_left_out(data, campaign)
     runs = [] if campaign is None else list(campaign.evidence)
-    asked = questions(runs, plant.integrals, plant)
+    asked = questions(runs, plant)
     result = {"machine": plant.name, "check": found, "sound": found.is_sound, "questions": asked}
     present(json_, result, *check_lines(plant, found), *(f"Check: {line}" for line in asked))
     return ExitCode.OK if found.is_sound else ExitCode.FAILED

@@ -76,7 +76,7 @@ def run_diagnosis(
     if not quick:
         on_stage("choosing the experiment that separates the alternatives")
         proposed = propose(found, recordings, executor)
-    asked_of = (f"Check: {line}" for line in questions(whole, asked.derived))
+    asked_of = (f"Check: {line}" for line in questions(whole, asked.plant))
     fitted = (e.model for e in found.layout.equations.values())
     ignored = filter(None, map(offsets_note, fitted)) if asked.of_machine else ()
     notes = [*found.diagnosis.notes, *lost, *ignored, *asked_of]

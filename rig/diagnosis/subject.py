@@ -1,6 +1,6 @@
 """What is diagnosed: the recordings at a path, and the models that are declared of them."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from estimation.campaign import Campaign
 from estimation.derived import measured_channels
 from estimation.errors import nearest
 from estimation.model import Model
+from estimation.plant import Plant
 from estimation.plant_models import declared as declared_of
 from rig.calibrate.declared import Declared, declared_by_folder, is_raw
 from rig.errors import UsageError
@@ -24,8 +25,8 @@ class Subject:
 
     campaign: Campaign
     models: Sequence[Model]
-    derived: Collection[str] = ()
-    """Channels of the recordings that were not read but follow from others."""
+    plant: Plant | None = None
+    """The machine, where its file is given."""
     of_machine: bool = False
     """Whether the models are those of a machine file, which its owner can change."""
 
@@ -62,8 +63,8 @@ def subject(
         own = equations_of(machine)
         models = _of(own, balance) if model is None else declared_models(model, balance)
         campaign = open_recordings(path, machine, format_name, skip_bad)
-        derived = read_machine(machine).integrals
-        return Subject(with_motion(campaign, models), models, derived, of_machine=model is None)
+        plant = read_machine(machine)
+        return Subject(with_motion(campaign, models), models, plant, of_machine=model is None)
     if model is not None:
         models = declared_models(model, balance)
         return Subject(open_campaign(path, format_name, skip_bad), models)

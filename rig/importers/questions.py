@@ -4,7 +4,7 @@
 tables and of logs. Samples that are flagged do not count. Nothing is corrected here.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -52,16 +52,15 @@ WHOLE = 0.75
 """Share of its range that no position crosses between two samples while it moves."""
 
 
-def questions(
-    recordings: Sequence[Recording], derived: Collection[str] = (), plant: Plant | None = None
-) -> list[str]:
+def questions(recordings: Sequence[Recording], plant: Plant | None = None) -> list[str]:
     """Return the doubts about the channels and zeros of runs: questions, each with its channel.
 
     Args:
         recordings: The runs.
-        derived: Channels that were not read but follow from others; nothing is asked about them.
-        plant: The machine, which states what is in front of a gear.
+        plant: The machine, which states what is in front of a gear, and which channels were not
+            read but follow from others; nothing is asked about those.
     """
+    derived = {} if plant is None else plant.integrals
     names = dict.fromkeys(name for r in recordings for name in r.columns if name not in derived)
     limits = {} if plant is None else travels(plant)
     found = [

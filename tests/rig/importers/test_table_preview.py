@@ -164,7 +164,7 @@ def test_the_travel_of_a_motor_counts_behind_its_gear(tmp_path, said, size, is_a
     path = text_table(tmp_path / "run.csv", columns)
     shown = said("import", path, "--machine", file, "--preview").err
     assert ("is unusually large" in shown) == is_asked
-    asked = questions_of(list(read_runs(path, read_mapping(file, []), [])), (), parse(SCREW))
+    asked = questions_of(list(read_runs(path, read_mapping(file, []), [])), parse(SCREW))
     assert bool(asked) == is_asked
 
 
