@@ -3,6 +3,7 @@
 import _thread
 import io
 import re
+import signal
 import time
 from pathlib import Path
 
@@ -267,6 +268,15 @@ class Interrupted(io.FileIO):
         return size
 
 
+@pytest.fixture
+def interruptible():
+    """A process in the background of a shell ignores Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_while_bytes_are_written_loses_and_spoils_nothing(tmp_path, monkeypatch):
     path = tmp_path / "a.mcap"
     monkeypatch.setattr(Path, "open", lambda path, mode: Interrupted(path, mode))
