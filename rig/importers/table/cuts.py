@@ -74,10 +74,12 @@ def torn(
     """
     sizes = np.diff(edges)
     tiny = sizes[sizes < FEW]
-    rules = [*_rules(raw, mapping, time_s)]
     share = float(tiny.sum() / max(sizes.sum(), 1))
     most = mapping.data.runs.least_s is None and len(tiny) > len(sizes) / 2
-    if not rules or len(tiny) <= LISTED or not (most or share > SHARE):
+    if len(tiny) <= LISTED or not (most or share > SHARE):
+        return None
+    rules = [*_rules(raw, mapping, time_s)]  # their columns are read once more, to name the one
+    if not rules:
         return None
     rule = max(rules, key=lambda one: np.count_nonzero(one[1]))[0]
     names = [name for name in _of_trials(mapping) if rule == f"a new value of {name!r}"]
