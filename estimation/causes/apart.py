@@ -23,7 +23,7 @@ own variation that the factor may not explain. A run in which another effect dom
 LARGER, MINORITY = 2.0, 0.5
 """Factor by which the error of a run that is apart is larger than that of every other one, and the
 share of runs that are fewer. Where the equation lacks an effect, its share of a slow or light run
-looks like a factor."""
+appears as a factor."""
 
 
 class Apart(NamedTuple):
@@ -118,7 +118,7 @@ def reversed_runs(layout: Layout, sealed: Sealed, numbers: Numbers) -> list[Apar
 def _is_reversed(one: Apart) -> bool:
     """Whether minus one explains the run: with another factor, or less well, it has other causes.
 
-    A run of an arm whose equation lacks the motion of the other joints may look reversed.
+    A run of an arm whose equation lacks the motion of the other joints may appear reversed.
     """
     return 1.0 / FACTOR < -one.factor < FACTOR
 
@@ -190,7 +190,7 @@ def _is_factor(tried: _Factors, whole: FloatArray, within: FloatArray) -> NDArra
 def _is_large(fits: NDArray[np.bool_], base: FloatArray, gram: FloatArray) -> NDArray[np.bool_]:
     """Whether a run's error is larger than that of all others that are predicted as usual, (runs,).
 
-    Each is predicted by the fit without the run. Where most runs look apart, one spoils the others.
+    Each is predicted by the fit without the run. Where most appear apart, one spoils the others.
     """
     vector = np.hstack([-base, np.ones((len(base), 1))])
     squared = np.einsum("ki,rij,kj->kr", vector, gram, vector)

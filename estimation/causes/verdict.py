@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from estimation.causes import remarks
 from estimation.causes.acting import Moved
 from estimation.causes.angles import signals_of
-from estimation.causes.apart import reversed_runs
+from estimation.causes.apart import Apart, reversed_runs
 from estimation.causes.candidates import Candidate
 from estimation.causes.findings import (
     Kept,
@@ -88,13 +88,9 @@ def answer(
     began = time.perf_counter()
     on_stage("fitting the declared equations")
     timed = on_one_clock(recordings)
-    layout, sealed = _laid_out(models, timed, sealed, numbers)
-    wrong = reversed_runs(layout, sealed, numbers)
-    if wrong:
-        names = {one.run for one in wrong}
-        timed, sealed = [r for r in timed if r.name not in names], sealed.without(names)
-        layout, sealed = _laid_out(models, timed, sealed, numbers)
-    timed = [r for r in timed if r.name not in layout.left_out]
+    layout, sealed, wrong = _of_one_sign(models, timed, sealed, numbers)
+    kept_names = {run.name for run in layout.runs}
+    timed = [r for r in timed if r.name in kept_names]
     on_stage("searching the training runs for what they lack")
     with threadpool_limits(limits=1, user_api="blas"):  # threads wait for one another
         found = search(layout.select(sealed.discover), numbers)
@@ -146,6 +142,19 @@ def answer(
     )
     kept = tuple(one for one, _ in judged)
     return Answer(diagnosis, layout, found, kept, refits, tuple(written))
+
+
+def _of_one_sign(
+    models: Sequence[Model], recordings: Sequence[Recording], sealed: Sealed, numbers: Numbers
+) -> tuple[Layout, Sealed, list[Apart]]:
+    """Return the equations on the runs that are not reversed, their split, and those that are."""
+    layout, kept = _laid_out(models, recordings, sealed, numbers)
+    wrong = reversed_runs(layout, kept, numbers)
+    if wrong:
+        names = {one.run for one in wrong}
+        rest = [r for r in recordings if r.name not in names]
+        layout, kept = _laid_out(models, rest, kept.without(names), numbers)
+    return layout, kept, wrong
 
 
 def _laid_out(
