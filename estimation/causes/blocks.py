@@ -77,9 +77,9 @@ class Outcome:
         promising: Which of them could be worth a price, shape (causes,).
         errors: For each family of folds, part to squared error of these, (runs, promising).
         amplitudes: On all runs, shape (causes, k).
-        changes: Equation to the factor by which its largest linear term changes, shape (causes,).
-        slopes: Equation to the factor of each channel times a constant within runs, the causes'
-            own contribution included, shape (causes, channels).
+        changes: Equation to the factor by which the term of each channel times a constant changes,
+            shape (causes, channels).
+        slopes: The same within runs, the causes' own contribution included.
         by_run: Weighted products within runs, with the base's residual as the target.
         declared: Declared amplitudes next to each cause, shape (causes, declared).
     """
@@ -143,10 +143,8 @@ def evaluate(
         usual_there = joint.whole(usual)[at]
         factor = np.where(usual_there == 0.0, 1.0, usual_there)
         given = _per_unit(joint, block, (name, "within"), at, amplitudes)
-        slopes[name] = (declared[:, at] + given) / factor
-        if name in joint.largest_linear:
-            largest = at.index(joint.largest_linear[name][0])
-            changes[name] = declared[:, at[largest]] / factor[largest]
+        changes[name] = declared[:, at] / factor
+        slopes[name] = changes[name] + given / factor
     # the columns as they were before declared ones were taken off: in some runs these differ
     gram = np.asarray(sum(weights[p] * joint.gram[p] for p in block.of if p[1] == "within"))
     count = block.taken.shape[1]

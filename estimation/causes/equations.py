@@ -102,6 +102,12 @@ class Equation:
             found += [Column(term.sign, channel, True, False)] * len(term.effect.shape)
         return found
 
+    @cached_property
+    def fitted(self) -> FloatArray:
+        """Fitted amplitude of each of the columns; zero of a derivative by a shape."""
+        parts = [[*t.weights, *[0.0] * len(t.effect.shape)] for t in self.terms]
+        return np.array([x for part in parts for x in part])
+
     def noise(self, run: RunSignals) -> FloatArray:
         """Return the noise in `columns` and in the target, (n, k + 1).
 

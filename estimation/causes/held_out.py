@@ -26,38 +26,42 @@ OPEN = 0.05
 
 @dataclass(frozen=True)
 class Gains:
-    """The score of one more cause in each test run.
+    """What one more cause shows in each test run, as a score and as evidence.
 
     Attributes:
-        by_run: Run to score, as if the cause acted there.
-        without: Run to score, as if it did not: the other parameters are known better.
+        scores: Run to score, as if the cause acted there and as if it did not: then the other
+            parameters are known better.
+        logs: The same as a log likelihood ratio: a run is worth its independent samples, its mean
+            one.
         acting: Run to the probability that it acts there, from the training runs.
     """
 
-    by_run: Mapping[str, float]
-    without: Mapping[str, float]
+    scores: Mapping[str, tuple[float, float]]
+    logs: Mapping[str, tuple[float, float]]
     acting: Mapping[str, float]
 
-    def log_ratio(self, per_score: float) -> float:
-        """Return the logarithm of the likelihood ratio of all runs.
+    def score(self, rate: float) -> float:
+        """Return the score of all runs, at so much of the log odds for one unit of it."""
+        scaled = {name: (rate * x, rate * y) for name, (x, y) in self.scores.items()}
+        return self._sum(scaled) / rate
 
-        In each run it is that of the mean of acting and not acting, and `per_score` for one unit of
-        score.
-        """
-        return float(sum(np.logaddexp(*self._odds(name, per_score)) for name in self.by_run))
+    def log_ratio(self) -> float:
+        """Return the logarithm of the likelihood ratio of all runs."""
+        return self._sum(self.logs)
 
-    def acts_in(self, name: str, per_score: float) -> bool:
+    def acts_in(self, name: str) -> bool:
         """Whether the cause more probably acts in a run than not, the run itself included."""
-        acting, not_acting = self._odds(name, per_score)
+        acting, not_acting = self._odds(name, self.logs)
         return acting > not_acting
 
-    def _odds(self, name: str, per_score: float) -> tuple[float, float]:
+    def _sum(self, logs: Mapping[str, tuple[float, float]]) -> float:
+        """Return the sum over runs; in each the ratio is the mean of acting and not acting."""
+        return float(sum(np.logaddexp(*self._odds(name, logs)) for name in logs))
+
+    def _odds(self, name: str, logs: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
         """Return the log likelihood of acting in a run, and that of not acting."""
-        acting = self.acting[name]
-        return (
-            _log(acting) + per_score * self.by_run[name],
-            _log(1.0 - acting) + per_score * self.without[name],
-        )
+        acting, (by_run, without) = self.acting[name], logs[name]
+        return _log(acting) + by_run, _log(1.0 - acting) + without
 
 
 class HeldOut:
@@ -92,8 +96,7 @@ class HeldOut:
         acts = {name: p > 0.5 for name, p in acting.items()}
         if is_open:
             gains = self.gains(before, cause)
-            per_score = 0.5 * self.numbers.samples_a_run
-            acts |= {name: gains.acts_in(name, per_score) for name in is_open}
+            acts |= {name: gains.acts_in(name) for name in is_open}
         return acts, is_open
 
     def _acting(self, candidate: Candidate) -> Mapping[str, float]:
@@ -131,26 +134,35 @@ class HeldOut:
             out[name] = acting / (acting + not_acting) if acting + not_acting else 0.5
         return out
 
-    def gains(self, before: Sequence[Candidate], cause: Candidate) -> "Gains":
-        """Return the score of one more cause in each test run, next to the causes before it."""
+    def gains(self, before: Sequence[Candidate], cause: Candidate) -> Gains:
+        """Return what one more cause shows in each test run, next to the causes before it."""
         joint, old = self._next_to(before)
         acting, names = self._acting(cause), [self.layout.runs[k].name for k in self.at]
-        by_run = self._scores(old, self._squared(self._with(joint, cause)))
-        without = np.zeros(len(self.at))
+        scores, logs = (np.zeros((2, len(self.at))) for _ in range(2))
+        scores[0], logs[0] = self._shown(old, self._squared(self._with(joint, cause)))
         if any(acting[name] < 1.0 for name in names):
-            without = self._scores(old, self._squared(self._with(joint, cause, in_test=False)))
-        found = [dict(zip(names, x.tolist(), strict=True)) for x in (by_run, without)]
-        return Gains(found[0], found[1], acting)
+            without = self._squared(self._with(joint, cause, in_test=False))
+            scores[1], logs[1] = self._shown(old, without)
+        pairs = [
+            {name: (float(x[0]), float(x[1])) for name, x in zip(names, own.T, strict=True)}
+            for own in (scores, logs)
+        ]
+        return Gains(pairs[0], pairs[1], acting)
 
-    def _scores(
+    def _shown(
         self, before: Mapping[Part, FloatArray], after: Mapping[Part, FloatArray]
-    ) -> FloatArray:
-        """Return the score of each test run, from squared errors."""
-        total = np.zeros(len(self.at))
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the score of each test run and its log likelihood ratio, from squared errors."""
+        score, log, numbers = np.zeros(len(self.at)), np.zeros(len(self.at)), self.numbers
         for p, samples in self.joint.samples.items():
             mean = [e[p] / samples[self.at] for e in (before, after)]
-            total += log_ratio(self.joint, p, mean[0], mean[1])
-        return total
+            own = log_ratio(self.joint, p, mean[0], mean[1])
+            score += own
+            # a run has as many independent samples as it is worth, and one mean
+            log += 0.5 * (
+                numbers.samples_a_run * own if p[1] == "within" else own / numbers.between
+            )
+        return score, log
 
     def _next_to(self, causes: Sequence[Candidate]) -> tuple[Joint, Mapping[Part, FloatArray]]:
         """Return the regression with causes, and its squared errors; the last one is kept."""

@@ -19,6 +19,7 @@ from estimation.causes.laid import TINY, Followed, Laid, Part, Projection, centr
 from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.recording import FloatArray
+from estimation.within_bounds import solve_within
 
 HELD = 1e6
 """Precision of an amplitude that is held, in squares of its column: as good as no column."""
@@ -185,7 +186,7 @@ class Joint:
         whole = self._run_grams.sum(axis=0)
         # no term exceeds half of all signals, and a shape is known to within its own size
         size = self._declared_size
-        self._precision = 4.0 * np.diag(whole)[:size] / float(whole[-1, -1])
+        self._precision = 4.0 * np.diag(whole)[:size] / self._signals(whole)
         shapes = [c.of_shape for e in self.layout.equations.values() for c in e.kinds]
         self._precision[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
         self._unheld = self._precision
@@ -194,16 +195,33 @@ class Joint:
         bounded[: len(kinds)] = [c.is_bounded for c in kinds]
         self._hold(np.zeros_like(bounded))
         # of two machines together a friction may be negative: what differs is then a change
-        while (
-            self._is_one_machine
-            and (below := bounded & ~self.held & (self._amplitudes < 0.0)).any()
-        ):
-            self._hold(self.held | below)
+        if self._is_one_machine and (self._amplitudes[bounded] < 0.0).any():
+            self._hold(bounded & (self._within_bounds(bounded) <= 0.0))
+
+    def _signals(self, whole: FloatArray) -> float:
+        """Return the weighted square of all targets and of all terms of the declared model."""
+        fitted = np.zeros(self._declared_size)
+        for name, equation in self.layout.equations.items():
+            fitted[[*self._equations_at[name]]] = equation.fitted
+        return float(whole[-1, -1] + fitted**2 @ np.diag(whole)[: len(fitted)])
 
     @property
     def _amplitudes(self) -> FloatArray:
         """Amplitudes of the declared columns on all runs."""
         return self.whole(self.left_out(((),)).base[0])
+
+    def _within_bounds(self, bounded: NDArray[np.bool_]) -> FloatArray:
+        """Return the amplitudes of the declared columns where some are not below zero."""
+        size = self._declared_size
+        turn = np.eye(
+            self.size
+        )  # to the amplitudes as they are bounded, next to what was taken off
+        turn[:size, size:] = self.taken
+        gram = self._run_grams.sum(axis=0)
+        normal = turn.T @ (gram[:-1, :-1] + self._prior) @ turn
+        low = np.append(np.where(bounded, 0.0, -np.inf), np.full(len(self._added), -np.inf))
+        high = np.full(len(low), np.inf)
+        return solve_within(normal, turn.T @ gram[:-1, -1], low, high)[:size]
 
     def _hold(self, held: NDArray[np.bool_]) -> None:
         """Hold declared amplitudes at their bound of zero, shape (declared,)."""
@@ -403,6 +421,21 @@ class Joint:
             if channel:
                 found[channel] = found.get(channel, 0.0) + sign * float(base[at])
         return found
+
+    def noise_share(self, name: str, at: int, channel: str) -> float:
+        """Return how much of an equation's error within runs a reading's noise may be, at most one.
+
+        The noise is at most the error of every equation that the reading enters.
+        """
+        most = np.inf
+        for other in self.layout.equations:
+            places = [p for p, c in self.linear(other).items() if c == channel]
+            factors = [float(self.declared[p]) for p in places]
+            factors += [1.0] * (self.layout.equations[other].target == channel)
+            for factor in factors:
+                if factor:
+                    most = min(most, self.error[other, "within"] / factor**2)
+        return min(1.0, most * float(self.declared[at]) ** 2 / self.error[name, "within"])
 
     @cached_property
     def largest_linear(self) -> Mapping[str, tuple[int, str]]:

@@ -211,33 +211,38 @@ def probabilities(scores: FloatArray, gains: FloatArray, sharpness: float) -> Fl
 def _in_readings(
     joint: Joint, candidates: Sequence[Candidate], outcome: Outcome
 ) -> NDArray[np.bool_]:
-    """Count errors in the unit of an equation's largest reading, and return who replaces it.
+    """Count errors in the unit of an equation's readings, and return who replaces the largest.
 
-    The residual may be that reading's noise. Who reads the same quantity through another sensor
-    then shares the task with it and halves the noise, with nothing to do with a cause: the factor
-    of the reading becomes smaller, by as much as the noise is less seen. Who reads the reading
-    itself, where that has noise of an amplifier, may do so by its slope within runs. And who reads
-    the target itself has no use for the declared terms; a cause comes in addition to them. A
-    declared term whose factor moved reads what the base reads, with another factor, so none of this
-    holds for it. Shape (n,).
+    The residual may be a reading's noise, as much of it as other equations allow. Who reads the
+    same quantity through another sensor then shares the task with it and halves the noise, with
+    nothing to do with a cause: the factor of the reading becomes smaller, by as much as the noise
+    is less seen. That holds of the largest reading, and of all that have an amplifier's noise. Who
+    reads such a reading itself may do so by its slope within runs. And who reads the target itself
+    has no use for the declared terms; a cause comes in addition to them. A declared term whose
+    factor moved reads what the base reads, with another factor, so none of this holds for it.
+    Shape (n,).
     """
     replaces = np.zeros(len(candidates), dtype=np.bool_)
     moved = np.array([one.cause.is_declared for one in candidates])
     for name, slopes in outcome.slopes.items():
-        seen = np.ones(len(candidates))
-        for k, channel in enumerate(joint.linear(name).values()):
+        unit = np.ones(len(candidates))
+        largest = joint.largest_linear.get(name, (-1, ""))[0]
+        for k, (at, channel) in enumerate(joint.linear(name).items()):
+            change, share = outcome.changes[name][:, k], joint.noise_share(name, at, channel)
+            seen = np.ones(len(candidates))
+            reads = np.array([channel in one.cause.reads for one in candidates])
+            alone = np.array([{*one.cause.reads} == {channel} for one in candidates])
             if channel.endswith(AMPLIFIED):
-                alone = np.array([{*one.cause.reads} == {channel} for one in candidates])
                 seen[alone] = slopes[alone, k]
-        if name in outcome.changes:
-            change, channel = outcome.changes[name], joint.largest_linear[name][1]
-            other = np.array([{*one.cause.reads} != {channel} for one in candidates])
-            if origin_of(channel)[1]:  # a speed or an acceleration: no motion reads the target
-                other &= np.array([_reads_effort(joint, name, one) for one in candidates])
-            seen = np.where(other, np.minimum(seen, change), seen)
-            replaces |= other & (change < 1.0 / MOST_CHANGE)
-        seen = np.where(moved, 1.0, seen)
-        unit = np.maximum(1.0, np.maximum(seen, 1e-3) ** -2.0)
+                seen[~reads] = change[~reads]
+            if at == largest:
+                other = ~alone
+                if origin_of(channel)[1]:  # a speed or an acceleration: no motion reads the target
+                    other &= np.array([_reads_effort(joint, name, one) for one in candidates])
+                seen = np.where(other, np.minimum(seen, change), seen)
+                replaces |= other & (change < 1.0 / MOST_CHANGE)
+            left = 1.0 - share + share * np.clip(seen, 1e-3, 1.0) ** 2
+            unit = np.maximum(unit, np.where(moved, 1.0, 1.0 / left))
         for family in outcome.errors:
             family[name, "within"][:] *= unit[outcome.promising]
     replaces[moved] = False

@@ -313,9 +313,9 @@ def _tested(one: Kept, others: Sequence[Candidate], held_out: HeldOut) -> tuple[
     gains, logs = np.array([(p.gain, 0.0) for p in known]).T
     for k, p in enumerate(known):
         of_runs = held_out.gains(others, p.best.candidate)
-        logs[k] = of_runs.log_ratio(0.5 * numbers.samples_a_run)
+        logs[k] = of_runs.log_ratio()
         rate = numbers.sharpness / count
-        gains[k] = (train * gains[k] + of_runs.log_ratio(rate) / rate) / count
+        gains[k] = (train * gains[k] + of_runs.score(rate)) / count
     shares = np.array([p.share for p in known])
     total = float(np.logaddexp.reduce(np.log(shares / shares.sum()) + logs))
     prices = np.array([p.best.price.score(numbers) for p in known])

@@ -60,6 +60,25 @@ def _run(k: int, lost: Effect | None, random: np.random.Generator, spring: bool)
     )
 
 
+def resisting(seed: int) -> list[Recording]:
+    """Return runs whose load resists like friction; the current and the losses are drawn.
+
+    Fitted without bounds, the friction is that of the load with the opposite sign.
+    """
+    random = np.random.default_rng(seed)
+    of_sign, of_speed = random.uniform(0.0, 0.03), random.uniform(-1e-3, 1e-3)
+    drag, noise = random.uniform(0.0, 2e-3), 10.0 ** random.uniform(-3.0, -1.5)
+    out = []
+    for one in recordings(lambda angle, speed, load: drag * speed, seed=seed):
+        speed = np.gradient(one["motor_angle_rad"], one.time_s)
+        lost = 1.2 * one["motor_current_a"] - one["proximal_torque_n_m"]
+        load = of_sign * np.tanh(speed / 2.0) + of_speed * speed
+        current = (load + lost) / 1.2 + random.normal(0, noise, len(load))
+        torque = load + random.normal(0, 1e-5, len(load))
+        out.append(one.with_columns(motor_current_a=current, proximal_torque_n_m=torque))
+    return out
+
+
 def gearbox() -> Model:
     return model_file.read(Path("gearbox"))
 
@@ -139,6 +158,26 @@ def cabled(wave: float = 0.0, *, held: bool = False) -> list[Recording]:
         conditions = {"load_command_a": 0.1 * (1 + k % 3)}
         start = int(1e9 * 20 * k) + 1
         out.append(Recording(f"{k:02d}", time, columns, conditions=conditions, started_at_ns=start))
+    return out
+
+
+def sprung(noise_n_m: float) -> list[Recording]:
+    """Return runs of a cable against a spring and a damper; the jaw's torque has slow noise."""
+    random, keep = np.random.default_rng(0), np.exp(-1.0 / (RATE_HZ * 0.05))
+    out = []
+    for one in cabled():
+        spindle, count = one["spindle_angle_rad"], len(one.time_s)
+        speed = np.gradient(spindle, one.time_s)
+        load = 0.02 * spindle + 0.002 * speed
+        lost = 1e-4 * np.gradient(speed, one.time_s) + 1e-4 * speed + 0.004 * np.tanh(speed / 0.06)
+        fresh = random.normal(0, noise_n_m * np.sqrt(1.0 - keep**2), count + 1000)
+        slow = signal.lfilter([1.0], [1.0, -keep], fresh)[1000:]
+        columns = {
+            "jaw_angle_rad": 1.3 + RATIO * spindle - load / 0.5 + random.normal(0, 5e-5, count),
+            "proximal_torque_n_m": RATIO * load + lost + random.normal(0, 2e-4, count),
+            "distal_torque_n_m": load + slow + random.normal(0, 2e-4, count),
+        }
+        out.append(one.with_columns(**columns))
     return out
 
 

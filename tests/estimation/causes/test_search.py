@@ -1,5 +1,6 @@
 """What the search over causes finds, and what it never reads."""
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -46,6 +47,8 @@ from tests.estimation.causes.synthetic import (
     hoisted,
     motor,
     recordings,
+    resisting,
+    sprung,
     turning,
 )
 
@@ -476,6 +479,38 @@ def _noisy() -> list[Recording]:
         columns = {"crank_torque_n_m": torque, "crank_angle_rad": angle}
         runs.append(Recording(f"{k:02d}", time, columns))
     return runs
+
+
+@pytest.mark.parametrize("seed", [12, 13, 19, 29])
+def test_losses_at_their_bounds_are_those_of_the_least_error(seed: int) -> None:
+    """Of two frictions that come out negative together, only one has to be zero."""
+    joint = Joint(_laid(resisting(seed), motor()))
+    kinds = joint.layout.equations["motor"].kinds
+    losses = [k for k, column in enumerate(kinds) if column.is_bounded]
+    errors = []
+    for some in itertools.product((False, True), repeat=len(losses)):
+        held = np.zeros_like(joint.held)
+        held[losses] = some
+        fitted = joint.holding(held).left_out([[]]).base[0]
+        if (joint.whole(fitted)[losses] >= -1e-9)[~held[losses]].all():
+            errors.append(_squared_error(joint, fitted))
+    chosen = _squared_error(joint, joint.left_out([[]]).base[0])
+    assert len(errors) > 1
+    assert chosen == pytest.approx(min(errors), rel=0.01)
+
+
+def _squared_error(joint: Joint, base: FloatArray) -> float:
+    """Return the weighted squared error of a base of all runs."""
+    vector = np.append(base, -1.0)
+    parts = (joint.weights[p] * joint.gram[p].sum(axis=0) for p in joint.parts)
+    return float(sum(vector @ gram @ vector for gram in parts))
+
+
+@pytest.mark.parametrize("noise_n_m", [1e-4, 3e-4])
+def test_slow_noise_of_a_load_that_the_motion_predicts_is_no_late_encoder(noise_n_m: float) -> None:
+    """The jaw's speed stands in for the load's reading, and has none of its noise."""
+    runs = sprung(noise_n_m)
+    assert diagnose(runs, cable(), split(runs)).verdict == "nothing_missing"
 
 
 def test_a_noisy_encoder_is_no_slow_one() -> None:
