@@ -19,9 +19,6 @@ from estimation.signals import Signals
 SHAPE_STEP = 0.02
 """Relative step of the derivative of a declared column by its shape."""
 
-LOSSES = ("friction.", "transmission.damping")
-"""Families of declared terms that take energy from the motion."""
-
 
 class Column(NamedTuple):
     """A declared column.
@@ -30,7 +27,7 @@ class Column(NamedTuple):
         sign: With which its term enters.
         channel: What it is a constant times; empty where it is another function.
         of_shape: Whether it is the derivative by a shape.
-        is_bounded: Whether it is the amplitude of a loss, which cannot be negative.
+        is_bounded: Whether its amplitude cannot be negative, as that of an inertia or a friction.
     """
 
     sign: int
@@ -97,8 +94,7 @@ class Equation:
             linear = isinstance(term.effect, Proportional)
             channel = next(iter(term.channels.values())) if linear else ""
             sizes = term.effect.amplitudes
-            is_loss = term.effect.family.startswith(LOSSES)
-            found += [Column(term.sign, channel, False, is_loss and p.lower == 0.0) for p in sizes]
+            found += [Column(term.sign, channel, False, p.lower == 0.0) for p in sizes]
             found += [Column(term.sign, channel, True, False)] * len(term.effect.shape)
         return found
 

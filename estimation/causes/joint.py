@@ -76,7 +76,7 @@ class Joint:
         projection: Lays candidates out.
         power: Weighted square of all targets within runs.
         held: Which declared amplitudes are held at zero, their bound, shape (declared,): what takes
-            a friction or a damping below zero is a cause that the equation lacks.
+            a friction or an inertia below zero is a cause that the equation lacks.
     """
 
     def __init__(
@@ -406,6 +406,12 @@ class Joint:
         for name, taken in laid.taken.items():
             out[:, self._equations_at[name]] = taken
         return out
+
+    def bounded_at(self, equation: str, column: int | None) -> int | None:
+        """Return the place of a declared column's amplitude if it cannot be negative."""
+        if column is None or not self.layout.equations[equation].kinds[column].is_bounded:
+            return None
+        return self._equations_at[equation].start + column
 
     def linear(self, name: str) -> Mapping[int, str]:
         """Return place to channel of each declared column that is a channel times a constant."""

@@ -26,6 +26,9 @@ MOST_CHANGE = 2.0
 """Factor by which the largest linear term of an equation may become smaller next to a cause. It may
 become larger by any: without the cause it is as wrong as the cause is large."""
 
+TURNED = 0.1
+"""Share of a change by which a factor that cannot be negative may miss zero: it is measured."""
+
 DIGITS = 4
 """Decimals of a score and of a probability: causes with the same columns tie."""
 
@@ -172,11 +175,23 @@ class _Judged(NamedTuple):
 
 def _judged(joint: Joint, group: Group, block: Block, usual: _Usual) -> _Judged:
     outcome = evaluate(joint, block, usual.folds, group.precision, usual.base)
-    replaces = _in_readings(joint, group.candidates, outcome)
+    replaces = _in_readings(joint, group.candidates, outcome) | _turned(joint, group, outcome)
     gains = np.zeros(len(group.candidates))
     if outcome.errors:
         gains[outcome.promising] = score(joint, usual.spreads, usual.errors, outcome.errors)
     return _Judged(gains, outcome.amplitudes, replaces, outcome.declared, outcome.by_run)
+
+
+def _turned(joint: Joint, group: Group, outcome: Outcome) -> NDArray[np.bool_]:
+    """Return which declared terms, whose factor is not negative, would be so in some runs, (n,)."""
+    found = np.zeros(len(group.candidates), dtype=np.bool_)
+    for k, one in enumerate(group.candidates):
+        column = one.cause.column if isinstance(one.cause, Source) else None
+        at = joint.bounded_at(one.cause.place.home, column)
+        if at is not None:
+            change = float(outcome.amplitudes[k, 0] / one.size[0])
+            found[k] = outcome.declared[k, at] + change < -TURNED * abs(change)
+    return found
 
 
 def best_of_each(scored: Sequence[Scored]) -> list[Scored]:

@@ -160,9 +160,9 @@ def _settled(
             settled[k] = conditional[k][0]
         if all(_is_as(one, other) for one, other in zip(before, settled, strict=True)):
             break
-    least = min(settled, key=lambda c: c.score)
-    if least.score < 0.0 and len(settled) > 1:
-        return _settled(ranking, [c for c in settled if c is not least])
+    least = min(range(len(settled)), key=lambda k: settled[k].score)
+    if settled[least].score < 0.0 and len(settled) > 1:
+        return _settled(ranking, [*settled[:least], *settled[least + 1 :]])
     return settled, conditional
 
 

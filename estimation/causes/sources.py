@@ -75,6 +75,11 @@ class Source:
         return self.effect.family
 
     @property
+    def column(self) -> int | None:
+        """Number of its equation's declared column whose factor it changes; None of another one."""
+        return None
+
+    @property
     def is_declared(self) -> bool:
         """Whether it is a term of the declared equation, with another factor in some runs."""
         return False
