@@ -135,7 +135,7 @@ class HeldOut:
         return out
 
     def gains(self, before: Sequence[Candidate], cause: Candidate) -> Gains:
-        """Return what one more cause shows in each test run, next to the causes before it."""
+        """Return the score and the evidence of one more cause, next to the causes before it."""
         joint, old = self._next_to(before)
         acting, names = self._acting(cause), [self.layout.runs[k].name for k in self.at]
         scores, logs = (np.zeros((2, len(self.at))) for _ in range(2))

@@ -431,9 +431,11 @@ class Joint:
     def noise_share(self, name: str, at: int, channel: str) -> float:
         """Return how much of an equation's error within runs a reading's noise may be, at most one.
 
-        The noise is at most the error of every equation that the reading enters.
+        The noise is at most the reading's own changes, and the error of every equation that the
+        reading enters.
         """
-        most = np.inf
+        part = name, "within"
+        most = float(self.gram[part][:, at, at].sum() / self.samples[part].sum())
         for other in self.layout.equations:
             places = [p for p, c in self.linear(other).items() if c == channel]
             factors = [float(self.declared[p]) for p in places]
@@ -441,7 +443,7 @@ class Joint:
             for factor in factors:
                 if factor:
                     most = min(most, self.error[other, "within"] / factor**2)
-        return min(1.0, most * float(self.declared[at]) ** 2 / self.error[name, "within"])
+        return min(1.0, most * float(self.declared[at]) ** 2 / self.error[part])
 
     @cached_property
     def largest_linear(self) -> Mapping[str, tuple[int, str]]:

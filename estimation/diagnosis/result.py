@@ -9,7 +9,14 @@ from estimation.diagnosis.split import Sealed
 
 SCHEMA = "rig.diagnosis/1"
 
-VERDICTS = ("identified", "one_of", "depends_on", "something_missing", "nothing_missing")
+VERDICTS = (
+    "identified",
+    "one_of",
+    "depends_on",
+    "something_missing",
+    "unexplained",
+    "nothing_missing",
+)
 """From the strongest claim to none; the verdict of a diagnosis is its weakest finding's."""
 
 VARIABLES = [
@@ -151,9 +158,10 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        """The weakest finding's verdict, or `nothing_missing`."""
+        """The weakest finding's verdict; without findings whether noise explains the errors."""
         if not self.findings:
-            return "nothing_missing"
+            is_noise = not any(map(is_unexplained, self.over_noise.values()))
+            return "nothing_missing" if is_noise else "unexplained"
         return max((f.verdict for f in self.findings), key=VERDICTS.index)
 
     def to_json(self) -> dict[str, Any]:

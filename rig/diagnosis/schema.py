@@ -68,7 +68,7 @@ class DiagnosisSchema(BaseModel):
     """A completed diagnosis. Further keys may come; those listed keep their meaning."""
 
     schema_: Annotated[Literal["rig.diagnosis/1"], Field(alias="schema")]
-    verdict: Name | Literal["nothing_missing"]
+    verdict: Name | Literal["unexplained", "nothing_missing"]
     findings: list[Finding]
     rmse_before: dict[Balance, Number | None]
     rmse_after: dict[Balance, Number | None]

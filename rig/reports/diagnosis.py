@@ -22,6 +22,7 @@ VERDICTS = {
     "one_of": "one of several effects",
     "depends_on": "effect of unknown form",
     "something_missing": "model incomplete, cause not identified",
+    "unexplained": "no effect identified; noise does not explain the error",
     "nothing_missing": "no unmodelled effect found",
 }
 """Verdict to the words of the heading."""

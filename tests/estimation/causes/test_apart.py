@@ -165,6 +165,7 @@ def test_what_nothing_explains_is_stated_with_the_terms_at_their_bounds() -> Non
     assert found.findings == ()
     ratio = re.search(r"the error on the test runs is (\S+) times the noise", found.notes[0])
     assert float(ratio[1]) > 5.0
+    assert found.verdict == "unexplained"
     assert "at a bound: friction.viscous damping" in found.notes[1]
 
 
