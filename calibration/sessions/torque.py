@@ -52,7 +52,13 @@ class TorqueSession:
             )
         rising = len(self.masses_kg) > 0 and np.all(np.diff((0.0, *self.masses_kg)) > 0)
         if not (rising and self.arm_m > 0 and np.isfinite(self.arm_m)):
-            raise BadDataError("levels", "An arm is longer than 0, and the masses rise from 0.")
+            raise BadDataError(
+                "levels",
+                "An arm is longer than 0, and the masses rise from 0.",
+                f"Given: {1e3 * self.arm_m:g} mm and"
+                f" {', '.join(f'{1e3 * mass:g}' for mass in self.masses_kg)} g.",
+                "Give --masses-g in rising order, such as 50,100,150, and a positive --arm-mm.",
+            )
         levels, steps = 1 + len(self.masses_kg), 1 + 2 * len(self.masses_kg) * self.repeats
         if levels < MINIMUM_LEVELS or steps < MINIMUM_STEPS:
             raise BadDataError(

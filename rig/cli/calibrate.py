@@ -242,12 +242,18 @@ def _numbers(words: str, option: str) -> list[float]:
         return [float(word) for word in words.split(",")]
     except ValueError:
         raise UsageError(
-            f"{option} takes numbers with commas between.", f"Given: {words}."
+            f"{option} takes numbers with commas between.",
+            f"Given: {words}.",
+            f"Give them as in {option} 10,20,30.",
         ) from None
 
 
 def _three(words: str, option: str) -> list[float]:
     values = _numbers(words, option)
     if len(values) != 3:
-        raise UsageError(f"{option} takes three numbers with commas between.", f"Given: {words}.")
+        raise UsageError(
+            f"{option} takes three numbers with commas between.",
+            f"Given: {words}.",
+            f"Give them as in {option} 10,20,30.",
+        )
     return values

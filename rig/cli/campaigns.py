@@ -49,7 +49,7 @@ def campaigns(
     ] = None,
     workers: WorkersOption = 1,
     scheduler: SchedulerOption = None,
-    most: Annotated[int, Option("--most", help="Rows of a table, the newest first.")] = 40,
+    most: Annotated[int, Option("--most", min=1, help="Rows of a table, the newest first.")] = 40,
     rebuild: Annotated[
         bool, Option("--rebuild", help="Read every log again into the index.")
     ] = False,

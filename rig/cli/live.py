@@ -110,7 +110,7 @@ def live(
         title=f"rig live: {settings.name}",
         channels=shown_channels(estimators, machine.shown),
         devices=tuple(settings.devices),
-        lever_m=lever_mm / 1e3 if lever_mm else settings.lever_arm_m,
+        lever_m=settings.lever_arm_m if lever_mm is None else lever_mm / 1e3,
         plain=plain,
         json=json_,
         half_widths=lambda: half_widths(estimators),
