@@ -113,7 +113,9 @@ class Campaign:
         """
         for name in reasons.keys() - set(self.names):
             raise CampaignError(
-                f"The campaign has no run {name!r}.", f"It has: {', '.join(self.names)}."
+                f"The campaign has no run {name!r}.",
+                f"It has: {', '.join(self.names)}.",
+                "Name one of these.",
             )
         return Campaign(
             tuple(replace(r, excluded=reasons.get(r.name, r.excluded)) for r in self.runs)

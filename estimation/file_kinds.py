@@ -22,6 +22,7 @@ CSV = "a table (CSV)"
 PARQUET = "a table (Parquet)"
 ARRAYS = "arrays (.npz)"
 ESTIMATOR = "an estimator (.npz)"
+UNKNOWN = "a file of an unknown kind"
 
 MAGIC = {
     b"\x89MCAP0\r\n": RECORDING,
@@ -62,7 +63,7 @@ def kind_of(content: bytes) -> str:
     try:
         text = content.decode("utf-8-sig").lstrip()
     except UnicodeDecodeError:
-        return "a file of an unknown kind"
+        return UNKNOWN
     return _kind_of_text(text)
 
 

@@ -32,6 +32,7 @@ from typing import Any, cast, get_args
 from estimation.channels import is_same
 from estimation.effects import effect
 from estimation.errors import EstimationError, UnknownNameError, nearest
+from estimation.file_kinds import UNKNOWN, kind_of
 from estimation.files import not_utf8, write_text_atomic
 from estimation.filters import LowPass
 from estimation.model import Estimate, Evidence, Model, ModelError, Term
@@ -108,7 +109,14 @@ def read_all(path: Path) -> list[Model]:
     try:
         text = place.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise ModelFileError(f"{path} is not a model file.", *not_utf8(error)) from error
+        kind = kind_of(error.object)
+        if kind == UNKNOWN:
+            raise ModelFileError(f"{path} is not a model file.", *not_utf8(error)) from error
+        raise ModelFileError(
+            f"{path} is {kind}, not a model file.",
+            "A model file is TOML and holds a declared or fitted model.",
+            "Fit one: rig fit LOGS --out FILE.toml.",
+        ) from error
     except OSError as error:
         raise ModelFileError(
             f"The model file {path} cannot be read.", str(error), f"Shipped: {', '.join(names())}."

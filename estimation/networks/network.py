@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from estimation.errors import EstimationError
+from estimation.file_kinds import ARRAYS, ESTIMATOR, kind_of
 from estimation.files import write_bytes_atomic
 from estimation.recording import FloatArray, read_only
 
@@ -147,8 +148,19 @@ def schema_of(path: Path) -> str:
 
 def _content(path: Path) -> tuple[dict[str, np.ndarray], str]:
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
-            arrays = {name: content[name] for name in content.files}
+        content = path.read_bytes()
+    except OSError as error:
+        raise NetworkError(
+            f"The file {path} cannot be read.", f"{error.strerror or error}.", "Check the path."
+        ) from error
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
     except Exception as error:  # a damaged archive raises one of many
-        raise NetworkError(f"The file {path} cannot be read.", str(error)) from error
+        kind = kind_of(content)
+        raise NetworkError(
+            f"The file {path} cannot be read as an estimator.",
+            "It is damaged." if kind in (ESTIMATOR, ARRAYS) else f"It is {kind}.",
+            "Name a file that rig fit or rig adapt wrote, .toml or .npz.",
+        ) from error
     return arrays, str(arrays.pop("schema", "none"))

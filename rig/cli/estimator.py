@@ -55,7 +55,10 @@ def compare(
 def adapt(
     source: Annotated[Path, Argument(help="Estimator of the source, from rig fit.")],
     path: Annotated[Path, Argument(help="Recordings of the other instrument.")],
-    runs: Annotated[str, Option(help="Runs to adapt with, such as 00,11.")] = "",
+    runs: Annotated[
+        str,
+        Option(help="Names of runs to adapt with, as of rig log info, such as bench-01,bench-07."),
+    ] = "",
     choose: Annotated[
         int, Option(min=1, help="Without --runs: how many, those nearest to all others.")
     ] = 1,
@@ -164,6 +167,11 @@ def export(
                 f"{model} has no equation {equation!r}.", nearest(equation, list(models))
             )
         estimator = ModelEstimator(models[equation])
+    elif equation is not None:
+        raise UsageError(
+            f"--equation {equation} cannot be used: {model} holds no equations.",
+            fix="Omit --equation, or name a model file (.toml).",
+        )
     if not isinstance(estimator, BankEstimator | NetworkEstimator | ModelEstimator):
         raise UsageError(
             f"{model} cannot be written as C.",

@@ -97,7 +97,10 @@ def runs_by_rule(source: Adaptable, campaign: Campaign, count: int) -> list[str]
     }
     if len(usable) <= count:
         raise UsageError(
-            f"{len(usable)} usable runs are there, too few to choose {count} and report on others."
+            f"{len(usable)} usable runs are there, too few to choose {count} and report on others.",
+            fix=f"Give --choose {len(usable) - 1} or less."
+            if len(usable) > 1
+            else "Record more runs of this instrument.",
         )
     names = list(usable)
     return [names[k] for k in spread_out(reduced(source, list(usable.values())), count)]
@@ -170,7 +173,9 @@ def _named(wanted: str, names: Sequence[str]) -> str:
     fitting = [name for name in names if name == wanted or name.endswith(f"/{wanted}")]
     if len(fitting) != 1:
         raise UsageError(
-            f"{wanted!r} names {len(fitting)} runs.", f"There are: {', '.join(names)}."
+            f"{wanted!r} names {len(fitting)} runs.",
+            f"There are: {', '.join(names)}.",
+            f"Give their whole names: --runs {','.join(names[:2])}.",
         )
     return fitting[0]
 

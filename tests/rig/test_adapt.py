@@ -144,11 +144,31 @@ def test_a_network_s_output_layer_moves_to_another_instrument(folders, tmp_path,
 
 
 def test_what_adapt_cannot_do_is_reported(folders, states, tmp_path, said):
-    assert "names 0 runs" in said("adapt", states, folders[1], "--runs 77", code=2).err
+    refused = said("adapt", states, folders[1], "--runs 77", code=2).err
+    assert "names 0 runs" in refused
+    assert "fix: Give their whole names: --runs 00,01." in refused
+    most = len(list(folders[1].iterdir())) - 1
+    refused = said("adapt", states, folders[1], "--choose 30", code=2).err
+    assert f"fix: Give --choose {most} or less." in refused
     line = tmp_path / "line.toml"
     said("fit", folders[0], "--model linear --out", line)
     assert "cannot be adapted" in said("adapt", line, folders[1], "--runs 01", code=2).err
     said("fit", folders[0], "--model states --surrogate jaw_angle_rad", code=2)
+
+
+def test_what_is_no_model_is_named_by_its_kind(states, tmp_path, said):
+    notes, header = tmp_path / "notes.txt", tmp_path / "grip.h"
+    notes.write_text("Bench 3.\n")
+    refused = said("export", notes, "--out", header, code=5).err
+    assert "It is a text file." in refused
+    assert "fix: Name a file that rig fit or rig adapt wrote" in refused
+    assert "pickle" not in refused
+    refused = said("export", states, "--out", header, "--equation grip", code=2).err
+    assert "--equation grip cannot be used" in refused
+    assert not header.exists()
+    refused = said("record --sim -p still --out", tmp_path / "logs", "-m", states, code=5).err
+    assert "is an estimator (.npz), not a model file." in refused
+    assert "fix: Fit one: rig fit LOGS --out FILE.toml." in refused
 
 
 def test_export_writes_a_header(states, tmp_path, said):

@@ -79,7 +79,9 @@ def test_a_damaged_run_stops_a_command_unless_it_is_asked_to_skip_it(
     err = said(words, folder, "--skip-bad").err
     assert "Run 003 does not count:" in err
     assert "003.TXT" in err
-    assert "has no run '004'" in said(words, folder, "--skip-bad --exclude 004", code=5).err
+    refused = said(words, folder, "--skip-bad --exclude 004", code=5).err
+    assert "has no run '004'" in refused
+    assert "fix: Name one of these." in refused
     assert "Run 002 does not count" in said(words, folder, "--skip-bad --exclude 002").err
 
 
