@@ -5,13 +5,20 @@ tables and of logs. Samples that are flagged do not count. Nothing is corrected 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 
+from estimation.campaign import Campaign
 from estimation.channels import unit_of
 from estimation.copies import copies
+from estimation.errors import EstimationError
+from estimation.fitting import fit
+from estimation.opposed import opposed
 from estimation.plant import Plant
+from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
+from estimation.turned import turned_runs
 from estimation.zeros import moved_zeros
 from rig.importers.apart import in_another_unit, of_another_sign
 from rig.importers.clock import implausible_clocks
@@ -35,7 +42,8 @@ The sizes are those of machines that fit a room: 32 turns of a shaft, 20000 revo
 
 MOST_LONE, FAR_OUT = 3, 10.0
 """Most values that are far beyond all others together, and how many times as far from the median
-as any other value they are. A value may be that of many samples, such as -9999 of no reading."""
+as any other value they are, or as large as any in other runs. A value may be that of many samples,
+such as -9999 of no reading."""
 
 COLDEST_K, HOTTEST_K = 200.0, 600.0
 
@@ -46,7 +54,7 @@ CLIPPED = 0.005
 """Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
 
 MOST_NAMED = 6
-"""Most runs of a clipped channel that are named."""
+"""Most runs that a question about a channel names."""
 
 WHOLE = 0.75
 """Share of its range that no position crosses between two samples while it moves."""
@@ -91,6 +99,19 @@ def of_runs(recordings: Sequence[Recording]) -> Iterator[str]:
     yield from (zero.sentence for zero in moved_zeros(recordings))
 
 
+def of_equations(recordings: Sequence[Recording], plant: Plant) -> Iterator[str]:
+    """Yield the runs in which a channel of a machine's equation has the opposite sign.
+
+    A preview asks so; the commands that fit the equations do so themselves.
+    """
+    campaign = Campaign.of(recordings)
+    for model in declared(plant):
+        with suppress(EstimationError):
+            fitted = fit(model, campaign, bootstrap=0)
+            if not opposed(fitted, campaign):
+                yield from turned_runs(fitted, campaign)
+
+
 def travels(plant: Plant) -> dict[str, float]:
     """Return the size above which each position is unusual: that of the slowest axis, geared up."""
     sizes = {axis.name: PLAUSIBLE[axis.unit][0] for axis in plant.axes}
@@ -117,13 +138,13 @@ def of_channel(name: str, recordings: Sequence[Recording], travel: float = 0.0) 
         parts = [np.where(np.isin(part, lone), np.nan, part) for part in parts]
         values = np.concatenate([part[np.isfinite(part)] for part in parts])
     least, greatest = float(values.min()), float(values.max())
-    wrong += _implausible(unit, least, greatest, travel)
+    runs = dict(zip((r.name for r in recordings if name in r), parts, strict=True))
+    wrong += _implausible(unit, runs, least, greatest, travel)
     if least == greatest:
         if COMMAND.search(name):
             return wrong
         return [*wrong, f"it is constant at {with_unit(least, unit)}; is the sensor connected?"]
-    names = [r.name for r in recordings if name in r]
-    wrong += _clipped(dict(zip(names, parts, strict=True)), least, greatest, unit)
+    wrong += _clipped(runs, least, greatest, unit)
     if unit in ("rad", "m"):
         wrong += _wrapped(parts, least, greatest, unit)
     return wrong
@@ -191,7 +212,9 @@ def _outlier(
     )
 
 
-def _implausible(unit: str, least: float, greatest: float, travel: float) -> Iterator[str]:
+def _implausible(
+    unit: str, runs: Mapping[str, FloatArray], least: float, greatest: float, travel: float
+) -> Iterator[str]:
     if unit == "K":
         if least < COLDEST_K or greatest > HOTTEST_K:
             yield f"{least:g} to {greatest:g} K is unusual; is the column in degC?"
@@ -200,7 +223,31 @@ def _implausible(unit: str, least: float, greatest: float, travel: float) -> Ite
         size = max(abs(least), abs(greatest))
         if size > max(limit, travel):
             turns = f", {size / (2 * np.pi):.0f} turns," if unit == "rad" else ""
-            yield f"{with_unit(size, unit)}{turns} is unusually large; is the column in {instead}?"
+            large = f"{with_unit(size, unit)}{turns} is unusually large"
+            if apart := _far_larger(runs, max(limit, travel)):
+                yield (
+                    f"{large} in {_listed(apart)}, and the other runs are not; is the column in"
+                    f" {instead} there? A unit of [data] is that of all files: correct these"
+                    " files, or import them by themselves with a unit of their own."
+                )
+            else:
+                yield f"{large}; is the column in {instead}?"
+
+
+def _far_larger(runs: Mapping[str, FloatArray], limit: float) -> list[str]:
+    """Return the runs beyond a limit, if all others are far smaller than each; none without any."""
+    sizes = {n: float(np.abs(x[np.isfinite(x)]).max(initial=0.0)) for n, x in runs.items()}
+    apart = [name for name, size in sizes.items() if size > limit]
+    rest = [size for name, size in sizes.items() if name not in apart]
+    is_far = bool(rest) and min(sizes[name] for name in apart) > FAR_OUT * max(rest)
+    return apart if is_far else []
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return the names of runs, of many the first ones."""
+    shown = ", ".join(names[:MOST_NAMED])
+    more = len(names) - MOST_NAMED
+    return shown if more <= 0 else f"{shown} and {counted(more, 'other run')}"
 
 
 def _clipped(
@@ -219,10 +266,7 @@ def _clipped(
         share = sum(held.values()) / len(values)
         if share > CLIPPED:
             places = [name for name, count in held.items() if count]
-            shown = ", ".join(places[:MOST_NAMED])
-            if len(places) > MOST_NAMED:
-                shown += f" and {counted(len(places) - MOST_NAMED, 'other run')}"
-            where = f" in {shown}" if len(places) < len(runs) else ""
+            where = f" in {_listed(places)}" if len(places) < len(runs) else ""
             yield (
                 f"{100 * share:.1f} % of the samples are held at the {word} value,"
                 f" {with_unit(end, unit)}{where}; is it clipped?"

@@ -13,7 +13,7 @@ from estimation.channels import unit_of
 from estimation.plant import Plant
 from estimation.recording import FloatArray, Recording
 from rig.importers.derivatives import fault, pairs
-from rig.importers.questions import of_channel, of_runs, travels
+from rig.importers.questions import of_channel, of_equations, of_runs, travels
 from rig.importers.table.raw import Remark
 from rig.output.table import counted
 
@@ -100,7 +100,7 @@ def preview(
     """Return a look at the runs of a table, at least one, and at the first rows of the first run.
 
     The runs are not yet checked against their derivatives; `remarks` is what reading them remarked.
-    The machine, if known, states what is in front of a gear.
+    The machine, if known, states what is in front of a gear, and the equations of the channels.
     """
     names = list(dict.fromkeys(name for r in recordings for name in r.columns))
     limits = {} if plant is None else travels(plant)
@@ -109,11 +109,12 @@ def preview(
     together = [
         (r.name, wrong) for r in recordings for pair in pairs(r) if (wrong := fault(r, *pair))
     ]
+    signs = () if plant is None else of_equations(recordings, plant)
     return Preview(
         tuple(_run(recording) for recording in recordings),
         tuple(_channel(name, recordings, limits.get(name, 0.0)) for name in names),
         shown,
-        (*_grouped(together, "runs"), *of_runs(recordings)),
+        (*_grouped(together, "runs"), *of_runs(recordings), *signs),
         tuple(_grouped(remarks, "files")),
     )
 

@@ -15,6 +15,7 @@ from rig.importers.registry import left_out, open_campaign
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import open_table, read_runs
 from rig.importers.table.preview import preview
+from tests.estimation.causes.synthetic import HOIST, hoisted
 from tests.rig.importers.conftest import text_table
 
 TIME = np.arange(0, 8, 0.01)
@@ -166,6 +167,35 @@ def test_the_travel_of_a_motor_counts_behind_its_gear(tmp_path, said, size, is_a
     assert ("is unusually large" in shown) == is_asked
     asked = questions_of(list(read_runs(path, read_mapping(file, []), [])), parse(SCREW))
     assert bool(asked) == is_asked
+
+
+@pytest.mark.parametrize("turned", [(), (6, 9)])
+def test_a_channel_of_the_other_sign_in_some_runs_is_named_by_the_equation(tmp_path, said, turned):
+    """As `rig machine check` does; of a weight, the correlation of two channels shows no sign."""
+    for k, run in enumerate(hoisted()):
+        force = -run["rope_force_n"] if k in turned else run["rope_force_n"]
+        columns = {**run.columns, "rope_force_n": force}
+        text_table(tmp_path / f"{run.name}.csv", {"time_s": run.time_s, **columns})
+    file = tmp_path / "hoist.toml"
+    file.write_text(f"{HOIST}\n[data]\n")
+    asked = "rope_force_n is about -1 times what the other runs predict for it in 06, 09; is its"
+    shown = said("import", tmp_path, "--machine", file, "--preview")
+    assert (asked in shown.err) == bool(turned)
+    assert ("Nothing looks wrong" in shown.out) != bool(turned)
+    checked = " ".join(said("machine check", file, tmp_path).out.split())
+    assert (asked in checked) == bool(turned)
+
+
+def test_a_file_in_another_unit_is_named_where_the_others_are_right(tmp_path):
+    """A third of the runs: the usual size is not known, but that of these cannot be."""
+    for number in range(6):
+        unit = 1000.0 if number in (1, 4) else 1.0
+        columns = {"time_s": TIME, "motor_current_a": (0.8 + number) * unit * WAVE}
+        text_table(tmp_path / f"run{number}.csv", columns)
+    found = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    (large,) = (one for one in found if "unusually large" in one)
+    assert "is unusually large in run1, run4, and the other runs are not" in large
+    assert "milliamperes or counts there? A unit of [data] is that of all files" in large
 
 
 def test_a_run_whose_zero_moved_is_asked_about(tmp_path):
