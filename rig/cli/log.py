@@ -31,7 +31,8 @@ OneLog = Annotated[Path, Argument(help="A log.")]
 def info(path: AnyRecording, json: JsonFlag = False) -> None:
     """Show what a log lost, then run, conditions, streams, rates, marks and attachments.
 
-    Of recordings of another format: a line for each run.
+    Of recordings of another format: a line for each run. Exit code 0 of a damaged log, too, which
+    is described as far as it can be read; rig log check ends with 1 or 5.
     """
     from rig.log.check import logs_in
     from rig.log.reader import read_log
@@ -122,12 +123,17 @@ def repair(
         Path | None, Option(help="File to write; NAME.repaired.mcap by default.")
     ] = None,
     json: JsonFlag = False,
-) -> None:
-    """Write the readable part of a damaged log to a new file; the original is not changed."""
+) -> int:
+    """Write the readable part of a damaged log to a new file; the original is not changed.
+
+    Exit code 5 where no sample is readable: the new file has what is known of the run alone.
+    """
     from rig.log.repair import repair_log
 
     report = repair_log(path, out)
     present(json, report, *_repair_lines(report))
+    is_empty = report.repaired is not None and not any(report.recovered.values())
+    return ExitCode.DATA if is_empty else ExitCode.OK
 
 
 log_app.command()(export)
@@ -257,7 +263,13 @@ def _repair_lines(report: "RepairReport") -> Iterator[str]:
     if report.repaired is None:
         yield f"{report.original} is not damaged; nothing was written."
         return
-    yield f"wrote {report.repaired}, and read it back equal"
+    if any(report.recovered.values()):
+        yield f"wrote {report.repaired}, and read it back equal"
+    else:
+        yield (
+            f"No sample of {report.original} is readable. {report.repaired} has what is known of"
+            " the run, and no sample. Record the run again."
+        )
     for topic, count in report.recovered.items():
         unproven = report.salvaged.get(topic, 0)
         note = f", {unproven} of them from the torn end, without a checksum" if unproven else ""

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rig.cli.main import main
 from rig.errors import DataError, ExitCode, UsageError
 from rig.log.check import Verdict, check_log
 from rig.log.reader import DamagedLogError, read_log
@@ -141,6 +142,16 @@ def test_a_log_that_lost_its_streams_cannot_be_repaired(log):
     with pytest.raises(RepairError):
         repair_log(log)
     assert check_log(log).verdict is Verdict.DAMAGED
+
+
+def test_a_log_without_a_readable_sample_is_no_success(tmp_path, capsys):
+    path = write_numbered(tmp_path / "a.mcap", range(100))
+    data = path.read_bytes()
+    path.write_bytes(data[: data.find(b"\x04\0\0\0zstd") + 60])
+    assert main(["log", "repair", str(path)]) == ExitCode.DATA
+    assert f"No sample of {path} is readable." in " ".join(capsys.readouterr().out.split())
+    assert main(["log", "info", str(path)]) == ExitCode.OK
+    assert main(["log", "check", str(path)]) == ExitCode.DATA
 
 
 def test_whole_messages_of_a_torn_chunk_are_salvaged(tmp_path):
