@@ -89,7 +89,7 @@ def import_(
     """
     from rig.importers.table.channels import NotMappedError
     from rig.importers.table.mapping import read_mapping
-    from rig.importers.table.open import read_runs, require_runs
+    from rig.importers.table.open import read_largest, read_runs, require_runs
     from rig.importers.table.preview import preview as look
     from rig.importers.table.raw import Remark
     from rig.machines.shipped import place_of
@@ -105,10 +105,10 @@ def import_(
     said: list[Remark] = []
     try:
         recordings = list(read_runs(path, mapping, said, asks=preview))
-    except NotMappedError as error:
+    except NotMappedError:
         if not preview:
             raise
-        present_columns(error.raw, path, json)
+        present_columns(read_largest(path, mapping), path, json)
         return
     require_runs(recordings, path, mapping)
     found = look(recordings, said, None if machine is None else _plant_of(machine))

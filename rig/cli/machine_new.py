@@ -114,19 +114,17 @@ def data_text(table: Path, plant: Plant) -> str:
     """Return `[data]` for a table: a line for each channel, and the table's columns as remarks."""
     from rig.importers.table.data import Data
     from rig.importers.table.mapping import ColumnMapping
-    from rig.importers.table.open import files_at, read_raw
+    from rig.importers.table.open import read_largest
 
-    mapping = ColumnMapping(Data())
-    first = files_at(table, mapping)[0]
-    raw = read_raw(first, mapping)
+    raw = read_largest(table, ColumnMapping(Data()))
     channels = [*(a.name for a in plant.actuators), *(s.name for s in plant.sensors)]
-    lines = ["", f"# Columns of {table.name}, with the first sample:"]
+    lines = ["", f"# Columns of {raw.path.name}, with the first sample:"]
     lines += [f"#   {_line(name, x[0])}" for name, x in raw.columns.items() if len(x)]
     lines += [f"# Single value {_line(name, value)}" for name, value in raw.fields.items()]
     lines += [f"# Remark: {remark}." for remark in raw.remarks]
     lines += [
         "[data]",
-        f'# files = "*{first.suffix}"  # of a folder',
+        f'# files = "*{raw.path.suffix}"  # of a folder',
         FILE_NAME,
         "",
         "[data.columns]",

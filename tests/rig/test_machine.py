@@ -391,6 +391,20 @@ def test_a_new_file_suggests_the_ending_of_the_data(tmp_path, said):
     assert '# files = "*.jsonl"' in out.read_text()
 
 
+def test_the_columns_of_the_data_are_shown_and_not_those_of_a_side_table(tmp_path, said):
+    folder, out = tmp_path / "runs", tmp_path / "m.toml"
+    folder.mkdir()
+    (folder / "conditions.csv").write_text("file;load [kg]\nrun_1.csv;0\nrun_2.csv;8\n")
+    for name in ("run_1", "run_2"):
+        rows = "".join(f"{k / 100};{k % 7}\n" for k in range(200))
+        (folder / f"{name}.csv").write_text(f"Zeit [s];Weg [mm]\n{rows}")
+    said("machine new", out, "--axis a:m --sensor a:a_position_m --from", folder)
+    assert "# Columns of run_1.csv, with the first sample:\n#   Zeit [s]: 0" in out.read_text()
+    printed = said("import", folder, "--preview").out
+    assert "Columns of run_1.csv" in printed
+    assert "Weg [mm]" in printed
+
+
 @pytest.mark.parametrize("both", [True, False])
 def test_a_transmission_bends_where_both_its_travels_are_read(tmp_path, said, both):
     words = "--axis motor:rad --axis slide:m --transmission motor:slide:200"

@@ -189,6 +189,11 @@ def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:
     return sorted(found, key=lambda file: by_number(str(file.relative_to(path))))
 
 
+def read_largest(path: Path, mapping: ColumnMapping) -> Raw:
+    """Read the largest file of a table: that of a folder which has samples, not a side table."""
+    return read_raw(max(files_at(path, mapping), key=lambda file: file.stat().st_size), mapping)
+
+
 def read_raw(file: Path, mapping: ColumnMapping) -> Raw:
     """Read one file: its columns, and single values from it, its name and the side file.
 
