@@ -24,7 +24,7 @@ class GainBySide(Pointwise):
     balances: ClassVar = {"grasp": -1}
     roles: ClassVar = {"current": "motor_current_a"}
     amplitudes = (
-        Parameter("asymmetry", "target / current", "half the gain of closing minus opening"),
+        Parameter("asymmetry", "target / current", "half the gain of current > 0 less current < 0"),
     )
     told_apart_by = "stall at the same current of both signs"
 

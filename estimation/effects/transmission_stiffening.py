@@ -48,7 +48,7 @@ class AsymmetricStiffness(Stiffening):
     meaning = "a transmission that deflects more in one direction of load than in the other"
     balances: ClassVar = {"gearbox": 1, "stretch": -1}
     amplitudes = (
-        Parameter("asymmetry", "target / load", "half the compliance of closing minus opening"),
+        Parameter("asymmetry", "target / load", "half the compliance of load > 0 less load < 0"),
     )
     shape = ()
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from estimation.changes.difference import Change, Difference
 from rig.output.table import TextTable
-from rig.reports.diagnosis_words import confidence, wave
+from rig.reports.diagnosis_words import confidence, label, wave
 
 PLAIN = {"came": "new effect", "went": "effect that is gone", "moved": "changed parameter"}
 """How something changed, as in the JSON, to the words of a sentence."""
@@ -38,7 +38,8 @@ def _sentence(change: Change) -> str:
 def _size(change: Change, name: str) -> str:
     value, unit, before = change.parameters[name], change.unit[name], change.before[name]
     low, high = change.ci95[name]
-    text = f"{name} {value:+.4g} {unit} ({low:+.4g} to {high:+.4g})".replace(" 1 (", " (")
+    named = label(change.family, name)
+    text = f"{named} {value:+.4g} {unit} ({low:+.4g} to {high:+.4g})".replace(" 1 (", " (")
     return text if before is None else f"{text} from {before:.4g}"
 
 
@@ -50,7 +51,8 @@ def change_table(found: Difference) -> TextTable:
             low, high = change.ci95[name]
             known, interval = change.before[name], f"{low:+.4g} to {high:+.4g}"
             before = "-" if known is None else f"{known:.4g}"
-            rows.append((change.name, name, before, f"{value:+.4g}", interval, change.unit[name]))
+            named, unit = label(change.family, name), change.unit[name]
+            rows.append((change.name, named, before, f"{value:+.4g}", interval, unit))
     heads = ("change", "parameter", "in A", "A to B", "95 %", "unit")
     return TextTable("What changed", heads, rows)
 

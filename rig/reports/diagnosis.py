@@ -179,7 +179,11 @@ def error_table(diagnosis: Diagnosis) -> TextTable:
 def parameter_table(findings: Sequence[Finding]) -> TextTable | None:
     """Return the parameters of the findings with their intervals; None where there are none."""
     rows = [
-        [f"{finding.balance}, {finding.family}, {name}", *_with_interval(known)]
+        [
+            f"{finding.balance}, {finding.family},"
+            f" {words.label(finding.form or finding.family, name)}",
+            *_with_interval(known),
+        ]
         for finding in findings
         for name, known in words.with_period(finding).items()
     ]

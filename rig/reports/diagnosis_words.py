@@ -165,11 +165,20 @@ def sizes_of(finding: Finding) -> dict[str, str]:
             size = _measured(math.hypot(sine.value, cosine.value), sine.unit)
             sizes[f"amplitude{harmonic}"] = size
     for name, known in left.items():
-        sizes[name] = _measured(known.value, known.unit)
+        sizes[label(finding.form or finding.family, name)] = _measured(known.value, known.unit)
     if "order" in left:
         del sizes["order"]
         sizes |= wave(left["order"].value, finding.depends_on)
     return sizes
+
+
+def label(effect: str, name: str) -> str:
+    """Return the name of a parameter of an effect; of one that is half of a size, with that."""
+    known = catalogue().get(effect)
+    for parameter in (*known.amplitudes, *known.shape) if known else ():
+        if parameter.name == name and parameter.description.startswith("half the "):
+            return f"{name} ({parameter.description})"
+    return name
 
 
 def confidence(share: float) -> str:

@@ -6,7 +6,7 @@ from estimation.cross_validation import HeldOutError
 from estimation.effects import Parameter
 from estimation.model import Estimate, Model
 from rig.output.table import TextTable, counted
-from rig.reports.diagnosis_words import display, in_unit
+from rig.reports.diagnosis_words import display, in_unit, label
 
 
 def parameter_table(model: Model) -> TextTable:
@@ -17,7 +17,7 @@ def parameter_table(model: Model) -> TextTable:
             known = term.values[parameter.name]
             unit = term.unit(parameter, model.target)
             sign = "+" if term.sign == 1 else "-"
-            name = f"{term.effect.id}, {parameter.name}"
+            name = f"{term.effect.id}, {label(term.effect.id, parameter.name)}"
             interval = _interval(known, parameter)
             rows.append([name, sign, f"{known.value:.4g}", interval, unit])
     evidence = model.evidence

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from estimation.causes.isolability import Isolable
+from estimation.changes.difference import Change, Difference
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.split import Sealed
 from estimation.effects import catalogue
@@ -21,6 +22,7 @@ from rig.log.convert import write_recording
 from rig.output import figures
 from rig.output.provenance import Provenance, commit
 from rig.output.table import TextTable, to_markdown, to_rich
+from rig.reports import changes
 from rig.reports.diagnosis import card, parameter_table
 from rig.reports.diagnosis_words import check_of, meaning, meaning_of, sentences, sizes_of
 from rig.reports.fit import parameter_table as fitted_table
@@ -129,6 +131,44 @@ def test_sizes_are_those_of_the_wave_and_in_readable_units(along, repeats):
     )
     assert sizes_of(finding) == {"amplitude": "5 mN m", "time": "0.25 s"} | repeats
     assert "lead of the screw, the pitch of the belt" in check_of(finding)
+
+
+@pytest.mark.parametrize("form", ["", "transmission.backlash.play"])
+def test_a_parameter_that_is_half_of_a_size_is_labelled_so(form):
+    """Wherever it is printed: a part may be ordered by it."""
+    named = "gap (half the free travel)"
+    finding = Finding(
+        balance="tendon",
+        error_of="tendon",
+        family="transmission.backlash",
+        form=form,
+        verdict="identified",
+        parameters={
+            "gap": Value(2.5e-3, "rad", (2.4e-3, 2.6e-3)),
+            "width": Value(0.1, "N m", None),
+        },
+    )
+    assert sizes_of(finding) == {named: "0.0025 rad", "width": "100 mN m"}
+    assert parameter_table([finding]).rows[0][0] == f"tendon, transmission.backlash, {named}"
+    play = {"gap": 2.5e-3}
+    change = Change(
+        verdict="came",
+        how="came",
+        name="transmission.backlash at gearbox",
+        equation="gearbox",
+        family="transmission.backlash",
+        alternatives=(),
+        confidence=0.99,
+        parameters=play,
+        ci95={"gap": (2.4e-3, 2.6e-3)},
+        unit={"gap": "rad"},
+        before={"gap": None},
+        shape={},
+        depends_on=(),
+    )
+    found = Difference((change,), {})
+    assert f"{named} +0.0025 rad" in next(changes.lines(found))
+    assert changes.change_table(found).rows[0][1] == named
 
 
 def test_the_page_has_the_period_of_a_wave_along_a_travel():
