@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.campaign import Campaign
-from estimation.derived import CAMPAIGN_TIME
+from estimation.derived import CAMPAIGN_TIME, measured_channels
 from estimation.effects import Parameter
 from estimation.errors import EstimationError
 from estimation.model import Model, Term, balance_channels, settled
+from estimation.noise import white_noise
 from estimation.recording import FloatArray, Recording
 from estimation.within_bounds import solve_within
 
@@ -125,6 +126,25 @@ def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list
             else "Look at why samples are flagged: rig import DATA --machine FILE --preview.",
         )
     return runs
+
+
+def noisier(model: Model, campaign: Campaign, runs: Sequence[FitRun]) -> list[FitRun]:
+    """Return prepared runs once more, with each reading's noise added to it a second time.
+
+    The readings are those of the columns, and the samples are the same. How the amplitudes move is
+    how far the noise that is there has moved them (Cook and Stefanski 1994, simulation
+    extrapolation).
+    """
+    places, out = {run.whole.name: run.places for run in runs}, []
+    timed = campaign.timed() if CAMPAIGN_TIME in model.channels else campaign
+    for recording in timed.evidence:
+        if recording.name in places:
+            read = [c for c in measured_channels(model.channels, model.signals) if c in recording]
+            noise = white_noise(recording, read, model.signals)
+            doubled = recording.with_columns(**{c: recording[c] + noise[c] for c in read})
+            whole, at = balance_channels(model, doubled), places[recording.name]
+            out.append(FitRun(whole, at, whole.at(at)))
+    return out
 
 
 def problem_of(model: Model, runs: list[FitRun]) -> Problem:

@@ -12,7 +12,15 @@ from typing import Literal
 import numpy as np
 
 from estimation.campaign import Campaign
-from estimation.fit_problem import FitRun, Problem, check_target, prepared, problem_of, solve
+from estimation.fit_problem import (
+    FitRun,
+    Problem,
+    check_target,
+    noisier,
+    prepared,
+    problem_of,
+    solve,
+)
 from estimation.model import Estimate, Evidence, Model, estimate, with_values
 from estimation.recording import FloatArray
 from estimation.shape_search import range_of, scaled, search_shape, unscaled
@@ -47,8 +55,9 @@ def fit(
 
     Returns:
         The model with values, spreads and evidence. Spreads are to first order in all parameters,
-        shapes too. A parameter at its bound, or fitted on so few runs that resamplings often lack
-        them, has no spread.
+        shapes too. An interval is that of the spread and reaches to the value that readings without
+        noise would give, by as much as their noise a second time moves it. A parameter at its
+        bound, or fitted on so few runs that resamplings often lack them, has no spread.
 
     Raises:
         FitError: No valid sample, a target that is constant, or columns that are collinear on these
@@ -64,8 +73,21 @@ def fit(
     grams = [problem.gram(run, shape) for run in problem.runs]
     amplitudes = solve(problem, np.sum(grams, axis=0))
     spreads = _bootstrap(problem, amplitudes, shape, bootstrap, seed)
-    fitted = _with_numbers(problem, amplitudes, shape, spreads)
+    drawn = None if spreads is None else _drawn(problem, campaign, amplitudes, shape)
+    fitted = _with_numbers(problem, amplitudes, shape, spreads, drawn)
     return replace(fitted, evidence=_evidence(fitted, problem.runs, seed))
+
+
+def _drawn(
+    problem: Problem, campaign: Campaign, free: FloatArray, shape: Sequence[float]
+) -> FloatArray:
+    """Return by how much the readings' noise has drawn the free amplitudes, shapes as they are.
+
+    A reading with noise has too small an amplitude, and the others make up for it (Fuller,
+    "Measurement error models", 1987). Least squares predicts best so, from readings as noisy.
+    """
+    noisy = replace(problem, runs=noisier(problem.model, campaign, problem.runs), kept={})
+    return solve(noisy, np.sum([noisy.gram(run, shape) for run in noisy.runs], axis=0)) - free
 
 
 def _mean_offset(problem: Problem, shape: Sequence[float], free: FloatArray) -> float:
@@ -148,14 +170,25 @@ def _slopes(problem: Problem, run: FitRun, shape: list[float], free: FloatArray)
 
 
 def _with_numbers(
-    problem: Problem, free: FloatArray, shape: list[float], spreads: FloatArray | None
+    problem: Problem,
+    free: FloatArray,
+    shape: list[float],
+    spreads: FloatArray | None,
+    drawn: FloatArray | None,
 ) -> Model:
     """Return the model with its numbers in place, without evidence."""
     amplitudes = np.full(len(problem.names), _mean_offset(problem, shape, free))
     amplitudes[problem.free] = free
     place = np.full(len(problem.names), -1)  # the offset is the bootstrap's last column
     place[problem.free] = np.arange(len(free))
-    sizes = iter([_estimate(x, spreads, k) for x, k in zip(amplitudes, place, strict=True)])
+    by_noise = np.append(np.zeros(len(free)) if drawn is None else drawn, 0.0)
+    low, high = np.append(problem.lower, -np.inf), np.append(problem.upper, np.inf)
+    sizes = iter(
+        [
+            _estimate(x, spreads, k, (float(low[k]), float(high[k])), float(by_noise[k]))
+            for x, k in zip(amplitudes, place, strict=True)
+        ]
+    )
     shapes = iter([_estimate(x, spreads, k) for k, x in enumerate(shape, start=len(free))])
     values = [
         {p.name: next(sizes) for p in term.effect.amplitudes}
@@ -165,13 +198,21 @@ def _with_numbers(
     return with_values(problem.model, values)
 
 
-def _estimate(value: float, spreads: FloatArray | None, column: int) -> Estimate:
+def _estimate(
+    value: float,
+    spreads: FloatArray | None,
+    column: int,
+    bounds: tuple[float, float] = (-np.inf, np.inf),
+    drawn: float = 0.0,
+) -> Estimate:
     if spreads is None:
         return Estimate(float(value))
     replicates = spreads[np.isfinite(spreads[:, column]), column]
     if len(replicates) < IN_INTERVAL * len(spreads):  # the others may have any value
         return Estimate(float(value))
-    return Estimate(float(value), float(replicates.std(ddof=1)), interval95(value, replicates))
+    low, high = interval95(value, replicates)
+    reached = max(bounds[0], min(low, low - drawn)), min(bounds[1], max(high, high - drawn))
+    return Estimate(float(value), float(replicates.std(ddof=1)), reached)
 
 
 def interval95(value: float, replicates: FloatArray) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from estimation.causes.scoring import Scored, posterior
 from estimation.causes.sources import LATE, Source
 from estimation.causes.unsteady import Unsteady
 from estimation.diagnosis.result import Finding, Value
-from estimation.effects import Proportional
+from estimation.effects import Parameter, Proportional
 from estimation.model import Model, Term
 
 SURE = 0.9
@@ -61,13 +61,15 @@ class Probability:
 class Kept:
     """A cause that the test runs confirmed, with the families and all candidates in its place.
 
-    They are given the other causes, best first. The part is what it adds to its home equation.
+    They are given the other causes, best first. The part is what it adds to its home equation,
+    `shown` what it adds to that whose error is stated.
     """
 
     scored: Scored
     likely: Sequence[Probability]
     ranked: Sequence[Scored]
     part: Addition | None = None
+    shown: Addition | None = None
 
 
 def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
@@ -176,17 +178,50 @@ def _amplitudes_and_shape(
         acting = [run for run in refits.layout.runs if run.name in finding.runs_affected]
         return {"change": Value(cause.change(amplitude, acting), unit, None)}
     if (term := written_term(kept, model)) is not None:
+        share = 1.0 if cause.place.kind == "angle sensor" else cause.passed(refits.layout.runs)
         return {
-            p.name: Value(known.value, term.unit(p, model.target), known.ci95)
+            p.name: _unfiltered(
+                term, p, model.target, share if p in term.effect.amplitudes else 1.0
+            )
             for p in term.parameters
-            for known in [term.values[p.name]]
         }
     units = Term(cause.effect, channels=dict(cause.channels))
     shape = {
         p.name: Value(float(x), units.unit(p, model.target), None)
         for p, x in zip(cause.effect.shape, cause.shape, strict=True)
     }
+    if elsewhere := _elsewhere(kept, finding, refits):
+        return {**elsewhere, **shape}
     return {**_refitted(kept, home, refits), **shape}
+
+
+def _unfiltered(term: Term, parameter: Parameter, target: str, share: float) -> Value:
+    """Return a parameter as it was before the channels' filter passed a share of it."""
+    known, unit = term.values[parameter.name], term.unit(parameter, target)
+    if known.ci95 is None:
+        return Value(known.value / share, unit, None)
+    low, high = known.ci95
+    return Value(known.value / share, unit, (low / share, high / share))
+
+
+def _elsewhere(kept: Kept, finding: Finding, refits: Refits) -> Mapping[str, Value]:
+    """Return the amplitudes of a sensor's error from the equation whose error it lowers most.
+
+    In its home equation they are not identified: crosstalk of the current is a larger constant of
+    the drive. They are in the unit of the sensor.
+    """
+    cause, name, part = kept.scored.candidate.cause, finding.error_of, kept.shown
+    if isinstance(cause, Function) or part is None or part.term is None or name == finding.balance:
+        return {}
+    gains = [abs(e.gain) for e in cause.place.enters if e.equation == name and not e.order]
+    if cause.place.kind != "torque sensor" or not gains or not sum(gains):
+        return {}
+    values = refits.of[name].amplitudes(part, refits.parts[name]) / sum(gains)
+    target = cause.place.name.removeprefix("sensor ")
+    return {
+        p.name: Value(float(x), part.term.unit(p, target), None)
+        for p, x in zip(part.term.effect.amplitudes, values, strict=True)
+    }
 
 
 def written_term(kept: Kept, model: Model) -> Term | None:

@@ -60,7 +60,12 @@ OF_KIND: Mapping[str, tuple[str, ...]] = {
         "sensor.crosstalk",
         "change.step.offset",
     ),
-    "angle sensor": ("sensor.encoder_inl", "sensor.delay", "sensor.lag"),
+    "angle sensor": (
+        "sensor.encoder_inl",
+        "sensor.delay",
+        "sensor.lag",
+        "change.step.offset",
+    ),
 }
 """Kind of a place to the effects that act there; at a loss all others act but some."""
 

@@ -150,6 +150,22 @@ class Source:
         found = _worked_out(self, self._names(run, self.place.home), run, "")
         return None if found is None else found[:, list(self.parts)]
 
+    def passed(self, runs: Sequence[RunSignals]) -> float:
+        """Return the share of a wave that the channels' filter passes; 1 of another effect."""
+        if not self.is_wave:
+            return 1.0
+        order = dict(zip((p.name for p in self.effect.shape), self.shape, strict=True))["order"]
+        after = before = 0.0
+        for run in runs:
+            if (filtered := self.values(run)) is None:
+                return 1.0
+            gain = _passed(run, dict(self.channels)[self.turning], order)
+            gain = gain[run.grid] if self.on_grid else gain
+            power = np.sum(filtered**2, axis=1)
+            after += float(np.sum(power / gain))
+            before += float(np.sum(power / gain**2))
+        return after / before if before > 0.0 else 1.0
+
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray] | None:
         """Return the source's columns in every equation it enters, at the samples each counts."""
         made: dict[str, FloatArray] = {}

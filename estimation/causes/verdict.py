@@ -206,8 +206,10 @@ def _judged(
     judged, notes = [], list[str]()
     for k in sorted(opened):
         one = opened[k]
-        part = settled[id(one.parts[one.finding.balance])]
-        judged.append((replace(one.kept, part=part), one.finding))
+        own, stated = (
+            settled[id(one.parts[name])] for name in (one.finding.balance, one.finding.error_of)
+        )
+        judged.append((replace(one.kept, part=own, shown=stated), one.finding))
         notes += one.notes
     names = [kept.scored.candidate.name for kept, _ in judged]
     return judged, [*notes, *(_rejected(one, why, names) for one, why in rejected)]

@@ -28,8 +28,9 @@ def parameter_table(model: Model) -> TextTable:
             f"Fitted on {counted(len(evidence.runs), 'run')}, {evidence.samples:,} samples. RMSE"
             f" {in_unit(scale * evidence.rmse, unit)} with each run's mean removed,"
             f" {in_unit(scale * evidence.rmse_with_means, unit)} with means. Sign: + adds to the"
-            " target, - subtracts from it. 95 %: interval of a bootstrap over runs; empty at a"
-            " bound or with one run, and 'any' where the runs allow every value within the bounds."
+            " target, - subtracts from it. 95 %: interval of a bootstrap over runs, wider by"
+            " what noise of the readings has moved; empty at a bound or with one run, and 'any'"
+            " where the runs allow every value within the bounds."
         )
     return TextTable("Fitted model", ["parameter", "sign", "value", "95 %", "unit"], rows, note)
 

@@ -285,3 +285,16 @@ def test_a_model_of_an_offset_alone_is_fitted():
     offset = Term(effect("sensor.offset"), 1, {"clock": "time_s"})
     found = fit(Model("m", "carriage", "drive_force_n", (offset,)), stopped((2,)))
     assert found.terms[0].values["offset"].ci95 is not None
+
+
+@pytest.mark.parametrize("noise_a", [0.0, 0.03])
+def test_intervals_hold_what_the_noise_of_a_reading_has_hidden(motor, noise_a: float) -> None:
+    """The more noise the current has, the smaller is the drive's constant that fits best."""
+    random, made = np.random.default_rng(0), []
+    for one in campaign(noise_n_m=0.0):
+        current = one["motor_current_a"] + random.normal(0.0, noise_a, len(one))
+        made.append(one.with_columns(motor_current_a=current))
+    fitted = fit(motor, Campaign.of(made))
+    low, high = {name: e.ci95 for t in fitted.terms for name, e in t.values.items()}["gain"]
+    assert low <= TRUE["gain"] <= high
+    assert high - low < 0.05 * TRUE["gain"]

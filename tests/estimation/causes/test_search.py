@@ -516,14 +516,18 @@ def test_slow_noise_of_a_load_that_the_motion_predicts_is_no_late_encoder(noise_
 def test_a_noisy_encoder_is_no_slow_one() -> None:
     """The inertia comes out too small, and a lag of the angle would make up for it."""
     runs = _noisy()
-    assert diagnose(runs, [axis()], split(runs)).verdict == "nothing_missing"
+    assert diagnose(runs, [axis()], split(runs)).findings == ()
+
+
+SPRUNG = partial(recordings, spring=True)
+"""Runs against a spring: the angle follows the load."""
 
 
 @pytest.mark.parametrize(
     "made",
     [
         recordings,
-        partial(recordings, spring=True),  # an angle that follows the load
+        SPRUNG,
         partial(_coarse, 0),
         pytest.param(partial(_coarse, 1), marks=pytest.mark.long),
     ],
@@ -531,7 +535,9 @@ def test_a_noisy_encoder_is_no_slow_one() -> None:
 def test_nothing_is_found_where_nothing_is_missing(made: Callable[[], list[Recording]]) -> None:
     runs = made()
     found = diagnose(runs, [motor()], split(runs))
-    assert found.verdict == "nothing_missing"
+    assert found.findings == ()
+    # slow noise of the current is none that a reading shows
+    assert found.verdict == ("unexplained" if made is SPRUNG else "nothing_missing")
     assert found.errors["motor"].after == found.errors["motor"].before
     assert not any("times what" in note for note in found.notes)
 
@@ -585,6 +591,37 @@ def test_a_gear_and_its_sensors_are_kept_apart(fault: dict[str, float], family: 
     finding = _only(geared(**fault), motor(), gearbox())
     assert finding.family == family
     assert finding.rmse_after < (0.6 if "slow" in fault else 1.0) * finding.rmse_before
+
+
+def test_a_wave_has_its_size_before_the_filter() -> None:
+    """Twelve waves a turn pass the cutoff of the channels in the fast parts of a run."""
+    finding = _only(recordings(lambda angle, *_: 0.02 * np.sin(12.0 * angle)), motor())
+    assert finding.family == "ripple.motor"
+    assert finding.parameters["sine"].value == pytest.approx(0.02, rel=0.2)
+
+
+def test_crosstalk_has_the_size_of_the_equation_that_identifies_it() -> None:
+    """In the motor's equation crosstalk of the current is a larger constant of the drive."""
+    runs = [
+        run.with_columns(
+            proximal_torque_n_m=run["proximal_torque_n_m"] + 0.1 * run["motor_current_a"]
+        )
+        for run in geared()
+    ]
+    finding = _only(runs, motor(), gearbox())
+    assert (finding.family, finding.error_of) == ("sensor.crosstalk", "gearbox")
+    assert finding.parameters["share"].value == pytest.approx(0.1, rel=0.1)
+
+
+def test_an_encoder_that_slips_at_one_time_of_each_run_is_found() -> None:
+    runs = [
+        run.with_columns(spindle_angle_rad=run["spindle_angle_rad"] + 2e-4 * (run.time_s > 3.0))
+        for run in geared()
+    ]
+    finding = _only(runs, motor(), gearbox())
+    assert (finding.family, finding.place) == ("change.step", "sensor spindle_angle_rad")
+    assert finding.parameters["offset"].value == pytest.approx(2e-4, rel=0.1)
+    assert finding.parameters["since"].value == pytest.approx(3.0, abs=0.2)
 
 
 def _three_encoders(late_s: float) -> list[Recording]:
