@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from estimation.campaign import Campaign
+from estimation.effects import Parameter
 from estimation.fit_problem import (
     FitRun,
     Problem,
@@ -122,14 +123,15 @@ def _bootstrap(
         if problem.model.run_offsets:
             table = table - means[-1]
         products.append(table.T @ table)
-    inside = np.concatenate([(free > problem.lower) & (free < problem.upper), np.ones(len(shape))])
+    shapes = problem.shape_parameters
+    between = [not _is_at_bound(p, x) for p, x in zip(shapes, shape, strict=True)]
+    inside = np.append((free > problem.lower) & (free < problem.upper), np.array(between, bool))
     moving = np.flatnonzero(inside)
     power = np.diag(np.sum(products, axis=0))[moving]
     size = np.sqrt(np.where(power > 0.0, power, 1.0))
     weights = np.random.default_rng(seed).multinomial(
         len(runs), np.full(len(runs), 1 / len(runs)), size=count
     )
-    shapes = problem.shape_parameters
     start = np.concatenate([free, [scaled(p, x) for p, x in zip(shapes, shape, strict=True)]])
     values = np.full((count, len(start) + 1), np.nan)
     ranges = np.reshape([range_of(p, x) for p, x in zip(shapes, shape, strict=True)], (-1, 2))
@@ -155,6 +157,12 @@ def _bootstrap(
         if not parameter.linear:
             values[:, k] = np.exp(values[:, k])
     return values
+
+
+def _is_at_bound(parameter: Parameter, value: float) -> bool:
+    """Whether a shape is at an end of its range, as near as it is searched."""
+    at, *ends = (scaled(parameter, x) for x in (value, parameter.lower, parameter.upper))
+    return min(abs(at - end) for end in ends) < SLOPE_STEP * (ends[1] - ends[0])
 
 
 def _slopes(problem: Problem, run: FitRun, shape: list[float], free: FloatArray) -> FloatArray:

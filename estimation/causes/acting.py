@@ -250,7 +250,7 @@ def moved_terms(joint: Joint) -> list[tuple[Claim, Products]]:
 
     In all runs they are the base itself, so they compete only for acting in some. So do the gain
     of what reads the target, by which all terms differ alike, and that of a sensor which several
-    equations read.
+    equations read. An offset competes where the runs have none of their own.
     """
     usual, weights = joint.left_out([[]]).base[0], joint.weights
     out = []
@@ -258,12 +258,15 @@ def moved_terms(joint: Joint) -> list[tuple[Claim, Products]]:
         if one.effect.id == "sensor.gain" and not one.of_all:
             out.append((Claim(one), _products(joint, one, usual)))
             continue
-        if not one.is_declared:
+        is_offset = one.effect.id == OFFSET and not joint.has_offsets(one.place.home)
+        if not (one.is_declared or is_offset):
             continue
         across, own = np.zeros((len(joint.runs), joint.size + 1)), np.zeros(len(joint.runs))
         for part in ((one.place.home, kind) for kind in ("within", "between")):
             terms, at = np.zeros(joint.size + 1), [*joint.at[part]]
-            if one.column is None:
+            if is_offset:
+                terms[joint.offset_at(one.place.home)] = one.place.enters[0].gain
+            elif one.column is None:
                 terms[at] = one.place.enters[0].gain * usual[at]
             else:
                 terms[at[one.column]] = 1.0

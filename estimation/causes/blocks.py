@@ -50,21 +50,17 @@ class Block:
     weights: Mapping[Part, float]
 
     @cached_property
-    def within(self) -> Products:
-        """Weighted sum of the products of the parts within runs."""
-        return self._summed([p for p in self.of if p[1] == "within"])
-
-    @cached_property
     def whole(self) -> Products:
         """Weighted sum of the products of all parts."""
-        return self._summed(self.of)
+        return self.summed(self.of)
 
     def only(self, chosen: NDArray[np.bool_]) -> "Block":
         """Return some of the causes."""
         of = {p: Products(*(x[:, chosen] for x in known)) for p, known in self.of.items()}
         return Block(self.followed.only(chosen), of, self.taken[chosen], self.weights)
 
-    def _summed(self, parts: Iterable[Part]) -> Products:
+    def summed(self, parts: Iterable[Part]) -> Products:
+        """Return the weighted sum of the products of some parts."""
         weighted = [[self.weights[p] * x for x in self.of[p]] for p in parts]
         return Products(*(np.asarray(sum(kind)) for kind in zip(*weighted, strict=True)))
 
@@ -80,7 +76,7 @@ class Outcome:
         changes: Equation to the factor by which the term of each channel times a constant changes,
             shape (causes, channels).
         slopes: The same within runs, the causes' own contribution included.
-        by_run: Weighted products within runs, with the base's residual as the target.
+        by_run: Weighted products in each run, with the base's residual as the target.
         declared: Declared amplitudes next to each cause, shape (causes, declared).
     """
 
@@ -134,8 +130,9 @@ def evaluate(
     errors = []
     if promising.any():
         errors = _errors(joint, block.only(promising), folds, precision[promising])
-    weights = joint.weights
-    cross, own, right = block.within
+    # runs that have offsets of their own show nothing of a cause by their means
+    parts = [p for p in block.of if p[1] == "within" or not joint.has_offsets(p[0])]
+    cross, own, right = block.summed(parts)
     declared = _declared(joint, block, base, amplitudes)
     changes, slopes = {}, {}
     for name in {name for name, _ in block.of}:
@@ -146,7 +143,7 @@ def evaluate(
         changes[name] = declared[:, at] / factor
         slopes[name] = changes[name] + given / factor
     # the columns as they were before declared ones were taken off: in some runs these differ
-    gram = np.asarray(sum(weights[p] * joint.gram[p] for p in block.of if p[1] == "within"))
+    gram = np.asarray(sum(joint.weights[p] * joint.gram[p] for p in parts))
     count = block.taken.shape[1]
     mixed = block.taken.swapaxes(1, 2) @ cross[:, :, :count]
     own = own + mixed + mixed.swapaxes(2, 3)

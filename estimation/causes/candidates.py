@@ -55,14 +55,14 @@ class Claim:
         """Whether its form is unknown."""
         return isinstance(self.cause, Function)
 
-    @property
-    def has_means(self) -> bool:
+    def has_means(self, joint: Joint) -> bool:
         """Whether the means of the runs show it.
 
-        What starts between runs also shifts their means, by its own offset; another factor of a
-        declared term shifts them as the term does.
+        Where runs have offsets of their own, what starts between runs also shifts their means, by
+        its own offset; another factor of a declared term shifts them as the term does.
         """
-        return self.acts is None or self.given or self.cause.is_declared
+        own = any(map(joint.has_offsets, self.cause.place.equations))
+        return self.acts is None or self.given or self.cause.is_declared or not own
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,7 +181,7 @@ def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
             noisy = _is_noisy(joint.layout, one)
             shaken = _columns(one, joint.layout.shaken) if noisy else None
             width = next(iter(columns[0].values())).shape[1]
-            key = (tuple(columns[0]), width, _unit(one.cause), one.has_means, shaken is None)
+            key = (tuple(columns[0]), width, _unit(one.cause), one.has_means(joint), shaken is None)
             held = waiting.setdefault(key, [])
             held.append((one, columns, shaken))
             if len(held) * width**2 >= AT_ONCE:
@@ -213,7 +213,7 @@ def _laid(joint: Joint, held: Sequence[Raw]) -> Iterator[Group]:
     first = held[0][0]
     shaken = [raw[2] for raw in held if raw[2] is not None]
     columns = [raw[1] for raw in held]
-    laid = without_declared(joint, columns, shaken, _unit(first.cause), first.has_means)
+    laid = without_declared(joint, columns, shaken, _unit(first.cause), first.has_means(joint))
     shown = np.flatnonzero(laid.size.min(axis=1) >= NOTHING)
     if len(shown) < len(held):
         laid = laid.only(shown)

@@ -127,7 +127,7 @@ class Joint:
         """Declared parameters and the offset of each equation."""
         return sum(map(len, self._equations_at.values())) + len(self._equations_at)
 
-    def _offset_at(self, equation: str) -> int:
+    def offset_at(self, equation: str) -> int:
         """Return the place of an equation's offset: they follow all declared parameters."""
         names = [*self._equations_at]
         return self._declared_size - len(names) + names.index(equation)
@@ -145,7 +145,7 @@ class Joint:
         one = np.ones((len(means), 1))
         self.tables[name, "within"], self.at[name, "within"] = inner, at
         self.tables[name, "between"] = np.hstack([means[:, :-1], one, means[:, -1:]])[:, None]
-        self.at[name, "between"] = [*at, self._offset_at(name)]
+        self.at[name, "between"] = [*at, self.offset_at(name)]
         self.samples[name, "within"] = np.array([float(len(own)) for own in columns])
         self.samples[name, "between"] = np.ones(len(means))
 
@@ -168,8 +168,8 @@ class Joint:
                 value = float(np.einsum("i,rij,j->", vector, self.gram[p], vector))
                 spare = count / max(1, count - 3) if p[1] == "between" else 1.0
                 error[p] = max(spare * value / self.samples[p].sum(), TINY)
-            for name, equation in self.layout.equations.items():
-                if not equation.model.run_offsets:  # a mean is no less certain than one sample
+            for name in self.layout.equations:
+                if not self.has_offsets(name):  # a mean is no less certain than one sample
                     part = name, "between"
                     error[part] = min(error[part], error[name, "within"])
             self.error = error
@@ -279,7 +279,7 @@ class Joint:
         name, _ = part
         kinds = self.layout.equations[name].kinds
         at = [k for k, c in zip(self._equations_at[name], kinds, strict=True) if not c.of_shape]
-        at += [self._offset_at(name), self.size]
+        at += [self.offset_at(name), self.size]
         return np.asarray(self.gram[part].sum(axis=0)[np.ix_(at, at)])
 
     def parameter(self, base: FloatArray, equation: str, column: int | None) -> float:
@@ -289,7 +289,7 @@ class Joint:
         """
         if column is not None:
             return float(self.whole(base)[self._equations_at[equation].start + column])
-        return float(base[self._offset_at(equation)])
+        return float(base[self.offset_at(equation)])
 
     def with_effect(self, laid: Laid, amplitudes: FloatArray) -> "Joint":
         """Return the regression as if the base were true but for one effect of some amplitudes.
@@ -406,6 +406,10 @@ class Joint:
         for name, taken in laid.taken.items():
             out[:, self._equations_at[name]] = taken
         return out
+
+    def has_offsets(self, equation: str) -> bool:
+        """Whether the runs have offsets of their own in an equation."""
+        return self.layout.equations[equation].model.run_offsets
 
     def bounded_at(self, equation: str, column: int | None) -> int | None:
         """Return the place of a declared column's amplitude if it cannot be negative."""

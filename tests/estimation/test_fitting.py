@@ -298,3 +298,17 @@ def test_intervals_hold_what_the_noise_of_a_reading_has_hidden(motor, noise_a: f
     low, high = {name: e.ci95 for t in fitted.terms for name, e in t.values.items()}["gain"]
     assert low <= TRUE["gain"] <= high
     assert high - low < 0.05 * TRUE["gain"]
+
+
+def test_a_shape_at_its_bound_has_no_interval() -> None:
+    """Friction that grows with the root of the load is below the least power of a contact."""
+    declared_motor, power = read(Path("motor")), effect("friction.load.power")
+    channels = {"load": "proximal_torque_n_m", "speed": "motor_velocity_rad_s"}
+    model = replace(
+        declared_motor, terms=(*declared_motor.terms, Term(power, sign=-1, channels=channels))
+    )
+    runs = varied_runs(lambda _, speed, load: 0.05 * np.sqrt(load) * np.tanh(speed / 3.0))
+    values = fit(model, Campaign.of(runs)).terms[-1].values
+    assert values["exponent"].value == pytest.approx(power.shape[0].lower, rel=1e-3)
+    assert values["exponent"].ci95 is None
+    assert values["friction"].ci95 is not None

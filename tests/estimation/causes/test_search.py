@@ -985,3 +985,15 @@ def test_nothing_stands_in_for_a_noisy_reading(seed: int) -> None:
     """The load is a spring or a ramp in time, so an angle or a clock has it without its noise."""
     runs = list(draw(seed, "confounded", gear_ratio=35.0).twin.evidence)
     assert diagnose(runs, model_file.reference_rig(), split(runs)).findings == ()
+
+
+def test_an_offset_of_some_runs_is_found_where_the_means_of_runs_count() -> None:
+    runs = [
+        run.with_columns(rope_force_n=run["rope_force_n"] + 40.0 * (k >= 7))
+        for k, run in enumerate(hoisted())
+    ]
+    finding = _only(runs, hoist())
+    # a friction that is larger in one direction is an offset where the hoist moves
+    assert "sensor.offset" in (finding.family, *finding.alternatives)
+    assert finding.runs_affected == tuple(run.name for run in runs[7:])
+    assert finding.rmse_after < 0.1 * finding.rmse_before
