@@ -1,20 +1,23 @@
 """What a diagnosis remarks on besides its findings: one sentence each."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
 
 import numpy as np
 
 from estimation.causes.apart import Apart
+from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Equation
+from estimation.causes.findings import Kept, written_term
 from estimation.causes.folds import unvaried
+from estimation.causes.functions import Function
 from estimation.causes.instruments import noise_share
 from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.run_signals import EFFORTS
 from estimation.derived import origin_of
 from estimation.diagnosis.audit import audit
-from estimation.diagnosis.result import is_unexplained
+from estimation.diagnosis.result import Finding, is_unexplained
 from estimation.diagnosis.split import Sealed
 from estimation.model import AT_BOUND, Model
 from estimation.noise import MOST_ERROR, MOST_NOISE, noise_of, noisy_sentence
@@ -141,3 +144,42 @@ def _noisy(layout: Layout) -> list[str]:
                 sentence = noisy_sentence(channel, share, _remedy(equation))
                 found.append(f"{equation.name}: {sentence}")
     return found
+
+
+def rejected(candidate: Candidate, why: str, found: Collection[object]) -> str:
+    """Return that a cause is not a finding; of another form of a finding, that it is a second."""
+    second = "A second form of " if candidate.name in found else ""
+    family, place = candidate.cause.family, candidate.cause.place.name
+    if isinstance(candidate.cause, Function):
+        family = f"{'an' if second else 'An'} effect of unknown form"
+    return f"{second}{family} ({place}) was found in the training runs and {why}."
+
+
+def unidentified(judged: Sequence[tuple[Kept, Finding]], written: Sequence[Model]) -> Iterator[str]:
+    """Yield the findings that a model file could hold and does not, a sentence each."""
+    for kept, f in judged:
+        model = next(m for m in written if m.balance == f.balance)
+        if kept.part is not None and kept.part.is_written and not written_term(kept, model):
+            yield (
+                f"{f.balance}: {f.form} is reported and not added to the model file; next to the"
+                " declared terms not all of its amplitudes can be identified."
+            )
+
+
+def unwritten(candidate: Candidate) -> str:
+    """Return why a cause is in no model file."""
+    cause, family = candidate.cause, candidate.cause.family
+    if isinstance(cause, Function):
+        family, why = "an effect of unknown form", "it has no equation"
+    elif candidate.acts is not None:
+        why = "it acts in some of the runs only"
+    elif cause.ahead:
+        why = "its reading is late, and a model cannot read it earlier"
+    elif not any(e.order for e in cause.place.enters if e.equation == cause.place.home):
+        why = "it depends on the quantity that the model estimates, which the model cannot read"
+    else:
+        why = (
+            "the rate of change of what it adds enters the equation, and a term of a model is not a"
+            " rate of change"
+        )
+    return f"{cause.place.home}: {family} is reported and not added to the model file; {why}."

@@ -5,7 +5,7 @@ The test runs take no part in the search. They are opened once, when every hypot
 
 import math
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,9 +22,7 @@ from estimation.causes.findings import (
     named,
     parameters_of,
     unpredicted,
-    written_term,
 )
-from estimation.causes.functions import Function
 from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
 from estimation.causes.layout import Layout, lay_out, on_one_clock
@@ -106,7 +104,7 @@ def answer(
     findings = [
         replace(f, parameters=parameters_of(kept, f, written, refits)) for kept, f in judged
     ]
-    notes += _unidentified(judged, written)
+    notes += remarks.unidentified(judged, written)
     if not findings and sealed.may_name and (changing := unsteady(held_out)):
         findings = [unpredicted(changing, refits)]
         left[changing.equation] = findings[0].rmse_after
@@ -212,16 +210,7 @@ def _judged(
         judged.append((replace(one.kept, part=own, shown=stated), one.finding))
         notes += one.notes
     names = [kept.scored.candidate.name for kept, _ in judged]
-    return judged, [*notes, *(_rejected(one, why, names) for one, why in rejected)]
-
-
-def _rejected(candidate: Candidate, why: str, found: Collection[object]) -> str:
-    """Return that a cause is not a finding; of another form of a finding, that it is a second."""
-    second = "A second form of " if candidate.name in found else ""
-    family, place = candidate.cause.family, candidate.cause.place.name
-    if isinstance(candidate.cause, Function):
-        family = f"{'an' if second else 'An'} effect of unknown form"
-    return f"{second}{family} ({place}) was found in the training runs and {why}."
+    return judged, [*notes, *(remarks.rejected(one, why, names) for one, why in rejected)]
 
 
 def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) -> _Opened | None:
@@ -265,7 +254,7 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
         runs_affected=tuple(name for name, acts in acts_in.items() if acts),
     )
     if place.home in added and not added[place.home].is_written:
-        notes.append(_unwritten(candidate))
+        notes.append(remarks.unwritten(candidate))
     return _Opened(one, finding, added, max(falls.values()), notes)
 
 
@@ -343,37 +332,6 @@ def _fall(before: Errors, after: Errors, refits: Refits, equation: str) -> float
     own_offsets = refits.layout.equations[equation].model.run_offsets
     of_means = refits.numbers.between if own_offsets else 1.0
     return max(falls) if falls[0] + of_means * falls[1] > 0.0 else min(0.0, *falls)
-
-
-def _unidentified(
-    judged: Sequence[tuple[Kept, Finding]], written: Sequence[Model]
-) -> Iterator[str]:
-    """Yield the findings that a model file could hold and does not, a sentence each."""
-    for kept, f in judged:
-        model = next(m for m in written if m.balance == f.balance)
-        if kept.part is not None and kept.part.is_written and not written_term(kept, model):
-            yield (
-                f"{f.balance}: {f.form} is reported and not added to the model file; next to the"
-                " declared terms not all of its amplitudes can be identified."
-            )
-
-
-def _unwritten(candidate: Candidate) -> str:
-    cause, family = candidate.cause, candidate.cause.family
-    if isinstance(cause, Function):
-        family, why = "an effect of unknown form", "it has no equation"
-    elif candidate.acts is not None:
-        why = "it acts in some of the runs only"
-    elif cause.ahead:
-        why = "its reading is late, and a model cannot read it earlier"
-    elif not any(e.order for e in cause.place.enters if e.equation == cause.place.home):
-        why = "it depends on the quantity that the model estimates, which the model cannot read"
-    else:
-        why = (
-            "the rate of change of what it adds enters the equation, and a term of a model is not a"
-            " rate of change"
-        )
-    return f"{cause.place.home}: {family} is reported and not added to the model file; {why}."
 
 
 def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
