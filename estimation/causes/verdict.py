@@ -101,9 +101,7 @@ def answer(
         name: error.after if layout.equations[name].model.run_offsets else error.with_means_after
         for name, error in errors.items()
     }
-    findings = [
-        replace(f, parameters=parameters_of(kept, f, written, refits)) for kept, f in judged
-    ]
+    findings = [replace(f, parameters=parameters_of(k, f, written, refits)) for k, f in judged]
     notes += remarks.unidentified(judged, written)
     if not findings and sealed.may_name and (changing := unsteady(held_out)):
         findings = [unpredicted(changing, refits)]

@@ -85,10 +85,8 @@ def campaigns(
     if open_:
         _open(_only(found))
         return
-    if compare and found:
-        shown: list[str | TextTable] = [_side_by_side(found, root)]
-    else:
-        shown = _listed(found, root, runs, most, len(whole))
+    beside = [_side_by_side(found, root)] if compare and found else None
+    shown = beside or _listed(found, root, runs, most, len(whole))
     present(json, {"campaigns": found}, *shown)
 
 
