@@ -8,7 +8,8 @@ import pytest
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.places import Entry
-from estimation.causes.verdict import Answer, _unwritten, answer
+from estimation.causes.remarks import unwritten
+from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.split import split
 from estimation.fit_problem import prepared
 from estimation.fitting import _evidence
@@ -57,7 +58,7 @@ def test_the_model_written_with_two_causes_has_the_reported_errors_on_the_test_r
 def test_a_cause_that_no_model_holds_is_reported_with_the_reason(order, why):
     place = SimpleNamespace(home="motor", enters=[Entry("motor", 1.0, order)])
     cause = SimpleNamespace(family="sensor.gain", place=place, ahead=False)
-    note = _unwritten(SimpleNamespace(acts=None, cause=cause))
+    note = unwritten(SimpleNamespace(acts=None, cause=cause))
     assert note.startswith("motor: sensor.gain is reported and not added to the model file; ")
     assert why in note
 
