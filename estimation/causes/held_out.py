@@ -11,7 +11,7 @@ from estimation.causes.apart import Apart, apart
 from estimation.causes.candidates import Candidate, Claim, laid_out
 from estimation.causes.criterion import base_errors, log_ratio
 from estimation.causes.joint import Joint
-from estimation.causes.laid import Part
+from estimation.causes.laid import TINY, Part
 from estimation.causes.layout import Layout
 from estimation.causes.nuisances import with_skews
 from estimation.causes.numbers import Numbers
@@ -31,8 +31,7 @@ class Gains:
     Attributes:
         scores: Run to score, as if the cause acted there and as if it did not: then the other
             parameters are known better.
-        logs: The same as a log likelihood ratio: a run is worth its independent samples, its mean
-            one.
+        logs: The same as a log likelihood ratio.
         acting: Run to the probability that it acts there, from the training runs.
     """
 
@@ -158,10 +157,13 @@ class HeldOut:
             mean = [e[p] / samples[self.at] for e in (before, after)]
             own = log_ratio(self.joint, p, mean[0], mean[1])
             score += own
-            # a run has as many independent samples as it is worth, and one mean
-            log += 0.5 * (
-                numbers.samples_a_run * own if p[1] == "within" else own / numbers.between
-            )
+            if p[1] == "between":
+                # the ratio of two single squares may be anything: each is held against all runs
+                both = [float(x.mean()) for x in mean]
+                ratio = log_ratio(self.joint, p, both[0], np.array(both[1]))
+                part = mean[0] / (both[0] + TINY) - mean[1] / (both[1] + TINY)
+                own = ratio + numbers.between * part
+            log += 0.5 * numbers.samples_a_run * own
         return score, log
 
     def _next_to(self, causes: Sequence[Candidate]) -> tuple[Joint, Mapping[Part, FloatArray]]:
