@@ -20,6 +20,10 @@ SHAPE_STEP = 0.02
 """Relative step of the derivative of a declared column by its shape."""
 
 
+LOSSES = ("friction.", "transmission.damping")
+"""Families of declared terms that take energy from the motion."""
+
+
 class Column(NamedTuple):
     """A declared column.
 
@@ -28,12 +32,14 @@ class Column(NamedTuple):
         channel: What it is a constant times; empty where it is another function.
         of_shape: Whether it is the derivative by a shape.
         is_bounded: Whether its amplitude cannot be negative, as that of an inertia or a friction.
+        is_loss: Whether it is the amplitude of a loss, which cannot be negative either.
     """
 
     sign: int
     channel: str
     of_shape: bool
     is_bounded: bool
+    is_loss: bool
 
 
 @dataclass(frozen=True)
@@ -94,8 +100,11 @@ class Equation:
             linear = isinstance(term.effect, Proportional)
             channel = next(iter(term.channels.values())) if linear else ""
             sizes = term.effect.amplitudes
-            found += [Column(term.sign, channel, False, p.lower == 0.0) for p in sizes]
-            found += [Column(term.sign, channel, True, False)] * len(term.effect.shape)
+            takes = term.effect.family.startswith(LOSSES)
+            for p in sizes:
+                bounded = p.lower == 0.0
+                found.append(Column(term.sign, channel, False, bounded, bounded and takes))
+            found += [Column(term.sign, channel, True, False, False)] * len(term.effect.shape)
         return found
 
     @cached_property

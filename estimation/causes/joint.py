@@ -76,7 +76,7 @@ class Joint:
         projection: Lays candidates out.
         power: Weighted square of all targets within runs.
         held: Which declared amplitudes are held at zero, their bound, shape (declared,): what takes
-            a friction or an inertia below zero is a cause that the equation lacks.
+            a friction or a damping below zero is a cause that the equation lacks.
     """
 
     def __init__(
@@ -192,18 +192,21 @@ class Joint:
         self._unheld = self._precision
         bounded = np.zeros(size, dtype=np.bool_)
         kinds = [c for e in self.layout.equations.values() for c in e.kinds]
-        bounded[: len(kinds)] = [c.is_bounded for c in kinds]
+        bounded[: len(kinds)] = [c.is_loss for c in kinds]
         self._hold(np.zeros_like(bounded))
         # of two machines together a friction may be negative: what differs is then a change
         if self._is_one_machine and (self._amplitudes[bounded] < 0.0).any():
             self._hold(bounded & (self._within_bounds(bounded) <= 0.0))
 
     def _signals(self, whole: FloatArray) -> float:
-        """Return the weighted square of all targets and of all terms of the declared model."""
+        """Return the weighted square of all targets, or of all terms of the declared model if more.
+
+        With next to no load these are many times as large.
+        """
         fitted = np.zeros(self._declared_size)
         for name, equation in self.layout.equations.items():
             fitted[[*self._equations_at[name]]] = equation.fitted
-        return float(whole[-1, -1] + fitted**2 @ np.diag(whole)[: len(fitted)])
+        return float(max(whole[-1, -1], fitted**2 @ np.diag(whole)[: len(fitted)]))
 
     @property
     def _amplitudes(self) -> FloatArray:

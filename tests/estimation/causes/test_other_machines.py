@@ -339,7 +339,7 @@ def _lifted(seed: int) -> list[Recording]:
     return out
 
 
-@pytest.mark.parametrize("seed", [0, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_the_mass_behind_a_load_cell_is_no_inertia_that_differs(seed: int) -> None:
     """Within a run the cell reads mass times acceleration: as if the drive had less inertia."""
     (model,) = declared(plant_file.parse(LIFT))

@@ -486,7 +486,7 @@ def test_losses_at_their_bounds_are_those_of_the_least_error(seed: int) -> None:
     """Of two frictions that come out negative together, only one has to be zero."""
     joint = Joint(_laid(resisting(seed), motor()))
     kinds = joint.layout.equations["motor"].kinds
-    losses = [k for k, column in enumerate(kinds) if column.is_bounded]
+    losses = [k for k, column in enumerate(kinds) if column.is_loss]
     errors = []
     for some in itertools.product((False, True), repeat=len(losses)):
         held = np.zeros_like(joint.held)
