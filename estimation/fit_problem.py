@@ -99,8 +99,7 @@ def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list
         MissingChannelError: A run lacks a channel of the model.
     """
     runs = []
-    timed = campaign.timed() if CAMPAIGN_TIME in model.channels else campaign
-    for recording in timed.evidence:
+    for recording in _timed(model, campaign).evidence:
         step = every or max(1, int(recording.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
         whole = balance_channels(model, recording)
         places = settled(model, whole, step)
@@ -128,6 +127,11 @@ def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list
     return runs
 
 
+def _timed(model: Model, campaign: Campaign) -> Campaign:
+    """Return the campaign with its time where the model reads it."""
+    return campaign.timed() if CAMPAIGN_TIME in model.channels else campaign
+
+
 def noisier(model: Model, campaign: Campaign, runs: Sequence[FitRun]) -> list[FitRun]:
     """Return prepared runs once more, with each reading's noise added to it a second time.
 
@@ -136,8 +140,7 @@ def noisier(model: Model, campaign: Campaign, runs: Sequence[FitRun]) -> list[Fi
     extrapolation).
     """
     places, out = {run.whole.name: run.places for run in runs}, []
-    timed = campaign.timed() if CAMPAIGN_TIME in model.channels else campaign
-    for recording in timed.evidence:
+    for recording in _timed(model, campaign).evidence:
         if recording.name in places:
             read = [c for c in measured_channels(model.channels, model.signals) if c in recording]
             noise = white_noise(recording, read, model.signals)

@@ -216,9 +216,8 @@ class Joint:
     def _within_bounds(self, bounded: NDArray[np.bool_]) -> FloatArray:
         """Return the amplitudes of the declared columns where some are not below zero."""
         size = self._declared_size
-        turn = np.eye(
-            self.size
-        )  # to the amplitudes as they are bounded, next to what was taken off
+        # to the amplitudes as they are bounded, next to what was taken off them
+        turn = np.eye(self.size)
         turn[:size, size:] = self.taken
         gram = self._run_grams.sum(axis=0)
         normal = turn.T @ (gram[:-1, :-1] + self._prior) @ turn
@@ -314,7 +313,8 @@ class Joint:
         made.gram = made._products()
         made._weigh()
         made.declared = made.whole(made.left_out(((),)).base[0])
-        made.__dict__.pop("largest_linear", None)
+        for worked_out in ("largest_linear", "noise_in_error"):
+            made.__dict__.pop(worked_out, None)
         return made
 
     def with_cause(self, laid: Laid, precision: FloatArray) -> "Joint":
@@ -435,26 +435,39 @@ class Joint:
                 found[channel] = found.get(channel, 0.0) + sign * float(base[at])
         return found
 
-    def noise_share(self, name: str, at: int, channel: str) -> float:
-        """Return how much of an equation's error within runs a reading's noise may be, at most one.
+    @cached_property
+    def noise_in_error(self) -> Mapping[str, Mapping[int, float]]:
+        """Return how much of an equation's error within runs each reading's noise may be.
 
-        The noise is at most the reading's own changes, and the error of every equation that the
-        reading enters.
+        Equation to place of a declared column to a share, at most one. The noise is at most the
+        reading's own changes, and the error of every equation that the reading enters.
         """
-        part = name, "within"
-        most = float(self.gram[part][:, at, at].sum() / self.samples[part].sum())
-        for other in self.layout.equations:
-            places = [p for p, c in self.linear(other).items() if c == channel]
-            factors = [float(self.declared[p]) for p in places]
-            factors += [1.0] * (self.layout.equations[other].target == channel)
-            for factor in factors:
+        linear = {name: self.linear(name) for name in self.layout.equations}
+        most: dict[str, float] = {}
+        for name, equation in self.layout.equations.items():
+            error = self.error[name, "within"]
+            entered = [(c, float(self.declared[at])) for at, c in linear[name].items()]
+            for channel, factor in (*entered, (equation.target, 1.0)):
                 if factor:
-                    most = min(most, self.error[other, "within"] / factor**2)
-        return min(1.0, most * float(self.declared[at]) ** 2 / self.error[part])
+                    most[channel] = min(most.get(channel, np.inf), error / factor**2)
+        shares: dict[str, dict[int, float]] = {}
+        for name, places in linear.items():
+            part = name, "within"
+            own = np.einsum("rii->i", self.gram[part]) / self.samples[part].sum()
+            shares[name] = {
+                at: min(
+                    1.0,
+                    min(float(own[at]), most.get(channel, np.inf))
+                    * float(self.declared[at]) ** 2
+                    / self.error[part],
+                )
+                for at, channel in places.items()
+            }
+        return shares
 
     @cached_property
-    def largest_linear(self) -> Mapping[str, tuple[int, str]]:
-        """Return place and channel of each equation's largest channel times a constant."""
+    def largest_linear(self) -> Mapping[str, int]:
+        """Return the place of each equation's largest channel times a constant."""
         out = {}
         for name in self.layout.equations:
             linear = self.linear(name)
@@ -462,8 +475,7 @@ class Joint:
             whole = self.gram[name, "within"].sum(axis=0) + np.tensordot(samples, means, 1)
             power = self.declared**2 * np.diag(whole)[: len(self.declared)]
             if linear:
-                most = max(linear, key=lambda at: float(power[at]))
-                out[name] = most, linear[most]
+                out[name] = max(linear, key=lambda at: float(power[at]))
         return out
 
 

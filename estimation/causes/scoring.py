@@ -241,13 +241,16 @@ def _in_readings(
     moved = np.array([one.cause.is_declared for one in candidates])
     for name, slopes in outcome.slopes.items():
         unit = np.ones(len(candidates))
-        largest = joint.largest_linear.get(name, (-1, ""))[0]
+        largest = joint.largest_linear.get(name)
         for k, (at, channel) in enumerate(joint.linear(name).items()):
-            change, share = outcome.changes[name][:, k], joint.noise_share(name, at, channel)
+            is_amplified = channel.endswith(AMPLIFIED)
+            if not is_amplified and at != largest:
+                continue
+            change, share = outcome.changes[name][:, k], joint.noise_in_error[name][at]
             seen = np.ones(len(candidates))
-            reads = np.array([channel in one.cause.reads for one in candidates])
             alone = np.array([{*one.cause.reads} == {channel} for one in candidates])
-            if channel.endswith(AMPLIFIED):
+            if is_amplified:
+                reads = np.array([channel in one.cause.reads for one in candidates])
                 seen[alone] = slopes[alone, k]
                 seen[~reads] = change[~reads]
             if at == largest:

@@ -63,7 +63,8 @@ def oneill(
     with counting("runs", len(source.campaign)) as on_run:
         study = run_study(source, seed=seed, on_run=on_run)
     campaign = source.campaign.exclude(study.left_out)
-    deep, physical, every_kind = None, None, tuple[Any, ...]()
+    deep, physical = None, None
+    every_kind: tuple[Any, ...] = ()
     shown: dict[str, list[Any]] = {}
     if networks:
         from rig.studies.oneill.networks import Training, network_tables, run_networks
