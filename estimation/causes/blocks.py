@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from estimation.causes.criterion import log_ratio
 from estimation.causes.folds import Folds
 from estimation.causes.joint import Joint, Next
-from estimation.causes.laid import Followed, Laid, Part, products
+from estimation.causes.laid import TINY, Followed, Laid, Part, products
 from estimation.recording import FloatArray
 
 
@@ -78,6 +78,7 @@ class Outcome:
         slopes: The same within runs, the causes' own contribution included.
         by_run: Weighted products in each run, with the base's residual as the target.
         declared: Declared amplitudes next to each cause, shape (causes, declared).
+        gram: Weighted products of the declared columns in each run, as those of `by_run`.
     """
 
     promising: NDArray[np.bool_]
@@ -87,6 +88,13 @@ class Outcome:
     slopes: Mapping[str, FloatArray]
     by_run: Products
     declared: FloatArray
+    gram: FloatArray
+
+    def factor(self, one: int, runs: NDArray[np.intp]) -> float:
+        """Return the factor by which a cause changes what is declared in some runs."""
+        declared, gram = self.declared[one], self.gram[runs].sum(axis=0)
+        added = self.by_run.base[runs, one].sum(axis=0)[: len(declared)] @ self.amplitudes[one]
+        return 1.0 + float(declared @ added / (declared @ gram @ declared + TINY))
 
 
 def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
@@ -151,7 +159,8 @@ def evaluate(
     right = right + (gram[:, None, None, :count, -1] @ block.taken)[:, :, 0]
     cross = cross + gram[:, None, :-1, :count] @ block.taken
     by_run = Products(cross, own, right - usual @ cross)
-    return Outcome(promising, errors, amplitudes, changes, slopes, by_run, declared)
+    inner = gram[:, :count, :count]
+    return Outcome(promising, errors, amplitudes, changes, slopes, by_run, declared, inner)
 
 
 def rising(

@@ -20,8 +20,9 @@ SHAPE_STEP = 0.02
 """Relative step of the derivative of a declared column by its shape."""
 
 
-LOSSES = ("friction.", "transmission.damping")
-"""Families of declared terms that take energy from the motion."""
+LINKS = "arm.links"
+"""Beginning of the ids of effects whose channel was computed from the motion: no sensor reads it.
+"""
 
 
 class Column(NamedTuple):
@@ -29,17 +30,15 @@ class Column(NamedTuple):
 
     Attributes:
         sign: With which its term enters.
-        channel: What it is a constant times; empty where it is another function.
+        channel: What is read that it is a constant times; empty where it is another function.
         of_shape: Whether it is the derivative by a shape.
         is_bounded: Whether its amplitude cannot be negative, as that of an inertia or a friction.
-        is_loss: Whether it is the amplitude of a loss, which cannot be negative either.
     """
 
     sign: int
     channel: str
     of_shape: bool
     is_bounded: bool
-    is_loss: bool
 
 
 @dataclass(frozen=True)
@@ -97,14 +96,11 @@ class Equation:
         """What each of the columns is."""
         found = []
         for term in self.terms:
-            linear = isinstance(term.effect, Proportional)
+            linear = isinstance(term.effect, Proportional) and not term.effect.id.startswith(LINKS)
             channel = next(iter(term.channels.values())) if linear else ""
-            sizes = term.effect.amplitudes
-            takes = term.effect.family.startswith(LOSSES)
-            for p in sizes:
-                bounded = p.lower == 0.0
-                found.append(Column(term.sign, channel, False, bounded, bounded and takes))
-            found += [Column(term.sign, channel, True, False, False)] * len(term.effect.shape)
+            for p in term.effect.amplitudes:
+                found.append(Column(term.sign, channel, False, p.lower == 0.0))
+            found += [Column(term.sign, channel, True, False)] * len(term.effect.shape)
         return found
 
     @cached_property

@@ -192,7 +192,7 @@ class Joint:
         self._unheld = self._precision
         bounded = np.zeros(size, dtype=np.bool_)
         kinds = [c for e in self.layout.equations.values() for c in e.kinds]
-        bounded[: len(kinds)] = [c.is_loss for c in kinds]
+        bounded[: len(kinds)] = [c.is_bounded for c in kinds]
         self._hold(np.zeros_like(bounded))
         # of two machines together a friction may be negative: what differs is then a change
         if self._is_one_machine and (self._amplitudes[bounded] < 0.0).any():
@@ -255,6 +255,24 @@ class Joint:
             base = np.einsum("fij,fj->fi", inverses, gram[:, :-1, -1])
             self._fits[key] = LeftOut(left, runs, fold, inverses, base)
         return self._fits[key]
+
+    def unlike(self, acts: Sequence[bool]) -> float:
+        """Return how little some runs are a factor times what the others predict.
+
+        It is the share of the targets' squares that the factor does not explain, or the same of the
+        other runs if that is larger.
+
+        Args:
+            acts: Whether each run is one of them, shape (runs,).
+        """
+        both = [[k for k, one in enumerate(acts) if one == kind] for kind in (True, False)]
+        shares = list[float]()
+        for of, runs in zip(self.left_out(both).base, both, strict=True):
+            gram = self._run_grams[runs].sum(axis=0)
+            across = float(of @ gram[:-1, -1])
+            squares = float(gram[-1, -1]) * float(of @ gram[:-1, :-1] @ of)
+            shares.append(1.0 - across * abs(across) / (squares + TINY))
+        return max(shares)
 
     def prior_products(self, taken: FloatArray) -> FloatArray:
         """Return the prior's products of the base with causes that declared columns were taken off.

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from estimation.causes.angles import angles_of, related, signals_of, unrelated
-from estimation.causes.equations import Equation, sensitivity
+from estimation.causes.equations import LINKS, Equation, sensitivity
 from estimation.causes.layout import Layout
 from estimation.causes.run_signals import ANGLES, EFFORTS
 from estimation.derived import CAMPAIGN_TIME, origin_of, rates_of
@@ -110,7 +110,7 @@ def direction_width(layout: Layout, place: Place) -> float:
 def _computed(layout: Layout) -> set[str]:
     """Return the channels that an arm's links were fitted for: no sensor reads them."""
     terms = [t for e in layout.equations.values() for t in e.terms]
-    return {c for t in terms if t.effect.id.startswith("arm.links") for c in t.channels.values()}
+    return {c for t in terms if t.effect.id.startswith(LINKS) for c in t.channels.values()}
 
 
 def _motion(angle: str) -> dict[str, tuple[str, ...]]:

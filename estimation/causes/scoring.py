@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.causes.apart import FACTOR, UNEXPLAINED
 from estimation.causes.blocks import Block, Outcome, Products, block_of, evaluate, rising
 from estimation.causes.candidates import Candidate, Group
 from estimation.causes.criterion import base_errors, extrapolated, score
@@ -183,14 +184,24 @@ def _judged(joint: Joint, group: Group, block: Block, usual: _Usual) -> _Judged:
 
 
 def _turned(joint: Joint, group: Group, outcome: Outcome) -> NDArray[np.bool_]:
-    """Return which declared terms, whose factor is not negative, would be so in some runs, (n,)."""
+    """Return which causes give the declared terms a factor that they cannot have, shape (n,).
+
+    One that is not negative would be so in some runs. Or all terms together would have a factor far
+    from one in the runs in which the cause acts, though these do not follow what the others
+    predict: it removes what the equation fits badly.
+    """
     found = np.zeros(len(group.candidates), dtype=np.bool_)
     for k, one in enumerate(group.candidates):
-        column = one.cause.column if isinstance(one.cause, Source) else None
-        at = joint.bounded_at(one.cause.place.home, column)
+        if not isinstance(one.cause, Source) or one.acts is None:
+            continue
+        at = joint.bounded_at(one.cause.place.home, one.cause.column)
         if at is not None:
             change = float(outcome.amplitudes[k, 0] / one.size[0])
             found[k] = outcome.declared[k, at] + change < -TURNED * abs(change)
+        if outcome.promising[k]:
+            factor = outcome.factor(k, np.flatnonzero(one.acts))
+            if not 1.0 / FACTOR <= factor <= FACTOR:
+                found[k] |= joint.unlike(one.acts) > UNEXPLAINED
     return found
 
 

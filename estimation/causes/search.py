@@ -16,6 +16,7 @@ from estimation.causes.candidates import (
     groups_of,
     laid_out,
 )
+from estimation.causes.criterion import base_errors, extrapolated, score
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
 from estimation.causes.grids import RELATIVE, least_order, order_step
@@ -78,8 +79,8 @@ def hypothesis(
     ranking: "Ranking", starts: Sequence[Scored]
 ) -> tuple[list[Scored], list[Sequence[Scored]]]:
     """Return the best set of causes that begins with one, and all that compete with each of it."""
-    chains = [_chain(ranking, start) for start in starts]
-    return _settled(ranking, max(chains, key=lambda chain: sum(c.score for c in chain)))
+    sets = [_settled(ranking, _chain(ranking, start)) for start in starts]
+    return max(sets, key=lambda found: ranking.worth(found[0])) if len(sets) > 1 else sets[0]
 
 
 Rank = Callable[[Joint, Sequence[Group], Folds], list[Scored]]
@@ -108,6 +109,17 @@ class Ranking:
         ranked = self._rank(self._with(causes), self.pool, self.folds)
         self._known.append((claims, ranked))
         return ranked
+
+    def worth(self, causes: Sequence[Scored]) -> float:
+        """Return the score of a set as a whole, less the prices of its causes.
+
+        The causes' own scores do not add up to it: each is cautious about the base it was found on.
+        """
+        joint, numbers = self.joint, self.joint.numbers
+        spreads = [extrapolated(joint, family) for family in self.folds]
+        before, after = (base_errors(j, self.folds) for j in (joint, self._with(causes)))
+        gain = float(score(joint, spreads, before, after))
+        return gain - sum(one.price.score(numbers) for one in causes)
 
     def _with(self, causes: Sequence[Scored]) -> Joint:
         joint = self.joint

@@ -8,6 +8,7 @@ import pytest
 
 from estimation.causes.remarks import late
 from estimation.causes.verdict import diagnose
+from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
 from estimation.signals import Combination, Share, Signals
@@ -150,17 +151,30 @@ def test_a_term_that_differs_is_stated_of_the_fewer_runs() -> None:
 
 
 def test_what_nothing_explains_is_stated_with_the_terms_at_their_bounds() -> None:
-    random, runs = np.random.default_rng(0), []
-    for run in turning(lambda _, speed, acceleration: -0.05 * speed - 0.04 * acceleration):
-        slow = np.cumsum(random.normal(0, 2e-3, len(run.time_s)))
-        torque = run["crank_torque_n_m"] + slow - slow.mean()
-        runs.append(run.with_columns(crank_torque_n_m=torque))
-    found = diagnose(runs, [axis()], split(runs))
+    found = _of_negative_terms(damping_n_m_s_rad=-0.05, inertia_kg_m2=-0.002)
     assert found.findings == ()
     ratio = re.search(r"the error on the test runs is (\S+) times the noise", found.notes[0])
     assert float(ratio[1]) > 5.0
     assert found.verdict == "unexplained"
     assert "at a bound: inertia.missing inertia" in found.notes[1]
+
+
+def test_what_an_inertia_cannot_be_is_an_effect_of_the_acceleration() -> None:
+    found = _of_negative_terms(damping_n_m_s_rad=-0.05, inertia_kg_m2=-0.02)
+    (finding,) = found.findings
+    assert (finding.verdict, finding.depends_on) == ("depends_on", ("acceleration",))
+    assert "at a bound: inertia.missing inertia" in found.notes[1]
+
+
+def _of_negative_terms(damping_n_m_s_rad: float, inertia_kg_m2: float) -> Diagnosis:
+    """Return the diagnosis of an axis with negative terms and slow noise; its inertia is .02."""
+    random, runs = np.random.default_rng(0), []
+    change = inertia_kg_m2 - 0.02
+    for run in turning(lambda _, speed, acc: damping_n_m_s_rad * speed + change * acc):
+        slow = np.cumsum(random.normal(0, 2e-3, len(run.time_s)))
+        torque = run["crank_torque_n_m"] + slow - slow.mean()
+        runs.append(run.with_columns(crank_torque_n_m=torque))
+    return diagnose(runs, [axis()], split(runs))
 
 
 @pytest.mark.parametrize(("offset_n_m", "word"), [(0.0, "is noise"), (0.03, "no explanation")])

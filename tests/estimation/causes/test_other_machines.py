@@ -18,6 +18,7 @@ from estimation.diagnosis.result import Finding
 from estimation.diagnosis.split import split
 from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
+from tests.estimation.causes.synthetic import axis, turning
 
 RATE_HZ, SECONDS, RUNS = 100.0, 12.0, 10
 
@@ -315,8 +316,17 @@ reads = "effort"
 """
 
 
-def _lifted(seed: int) -> list[Recording]:
-    """Return runs of a lift with three masses, whose drive is stronger at some places."""
+def _lifted(
+    seed: int, *, gain: float = 0.0, ripple_n: float = 0.0, load_friction: float = 0.0
+) -> list[Recording]:
+    """Return runs of a lift with three masses.
+
+    Args:
+        seed: Of the motion and the noise.
+        gain: Share by which the drive is stronger at some places.
+        ripple_n: Force that repeats every 10 mm.
+        load_friction: Friction for each newton of the load.
+    """
     random, time = np.random.default_rng(seed), np.arange(1500) / 250.0
     out = []
     for k in range(14):
@@ -329,7 +339,9 @@ def _lifted(seed: int) -> list[Recording]:
         acceleration = np.gradient(speed, time)
         force = mass * (9.81 + acceleration)
         lost = 22.0 * (9.81 + acceleration) + 180.0 * speed + 28.0 * np.tanh(speed / 0.002)
-        constant = 90.0 * (1.0 + 0.05 * np.cos(2.0 * np.pi * place / 0.12))
+        lost += ripple_n * np.sin(2.0 * np.pi * place / 0.01 + 0.7)
+        lost += load_friction * np.abs(force) * np.tanh(speed / 0.002)
+        constant = 90.0 * (1.0 + gain * np.cos(2.0 * np.pi * place / 0.12))
         columns = {
             "motor_current_a": (force + lost) / constant + random.normal(0, 0.015, len(time)),
             "carriage_position_m": place + random.normal(0, 1e-6, len(time)),
@@ -343,7 +355,29 @@ def _lifted(seed: int) -> list[Recording]:
 def test_the_mass_behind_a_load_cell_is_no_inertia_that_differs(seed: int) -> None:
     """Within a run the cell reads mass times acceleration: as if the drive had less inertia."""
     (model,) = declared(plant_file.parse(LIFT))
-    runs = _lifted(seed)
+    runs = _lifted(seed, gain=0.05)
     found = diagnose(runs, [model], split(runs)).findings
     assert not any(one.verdict == "identified" for one in found)
     assert any("carriage_position" in one.depends_on for one in found)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5])
+def test_two_effects_of_a_lift_are_not_explained_by_its_load_cell(seed: int) -> None:
+    """Without them the drive's constant is far too small: without its load the cell fits better."""
+    (model,) = declared(plant_file.parse(LIFT))
+    runs = _lifted(seed, ripple_n=8.0, load_friction=0.08)
+    found = diagnose(runs, [model], split(runs)).findings
+    assert found
+    assert {one.family for one in found} <= {"ripple.motor", "friction.load", "unknown"}
+
+
+@pytest.mark.parametrize("factor", [0.3, 0.6, 3.0])
+def test_a_load_cell_may_have_another_gain_in_some_runs(factor: float) -> None:
+    runs = [
+        run.with_columns(crank_torque_n_m=run["crank_torque_n_m"] * (factor if k in has else 1.0))
+        for has in [(1, 4, 5)]
+        for k, run in enumerate(turning(size=3.0))
+    ]
+    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    assert (finding.family, finding.runs_affected) == ("sensor.gain", ("01", "04", "05"))
+    assert finding.parameters["change"].value == pytest.approx(factor - 1.0, rel=0.02)

@@ -482,17 +482,17 @@ def _noisy() -> list[Recording]:
 
 
 @pytest.mark.parametrize("seed", [12, 13, 19, 29])
-def test_losses_at_their_bounds_are_those_of_the_least_error(seed: int) -> None:
+def test_terms_at_their_bounds_are_those_of_the_least_error(seed: int) -> None:
     """Of two frictions that come out negative together, only one has to be zero."""
     joint = Joint(_laid(resisting(seed), motor()))
     kinds = joint.layout.equations["motor"].kinds
-    losses = [k for k, column in enumerate(kinds) if column.is_loss]
+    bounded = [k for k, column in enumerate(kinds) if column.is_bounded]
     errors = []
-    for some in itertools.product((False, True), repeat=len(losses)):
+    for some in itertools.product((False, True), repeat=len(bounded)):
         held = np.zeros_like(joint.held)
-        held[losses] = some
+        held[bounded] = some
         fitted = joint.holding(held).left_out([[]]).base[0]
-        if (joint.whole(fitted)[losses] >= -1e-9)[~held[losses]].all():
+        if (joint.whole(fitted)[bounded] >= -1e-9)[~held[bounded]].all():
             errors.append(_squared_error(joint, fitted))
     chosen = _squared_error(joint, joint.left_out([[]]).base[0])
     assert len(errors) > 1
