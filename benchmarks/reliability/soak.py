@@ -95,7 +95,7 @@ def soak(config_name: str, duration_s: float, where: str) -> Soak:
     with Session(config, link) as session:
         next(session.rest(0.5))
         began_s, busy_s = time.monotonic(), time.process_time()
-        start, blocks = session.spindle_angle_rad, round(duration_s / BLOCK_S)
+        start, blocks = session.here[0], round(duration_s / BLOCK_S)
         phase = 2 * np.pi * np.arange(round(1000 * BLOCK_S)) / (1000 * PERIOD_S)
         try:
             session.settle()

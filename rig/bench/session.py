@@ -135,11 +135,6 @@ class Session:
             "board_start": str(self.identity.boot),
         }
 
-    @property
-    def spindle_angle_rad(self) -> float:
-        """Where the spindle stood in the newest sample, rad."""
-        return self.here[0]
-
     def safe(self) -> None:
         """Disarm: command 0, load 0, confirmed by the logger.
 

@@ -260,6 +260,8 @@ def _report_lines(report: "LogReport") -> Iterator[str]:
 
 
 def _repair_lines(report: "RepairReport") -> Iterator[str]:
+    from rig.log.streams import SAMPLE
+
     if report.repaired is None:
         yield f"{report.original} is not damaged; nothing was written."
         return
@@ -271,8 +273,9 @@ def _repair_lines(report: "RepairReport") -> Iterator[str]:
             " the run, and no sample. Record the run again."
         )
     for topic, count in report.recovered.items():
+        what = "samples" if topic == SAMPLE else "messages"  # of the same samples
         unproven = report.salvaged.get(topic, 0)
         note = f", {unproven} of them from the torn end, without a checksum" if unproven else ""
         lost = report.lost.get(topic, 0)
-        yield f"  {topic}: {count} samples recovered{note}; {lost} known lost"
+        yield f"  {topic}: {count} {what} recovered{note}; {lost} known lost"
     yield f"{report.original} is unchanged."

@@ -109,7 +109,7 @@ def hold_grip(
     session.settle()
     session.take_zeros(0.5)
     most_a = SHARE * limits.load_command_a
-    controller = Grip(torque_n_m, session.spindle_angle_rad, most_a, duration_s)
+    controller = Grip(torque_n_m, session.here[0], most_a, duration_s)
     period = _Period()
     for reading in session.follow(controller.setpoints()):
         estimate = within_range(estimator, estimator.push(reading.columns, reading.time_s))

@@ -60,7 +60,7 @@ def test_the_spindle_follows_its_target_and_the_drive_ends_without_power(alone):
     with Session(settings, link) as session:
         next(session.rest(0.1))
         session.settle()
-        start = session.spindle_angle_rad
+        start = session.here[0]
         readings = list(session.play(start + np.linspace(0, 0.2, 600), np.zeros(600)))
         assert drive_of(link).state is State.OPERATION_ENABLED
     setpoint = np.concatenate([r.setpoint for r in readings])
@@ -201,7 +201,7 @@ def readings_of_a_host_that_pauses() -> list[Reading]:
     readings = []
     with Session(settings, open_logger(settings)) as session:
         next(session.rest(0.1))
-        start = session.spindle_angle_rad
+        start = session.here[0]
         for k, reading in enumerate(session.play(start + np.linspace(0, 0.1, 800), np.zeros(800))):
             readings.append(reading)
             if k == 3:

@@ -110,7 +110,7 @@ def test_a_motion_in_real_time_is_not_held_up_by_a_collection_of_all_objects(lib
     before = gc.get_freeze_count()
     with Session(config, open_logger(config)) as session:
         next(session.rest(0.1))
-        still = np.full(50, session.spindle_angle_rad)
+        still = np.full(50, session.here[0])
         for _ in session.play(still, np.zeros(50)):
             looked_at = len(gc.get_objects())
     assert looked_at < len(gc.get_objects()) / 10

@@ -36,7 +36,7 @@ def restarted(library: Path, monkeypatch: pytest.MonkeyPatch) -> FirmwareBoard:
 def played(board: FirmwareBoard) -> float:
     """Return the largest deviation of the spindle from 0.3 rad while it is held there."""
     with Session(simulated(), SimulatedTransport(board, "sim://")) as session:
-        return max(abs(session.spindle_angle_rad - 0.3) for _ in session.play(*STILL))
+        return max(abs(session.here[0] - 0.3) for _ in session.play(*STILL))
 
 
 def test_a_restarted_board_moves_only_after_the_command(restarted, answered):

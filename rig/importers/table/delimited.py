@@ -26,7 +26,9 @@ LEAST_LINES, MOST_NOTES = 4, 200
 BRACKETS = " []()"
 """What a unit below the head may stand in."""
 
-SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "space"}
+SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", " ": "space"}
+"""Signs between columns, those first that stand in a line for nothing else."""
+
 THOUSANDS = re.compile(
     r"[-+]?[1-9]\d{0,2}(?:(?P<sign>[.,' ])\d{3})(?:(?P=sign)\d{3})*(?:(?!(?P=sign))[.,]\d*)?"
 )
@@ -48,8 +50,8 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
     start = layout.skip_lines
     while start < len(lines) and _is_blank(lines[start], layout.comment):
         start += 1
-    if start < len(lines) and lines[start].startswith("sep=") and len(lines[start]) == 5:
-        sign = layout.separator or lines[start][4]  # stated by a spreadsheet
+    if start < len(lines) and (said := re.fullmatch("sep=(.)", lines[start])):
+        sign = layout.separator or said[1]  # stated by a spreadsheet
         layout = layout.model_copy(update={"separator": sign})
         start += 1
     start, remarks = _after_notes(path, lines, start, layout)
@@ -57,14 +59,12 @@ def read_delimited(path: Path, layout: Layout) -> Raw:
     remarks += more
     if start >= len(lines):
         raise DataError(f"{path} has no rows.", fix="Name a file with a head and samples.")
-    separator, more = _separator(path, lines[start], layout)
-    remarks += more
+    separator = _separator(path, lines[start], layout)
+    if separator in lines[start] and not layout.separator:
+        remarks.append(f"columns are separated by a {SEPARATORS[separator]}")
     try:
-        rows = [
-            (number, cells)
-            for number, cells in _cells(lines, start, separator, layout.comment)
-            if any(cell.strip() for cell in cells)
-        ]
+        every = _cells(lines, start, separator, layout.comment)
+        rows = [row for row in every if any(map(str.strip, row[1]))]
     except csv.Error as error:
         raise DataError(f"{path} cannot be read as a text table: {error}.") from error
     is_cut = not text.endswith(("\n", "\r"))
@@ -155,19 +155,17 @@ def _after_notes(path: Path, lines: list[str], start: int, layout: Layout) -> tu
         below += 1
     if below in (start, len(lines)) or layout.comment or layout.header is not None:
         return start, []
-    separator = _separator(path, lines[below], layout)[0]
+    separator = _separator(path, lines[below], layout)
     last = max(k for k in range(start, below) if lines[k].strip())
     bare = lines[last].lstrip("".join(MARKS)).lstrip()
     as_it_is, without_mark, wanted = (
         len(_split(line, separator)) if line else 0 for line in (lines[last], bare, lines[below])
     )
-    left_out = "lines that begin with # or % are left out"
-    if as_it_is == wanted:
-        return last, [left_out] if last > start else []
-    if without_mark == wanted:
+    if without_mark == wanted != as_it_is:
         lines[last] = bare
         return last, [f"line {last + 1} is the head"]
-    return below, [left_out]
+    head = last if as_it_is == wanted else below
+    return head, ["lines that begin with # or % are left out"] if head > start else []
 
 
 def _above_samples(
@@ -182,7 +180,7 @@ def _above_samples(
     if layout.skip_lines or layout.header is not None or len(own) < LEAST_LINES:
         return start, []
     last = lines[own[-2]]  # the very last one may be cut off
-    separator = _separator(path, last, layout)[0]
+    separator = _separator(path, last, layout)
     cells = _split(last, separator)
     decimal = layout.decimal or _decimal([(0, [""]), (1, cells)], separator)
     held = [c for c, cell in enumerate(cells) if _is_number(cell, decimal)]
@@ -202,13 +200,10 @@ def _above_samples(
     head = min(len(own) - 2, MOST_NOTES)
     while head and holds(head - 1) in ({"number"}, {"number", "nothing"}):
         head -= 1
-    if (
-        head > 1
-        and holds(head - 2) == {"text"}
-        and holds(head - 1) in ({"text"}, {"text", "nothing"})
-    ):
+    is_text = head > 0 and holds(head - 1) in ({"text"}, {"text", "nothing"})
+    if is_text and head > 1 and holds(head - 2) == {"text"}:
         head -= 2  # names, and below them units
-    elif head and holds(head - 1) == {"text"}:
+    elif is_text and holds(head - 1) == {"text"}:
         head -= 1
     again = next((k for k in own[:head] if lines[k].strip() == lines[own[head]].strip()), None)
     if again is not None:
@@ -224,16 +219,11 @@ def _is_blank(line: str, comment: str) -> bool:
     return not line.strip() or bool(comment and line.lstrip().startswith(comment))
 
 
-def _separator(path: Path, line: str, layout: Layout) -> tuple[str, list[str]]:
-    if layout.separator:
-        return layout.separator, []
-    counts = {one: line.count(one) for one in SEPARATORS if one != layout.decimal}
-    for one in (";", "\t", ",", " "):
-        if counts.get(one):
-            return one, [f"columns are separated by a {SEPARATORS[one]}"]
-    if path.suffix.lower() == ".tsv":
-        return "\t", []
-    return ",", []
+def _separator(path: Path, line: str, layout: Layout) -> str:
+    """Return the sign between the columns of a line: as stated, else the first that is there."""
+    there = (one for one in SEPARATORS if one != layout.decimal and one in line)
+    usual = "\t" if path.suffix.lower() == ".tsv" else ","
+    return layout.separator or next(there, usual)
 
 
 def _cells(
@@ -302,8 +292,7 @@ def _check_widths(path: Path, body: list[tuple[int, list[str]]], width: int, is_
     wrong = [place for place, (_, cells) in enumerate(body) if len(cells) != width]
     if not wrong:
         return
-    place, count = wrong[0], len(body) - wrong[0]
-    line, cells = body[place]
+    (line, cells), count = body[wrong[0]], len(body) - wrong[0]
     fix = f"Delete line {line} or save the file again." if count == 1 else f"Correct line {line}."
     raise DataError(
         f"{path}, line {line}: {len(cells)} fields, not {width} as in the first line.",
