@@ -81,14 +81,15 @@ def read(
         format_name: Importer of a known format; detected if none.
 
     Raises:
-        UsageError: The path or the machine file is not there, or the mapping is wrong.
+        UsageError: The path is not there, or the mapping is wrong.
+        NoPlantError: No such machine.
         DataError: A file is damaged or not what the mapping states.
     """
     from rig.importers.registry import open_campaign
     from rig.importers.table.mapping import read_mapping
     from rig.importers.table.open import open_table
     from rig.machines.recordings import with_positions
-    from rig.machines.shipped import read_machine
+    from rig.machines.shipped import place_of, read_machine
 
     if machine is None and columns is None and runs is None and rate_hz is None:
         return open_campaign(Path(path), format_name)
@@ -99,8 +100,9 @@ def read(
     ]
     if rate_hz is not None:
         flags.append((("sample_rate_hz",), rate_hz, "rate_hz"))
-    campaign = open_table(Path(path), read_mapping(Path(machine) if machine else None, flags))
-    return with_positions(campaign, read_machine(Path(machine))) if machine else campaign
+    file = place_of(Path(machine)) if machine else None
+    campaign = open_table(Path(path), read_mapping(file, flags))
+    return with_positions(campaign, read_machine(file)) if file else campaign
 
 
 def save(campaign: Campaign, folder: Path | str) -> list[Path]:

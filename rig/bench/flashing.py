@@ -38,9 +38,7 @@ class Board:
 def board_to_flash(serial: str, profile: Profile) -> Board:
     """Return the board to flash, once it is known to be the only one and not armed.
 
-    Args:
-        serial: Serial number it must have; any when empty.
-        profile: The protocol its present firmware may speak.
+    It must have the serial number, if one is given; its present firmware may speak the profile.
 
     Raises:
         UsageError: No board, several, or another one than named is plugged in.

@@ -31,11 +31,9 @@ class LoggerStalledError(RigError):
 
 
 class Intake:
-    """Takes in the samples of a logger that streams.
+    """Takes in the samples of a logger that streams; the way to it has its clock.
 
-    Args:
-        way: The way to it, for its clock.
-        gathers: Whether samples come by themselves, as time passes.
+    With `gathers` samples come by themselves, as time passes.
     """
 
     def __init__(self, logger: TeensyLogger | SensorLogger, way: Clocked, gathers: bool) -> None:
@@ -49,8 +47,7 @@ class Intake:
     def next(self, boot: int) -> SampleBatch:
         """Give the logger a sign of life, and return its next samples, one or more.
 
-        Args:
-            boot: Number of the start of the board that the samples are of.
+        They are of the board's start with the number `boot`.
 
         Raises:
             BoardResetError: The board was restarted, and sends nothing.

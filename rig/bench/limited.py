@@ -2,9 +2,9 @@
 
 from collections.abc import Collection, Sequence
 from contextlib import closing
-from difflib import get_close_matches
 
 from calibration.linear import CalibrationSet
+from estimation.errors import nearest
 from rig.bench.companions import Companion
 from rig.bench.device_logger import with_channels
 from rig.bench.logger import DRIVE, open_section
@@ -56,9 +56,7 @@ def limit_problems(config: Config) -> list[Problem]:
 
 
 def _unknown(limits: Collection[str], known: Collection[str]) -> list[Problem]:
-    found = []
-    for name in sorted(set(limits) - set(known)):
-        near = get_close_matches(name, known, n=1)
-        fix = f"Did you mean {near[0]!r}?" if near else f"There are: {', '.join(sorted(known))}."
-        found.append(Problem("limits", f"No device has the channel {name!r}.", fix))
-    return found
+    return [
+        Problem("limits", f"No device has the channel {name!r}.", nearest(name, sorted(known)))
+        for name in sorted(set(limits) - set(known))
+    ]

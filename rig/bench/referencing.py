@@ -50,15 +50,10 @@ def require_place(config: Config, here_rad: Sequence[float]) -> None:
 
 
 def reference_board(config: Config, here_rad: Sequence[float], at_index: bool = False) -> Identity:
-    """Reference the board of the configured rig, which stands still and disarmed.
+    """Reference the board of a rig that stands still and disarmed; return its identity then.
 
-    Args:
-        config: The rig.
-        here_rad: Where it stands: the machine's `here_channels`, rad.
-        at_index: Whether that is where the index of the spindle's encoder is; it is waited for.
-
-    Returns:
-        The identity of the referenced board.
+    The rig stands at `here_rad`: the machine's `here_channels`, rad. With `at_index` that is where
+    the index of the spindle's encoder is; it is waited for.
 
     Raises:
         UsageError: See `require_place`.

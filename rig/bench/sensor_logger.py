@@ -92,12 +92,7 @@ class RateWatch:
         self._read_s = self._settled_s = -np.inf
 
     def check(self, asked_s: float, arrived_s: float, sequence: int | None) -> None:
-        """Take one read.
-
-        Args:
-            asked_s: When the read began.
-            arrived_s: When it ended.
-            sequence: Number of its newest sample; None without one.
+        """Take one read: when it began and ended, and the number of its newest sample, if any.
 
         Raises:
             DriverError: The rates differ by more than `RATE_TOLERANCE`.

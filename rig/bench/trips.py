@@ -148,12 +148,8 @@ def tripped(reading: Reading) -> tuple[Trip, bool] | None:
 class HostWatch:
     """The board's guards once more, on the samples as they arrived: the compiled core's own.
 
-    Without the compiled core this computer holds `[limits]` alone.
-
-    Args:
-        gains: Gains the board was armed with.
-        limits: Limits the board was armed with.
-        machine: What it moves.
+    It has the gains and limits that the board was armed with. Without the compiled core this
+    computer holds `[limits]` alone.
     """
 
     def __init__(self, gains: Sequence[Any], limits: ArmLimits, machine: Machine) -> None:
@@ -188,11 +184,9 @@ class BoardResetError(RigError):
 
 
 def require_same_start(logger: TeensyLogger | SensorLogger, boot: int) -> None:
-    """Compare the board's present start number with the session's.
+    """Compare the board's present start number with that of the session's beginning.
 
-    Args:
-        logger: The board. One that does not answer is left to the caller to report.
-        boot: Start number when the session began.
+    A board that does not answer is left to the caller to report.
 
     Raises:
         BoardResetError: The numbers differ.

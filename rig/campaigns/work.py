@@ -26,13 +26,10 @@ T = TypeVar("T")
 def engine(
     workers: int = 1, scheduler: str | None = None, connect_s: float = 20.0
 ) -> Iterator[Executor | None]:
-    """Yield what work is given to, or None for this process.
+    """Yield what work is given to: processes of this machine, or None for this one (1).
 
-    Args:
-        workers: Processes of this machine; 1 is this one.
-        scheduler: Address of a Dask scheduler, such as `tcp://host:8786`; goes before `workers`.
-            Its workers need the same version of rig.
-        connect_s: Time to wait for the scheduler.
+    The address of a Dask scheduler, such as `tcp://host:8786`, goes before that. It is waited for
+    `connect_s`; its workers need the same version of rig.
 
     Raises:
         UsageError: The number of workers is impossible, the extra is not installed, or no

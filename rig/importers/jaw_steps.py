@@ -52,20 +52,13 @@ class JawStep:
 
 
 def with_one_zero(campaign: Campaign, target: str) -> tuple[Campaign, tuple[JawStep, ...]]:
-    """Return a campaign to estimate the jaw's angle on, with its zero where the last run has it.
+    """Return a campaign with the jaw's zero where the last run has it, and the steps taken off.
 
     Zeros are found by comparing runs that share conditions: the load stretches the cable and so
     moves the jaw by degrees; the share of each load, wrist, trajectory and instrument is fitted
     with the zeros. Flagged samples are left out. One run is held at a time. A campaign with as many
-    levels as runs shows no step.
-
-    Args:
-        campaign: The runs, in the order they were taken.
-        target: Channel that is estimated; of any but `jaw_angle_rad` the campaign is returned as it
-            is.
-
-    Returns:
-        The campaign, and the steps that were taken off.
+    levels as runs shows no step. The runs are in the order they were taken. A campaign to estimate
+    another target than `jaw_angle_rad` on is returned as it is.
 
     Raises:
         MissingChannelError: A run has no `jaw_angle_rad`.

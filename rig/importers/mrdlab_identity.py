@@ -71,12 +71,10 @@ class Identity:
 
 
 def identify(path: Path, header: str, columns: FloatArray) -> Identity:
-    """Combine the folder's name, the file's stem, the header text and the signs of the columns.
+    """Combine the folder's name, the file's stem, the header's `%` lines and the columns' signs.
 
-    Args:
-        path: The log; of a stem of three digits, the first is the jaw stop.
-        header: The `%` lines.
-        columns: Raw values in the file's column order, shape (10, n).
+    Of a stem of three digits the first is the jaw stop. The columns are raw values in the file's
+    order, shape (10, n).
 
     Raises:
         DataError: Names and signs disagree, neither states a side, or a torque, the current or the

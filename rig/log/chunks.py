@@ -57,13 +57,9 @@ class Found:
 def read_chunks(
     buffer: memoryview, chunks: Sequence[ChunkRef], streams: dict[int, Stream], wanted: set[int]
 ) -> Found:
-    """Unpack the chunks of a file and gather the messages of the wanted channels.
+    """Unpack the chunks of a file, in file order, and gather the messages of the wanted channels.
 
-    Args:
-        buffer: The bytes of the file.
-        chunks: Its chunks, in file order.
-        streams: Stream of each channel of fixed size.
-        wanted: Channels to read, keys of `streams`.
+    `streams` has the stream of each channel of fixed size; the wanted ones are keys of it.
     """
     batches: dict[int, list[ChunkRef]] = defaultdict(list)
     before = 0

@@ -31,13 +31,10 @@ def carried_calibrations(log: LogFile) -> CalibrationSet:
 
 
 def recalibrated(log: LogFile, calibrations: CalibrationSet) -> LogFile:
-    """Return the log with its SI channels made again from its counts.
+    """Return a log, read whole, with its SI channels made again from its counts.
 
-    Zeros that were measured before the run are kept: they are counts, whatever the line.
-
-    Args:
-        log: A log with both streams, read whole.
-        calibrations: Lines to apply; channels of the log without one stay as they were.
+    Channels without a line stay as they were. Zeros that were measured before the run are kept:
+    they are counts, whatever the line.
 
     Raises:
         UsageError: The log has no raw counts.

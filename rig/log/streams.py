@@ -57,11 +57,7 @@ FLIGHT_STREAM = Stream(
 
 
 def sample_stream(channels: Sequence[str], rate_hz: float | None) -> Stream:
-    """Return the stream of SI samples with these channels.
-
-    Args:
-        channels: Channel names with their unit; `time_s` is added in front.
-        rate_hz: Expected rate, Hz.
+    """Return the stream of SI samples with these channels, `time_s` in front, and expected rate.
 
     Raises:
         UnknownUnitError: A channel carries no unit.

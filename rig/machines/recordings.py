@@ -29,15 +29,9 @@ def open_recordings(
 ) -> Campaign:
     """Open recordings as `open_campaign` does, those of a foreign table by the file's `[data]`.
 
-    Args:
-        path: File, folder or archive.
-        machine: Machine file or the name of a shipped one; None for the reference rig.
-        format_name: Importer to use; found from the path when None.
-        skip_bad: Exclude runs that cannot be read, with the reason.
+    The machine is a file or the name of a shipped one; None is the reference rig.
 
     Raises:
-        UsageError: The path does not exist, or the format is not known.
-        DataError: The recordings cannot be read.
         NoPlantError: No such machine.
     """
     if machine is None:

@@ -239,10 +239,8 @@ def check_samples(
 ) -> None:
     """Hold every limit against every sample, armed or not; what is not a number is beyond it.
 
-    Args:
-        limits: Channel to its largest absolute value.
-        columns: Values by channel; a limit whose channel is not among them is left out.
-        time_s: Time of each sample in the session.
+    A limit is the largest absolute value of a channel; one without a column is left out. `time_s`
+    is the time of each sample in the session.
 
     Raises:
         SafetyTripError: A value is beyond its limit. The caller disarms the rig.

@@ -58,9 +58,9 @@ def _drawn(figure: Figure, caption: str) -> Markup:
     return Markup(text)  # noqa: S704 - drawn here, not taken from anyone
 
 
-def _axes(width_in: float, height_in: float, columns: int = 1) -> tuple[Figure, list[Axes]]:
+def _axes(height_in: float, columns: int = 1) -> tuple[Figure, list[Axes]]:
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        figure = Figure(figsize=(7.2, height_in), layout="constrained")
         figure.patch.set_alpha(0.0)
         axes = [figure.add_subplot(1, columns, k + 1) for k in range(columns)]
     for ax in axes:
@@ -81,7 +81,7 @@ def over_time(
 
     The caption of any figure describes it for readers who cannot see it.
     """
-    figure, (ax,) = _axes(7.2, 2.6)
+    figure, (ax,) = _axes(2.6)
     with mpl.rc_context(_STYLE):
         time = thinned(time_s, POINTS)
         for colour, (name, values) in zip(COLOURS, series.items(), strict=False):
@@ -105,7 +105,7 @@ def against(
     Variables, by name and unit, and values have shape (n,). The panels stand side by side, on one
     scale. The bins are those of `binned`.
     """
-    figure, axes = _axes(7.2, 2.5, len(variables))
+    figure, axes = _axes(2.5, len(variables))
     series = [("before", before, COLOURS[1]), ("after", after, COLOURS[0])]
     with mpl.rc_context(_STYLE):
         for ax, (label, variable) in zip(axes, variables.items(), strict=True):
@@ -133,7 +133,7 @@ def paired_bars(
     values: Mapping[str, Sequence[float]], sides: Sequence[str], unit: str, caption: str
 ) -> Markup:
     """Draw the bars of each name next to one another, one for each side."""
-    figure, (ax,) = _axes(7.2, 2.2)
+    figure, (ax,) = _axes(2.2)
     with mpl.rc_context(_STYLE):
         place, step = np.arange(len(values)), 0.72 / len(sides)
         for k, (side, colour) in enumerate(zip(sides, COLOURS, strict=False)):
@@ -153,7 +153,7 @@ def scattered(
     series: Mapping[str, tuple[FloatArray, FloatArray]], x_label: str, y_label: str, caption: str
 ) -> Markup:
     """Draw points, one colour a series of x and y, and a line at zero."""
-    figure, (ax,) = _axes(7.2, 2.6)
+    figure, (ax,) = _axes(2.6)
     with mpl.rc_context(_STYLE):
         for number, (name, (x, y)) in enumerate(series.items()):
             step = max(1, len(x) // 400)

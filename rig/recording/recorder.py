@@ -17,10 +17,8 @@ from rig.recording.session_log import SessionLog, mean_counts
 class LiveRecorder:
     """Writes readings of a session to a log while it is on.
 
-    Args:
-        folder: Folder of the logs.
-        kind: What is recorded; a log is named after it.
-        further: Columns that readings have in addition to those of the session.
+    A log is named after the kind of what is recorded. Readings have the further columns in addition
+    to those of the session.
     """
 
     def __init__(

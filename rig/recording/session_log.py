@@ -25,12 +25,9 @@ from rig.machines.reading import Reading
 class SessionLog(LogWriter):
     """A log of readings; its clock `time_s` begins with the first one that is written.
 
-    The log carries the session's configuration and calibrations.
-
-    Args:
-        path: Path of the log, ending in `.mcap`.
-        run: What is known of the run beyond what the session states; its start is known.
-        further: Columns that readings have in addition to those of the session.
+    The log carries the session's configuration and calibrations. The run states what is known
+    beyond the session, its start too; readings have the further columns in addition to those of
+    the session.
     """
 
     def __init__(
@@ -92,10 +89,8 @@ class SessionLog(LogWriter):
     def write_beside(self, blocks: Mapping[str, Beside]) -> None:
         """Write what further devices measured since the run began, on the logger's clock.
 
-        Both clocks' lines are fitted again all the time; times increase all the same.
-
-        Args:
-            blocks: Samples of each by the topic of its stream.
+        The blocks are samples of each by the topic of its stream. Both clocks' lines are fitted
+        again all the time; times increase all the same.
         """
         start_us = self._start_us or 0
         for topic, block in blocks.items():

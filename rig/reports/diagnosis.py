@@ -84,10 +84,7 @@ def json_of(done: Answer) -> str:
 def write(
     done: Answer, seed: int, page_file: Path | None, json_file: Path | None = None
 ) -> list[str]:
-    """Write the page and the JSON of a diagnosis where they are asked for.
-
-    Returns:
-        A line for each file written, the page first.
+    """Write the page and the JSON of a diagnosis where asked for; return a line for each file.
 
     Raises:
         OSError: A file cannot be written.
@@ -105,10 +102,9 @@ def write(
 def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
     """Return a finding as the person at the bench needs it.
 
-    Returns:
-        What it is in plain words, the verdict, name and text of each fact (size, error, confidence,
-        alternatives), what to check at the rig, and the command that describes the effect, empty
-        without a name.
+    What it is in plain words, the verdict, name and text of each fact (size, error, confidence,
+    alternatives), what to check at the rig, and the command that describes the effect, empty
+    without a name.
     """
     scale, unit = words.display(diagnosis.unit[finding.error_of], finding.rmse_before)
     named = finding.verdict in ("identified", "one_of")

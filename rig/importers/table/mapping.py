@@ -4,7 +4,6 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,6 @@ from rig.errors import DataError, UsageError
 from rig.importers.table.data import DATE, TIME, Data, Invalid, Runs, Section, Source
 from rig.importers.table.formula import FormulaError, evaluate, names_in
 from rig.importers.table.units import NotAUnitError, conversion
-
-EXAMPLES = Path(str(files("rig"))) / "machines" / "examples"
-"""Folder of the shipped machine files; `--machine` takes their names."""
 
 
 class _Whole(Section):
@@ -67,14 +63,12 @@ def read_mapping(
     """Read the mapping of a machine's file and of the command line, which comes first.
 
     Args:
-        file: The machine's file, the name of a shipped one, or None.
+        file: The machine's file, or None; `rig.machines.shipped.place_of` finds a shipped one.
         flags: For each entry of the command line its path below `[data]`, value and words.
 
     Raises:
         UsageError: A file is not there or not TOML, a key is unknown or wrong, a unit does not fit.
     """
-    if file is not None and not file.exists() and (EXAMPLES / f"{file}.toml").exists():
-        file = EXAMPLES / f"{file}.toml"
     text, content = _content(file) if file else ("", {})
     words: dict[tuple[str, ...], str] = {}
     for path, value, typed in flags:
@@ -100,11 +94,6 @@ def _content(file: Path) -> tuple[str, dict[str, Any]]:
     try:
         text = file.read_text("utf-8")
         content = tomllib.loads(text)
-    except FileNotFoundError as error:
-        shipped = ", ".join(sorted(path.stem for path in EXAMPLES.glob("*.toml")))
-        raise UsageError(
-            f"There is no machine file {file}.", f"Shipped: {shipped}.", "Check the path."
-        ) from error
     except UnicodeDecodeError as error:
         raise UsageError(f"{file} is not a machine file.", *not_utf8(error)) from error
     except (OSError, tomllib.TOMLDecodeError) as error:

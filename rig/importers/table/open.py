@@ -35,12 +35,8 @@ READERS: Mapping[str, Callable[[Path, Layout], Raw]] = {
 def open_table(path: Path, mapping: ColumnMapping, skip_bad: bool = False) -> Campaign:
     """Read the runs of a table, a file or a folder of files, into a campaign.
 
-    A run that is there twice counts once.
-
-    Args:
-        path: File or folder.
-        mapping: How it is read.
-        skip_bad: Exclude files and runs that cannot be read, with the reason, unless none can.
+    A run that is there twice counts once. With `skip_bad` files and runs that cannot be read are
+    excluded, with the reason, unless none can.
 
     Raises:
         UsageError: The path does not exist.

@@ -176,13 +176,8 @@ def as_unit(text: str) -> str:
 def agree(stated: str, unit: str, gain: float, name: str) -> bool | None:
     """Return whether a file and a mapping state the same unit of a column; None if unreadable.
 
-    A gain may turn one unit into the other, and any unit into one of another dimension.
-
-    Args:
-        stated: What the file states.
-        unit: What the mapping states; nothing means the SI unit of the channel.
-        gain: Factor of the mapping.
-        name: The channel.
+    Unit and gain are what the mapping states; no unit means the SI unit of the channel. A gain may
+    turn one unit into the other, and any unit into one of another dimension.
     """
     if not as_unit(stated):
         return None

@@ -22,11 +22,13 @@ TIME = np.arange(0, 8, 0.01)
 WAVE = np.sin(2 * TIME)
 
 
+def asked(path, *flags):
+    """Return the questions of a preview about the table at a path."""
+    return preview(list(read_runs(path, read_mapping(None, flags), [])), []).questions
+
+
 def questions(tmp_path, **columns):
-    path = text_table(tmp_path / "run.csv", columns)
-    remarks = []
-    recordings = list(read_runs(path, read_mapping(None, []), remarks))
-    return preview(recordings, remarks).questions
+    return asked(text_table(tmp_path / "run.csv", columns))
 
 
 @pytest.mark.parametrize(
@@ -81,8 +83,7 @@ def test_a_value_that_stands_for_no_reading_is_named_with_its_remedy_alone(tmp_p
         if number == 3:
             columns["motor_angle_rad"] = spiked(WAVE, **{f"k{k}": -174.5 for k in range(100, 110)})
         text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
-    recordings = list(read_runs(tmp_path, read_mapping(None, []), []))
-    (found,) = (q for q in preview(recordings, []).questions if "same" not in q)
+    (found,) = (q for q in asked(tmp_path) if "same" not in q)
     assert found.startswith("motor_angle_rad: 10 samples far beyond all others, exactly -174.5 rad")
     assert "from 1 s of run3 to 1.09 s of run3; does that mean that nothing was read?" in found
     when = re.search(r"when = '(.*?)'", found)[1]
@@ -113,7 +114,7 @@ def test_a_run_that_is_there_twice_is_asked_about_and_counts_once(tmp_path, said
     for name in ("a", "b", "c"):
         factor = 1.1 if name == "b" else 1.0
         text_table(tmp_path / f"{name}.csv", columns | {"motor_angle_rad": factor * WAVE})
-    (found,) = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    (found,) = asked(tmp_path)
     assert found.startswith("a, c: these runs are the same, sample by sample")
     campaign = open_table(tmp_path, read_mapping(None, []))
     assert campaign.evidence.names == ("a", "b")
@@ -130,7 +131,7 @@ def test_a_channel_that_is_clipped_in_some_runs_is_named_with_them(tmp_path):
     for number in range(4):
         force = np.minimum(WAVE, 0.8) if number == 2 else (0.7 + 0.01 * number) * WAVE
         text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, "load_force_n": force})
-    (found,) = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    (found,) = asked(tmp_path)
     assert "held at the greatest value, 0.8 N in run2; is it clipped?" in found
 
 
@@ -192,7 +193,7 @@ def test_a_file_in_another_unit_is_named_where_the_others_are_right(tmp_path):
         unit = 1000.0 if number in (1, 4) else 1.0
         columns = {"time_s": TIME, "motor_current_a": (0.8 + number) * unit * WAVE}
         text_table(tmp_path / f"run{number}.csv", columns)
-    found = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    found = asked(tmp_path)
     (large,) = (one for one in found if "unusually large" in one)
     assert "is unusually large in run1, run4, and the other runs are not" in large
     assert "milliamperes or counts there? A unit of [data] is that of all files" in large
@@ -204,8 +205,7 @@ def test_a_run_whose_zero_moved_is_asked_about(tmp_path):
         wave = (1 + 0.01 * number) * WAVE
         columns = {"time_s": TIME, "motor_angle_rad": wave, "zero": zero}
         text_table(tmp_path / f"run{number}.csv", columns)
-    mapping = read_mapping(None, [(("conditions", "motor_zero_offset_rad"), "zero", "")])
-    (found,) = preview(list(read_runs(tmp_path, mapping, [])), []).questions
+    (found,) = asked(tmp_path, (("conditions", "motor_zero_offset_rad"), "zero", ""))
     assert found.startswith("motor_zero_offset_rad: run5 has its zero at 3")
 
 
@@ -215,8 +215,7 @@ def of_runs(tmp_path, angles, currents):
         wave = np.sin(TIME * (2 + 0.1 * number))
         columns = {"motor_angle_rad": angle * wave, "motor_current_a": current * wave}
         text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
-    recordings = list(read_runs(tmp_path, read_mapping(None, []), []))
-    return preview(recordings, []).questions
+    return asked(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -265,7 +264,7 @@ def test_a_run_that_moves_less_by_friction_alone_is_known_by_its_noise(
             columns[name] = (size if is_odd else 1.0) * wave
             columns[name] += (of_noise or 1.0 if is_odd else 1.0) * noise
         text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
-    found = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    found = asked(tmp_path)
     assert any("load_angle_rad: it varies 0.1" in one for one in found) == is_asked
 
 
@@ -283,8 +282,7 @@ def test_a_condition_explains_that_a_channel_varies_less(tmp_path, masses, is_as
         wave = np.sin(TIME * (2 + 0.1 * number))
         columns = {"motor_angle_rad": wave, "rope_force_n": force * wave, "mass": 0 * TIME + mass}
         text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
-    mapping = read_mapping(None, [(("conditions", "load_mass_kg"), "mass", "")])
-    found = preview(list(read_runs(tmp_path, mapping, [])), []).questions
+    found = asked(tmp_path, (("conditions", "load_mass_kg"), "mass", ""))
     assert bool(found) == is_asked
     assert all("rope_force_n: it varies" in one for one in found)
 
@@ -303,8 +301,7 @@ def of_all_sizes(tmp_path, odd=1.0, odd_name="drive_command_v", fast=1.0):
         }
         columns[odd_name] *= odd if number == 3 else 1.0
         text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
-    recordings = list(read_runs(tmp_path, read_mapping(None, []), []))
-    return preview(recordings, []).questions
+    return asked(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -364,7 +361,7 @@ def test_a_channel_that_stands_still_while_the_machine_moves_is_named(
         if number in runs:
             columns[name][300:500] = columns[name][300]
         text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
-    found = preview(list(read_runs(tmp_path, read_mapping(None, []), [])), []).questions
+    found = asked(tmp_path)
     assert len(found) == is_asked
     assert all(one.startswith(f"{name}: it stands still in run3 from 3 to 4.99 s") for one in found)
 
@@ -410,8 +407,7 @@ def test_the_same_question_about_several_runs_is_asked_once(tmp_path):
     for number in range(3):
         gap = np.where(TIME > 4, TIME + 1 + number, TIME)
         text_table(tmp_path / f"run{number}.csv", {"time_s": gap, "motor_angle_rad": WAVE})
-    recordings = list(read_runs(tmp_path, read_mapping(None, []), []))
-    (question,) = preview(recordings, []).questions
+    (question,) = asked(tmp_path)
     assert question.startswith("run0: 1 gap in time, the longest of 1.01 s;")
     assert question.endswith("(2 others alike)")
 
