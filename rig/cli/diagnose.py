@@ -71,10 +71,10 @@ def diagnose(
     kept = _kept_with(path)
     page_file = report / "diagnosis.html" if report else kept and kept.with_suffix(".html")
     json_out = json_out or kept
-    outputs = {json_out: DIAGNOSIS, page_file: HTML, model_out: MODEL, protocol_out: PROTOCOL}
-    for output, kind in outputs.items():
+    for output, kind in {json_out: DIAGNOSIS, page_file: HTML}.items():
         check_output(output, kind)
-    for made in (model_out, protocol_out):
+    for made, kind in {model_out: MODEL, protocol_out: PROTOCOL}.items():
+        check_output(made, kind)
         options.require_new(made)
     looks = Ledger(ledger or default_ledger())
     with engine(workers, scheduler) as executor:
@@ -91,8 +91,8 @@ def diagnose(
         written.append(write_protocol(done.diagnosis, protocol_out))
     written += write(done, seed, page_file, json_out)
     looks.enter(look)
-    said = (*sentences(done.diagnosis), *done.diagnosis.notes, *written)
-    present(json_, done.diagnosis.to_json(), *said)
+    found = done.diagnosis
+    present(json_, found.to_json(), *sentences(found), *found.notes, *written)
 
 
 def _with_models(

@@ -6,6 +6,7 @@ from pathlib import Path
 from estimation.campaign import Campaign, Run
 from estimation.recording import Recording
 from rig.errors import DataError
+from rig.importers.registry import unreadable
 from rig.log.attempts import is_unfinished, run_name, standing, started_ns
 from rig.log.check import logs_in, looks_like_log
 from rig.log.convert import exclusion, recording_from_log
@@ -52,7 +53,7 @@ class LogImporter:
             try:
                 read.append(_sound(read_head(item)))
             except DataError as error:
-                bad.append(_unreadable(item, error))
+                bad.append(unreadable(f"{item.parent.name}/{item.name}", error, item))
         if not read:
             bad[0].recording()  # raises
         heads = sorted(standing(read), key=started_ns)
@@ -81,15 +82,6 @@ def _sound(log: LogFile) -> LogFile:
     if log.damage and not is_unfinished(log):
         raise damaged(log)
     return log
-
-
-def _unreadable(path: Path, error: DataError) -> Run:
-    """Return the run of a log that cannot be read, which reading it states."""
-
-    def load() -> Recording:
-        raise error
-
-    return Run(f"{path.parent.name}/{path.name}", load=load, source=path)
 
 
 def _run(head: LogFile, several: bool) -> Run:

@@ -100,10 +100,19 @@ def open_campaign(path: Path, format_name: str | None = None, skip_bad: bool = F
     campaign = without_copies(_importer(path, format_name).open(path))
     first: dict[str, tuple[str, str]] = {}
     runs = [replace(run, load=partial(_read, run, first)) for run in campaign.runs]
-    return Campaign(tuple(map(_or_excluded, runs) if skip_bad else runs))
+    return Campaign(tuple(map(or_excluded, runs) if skip_bad else runs))
 
 
-def _or_excluded(run: Run) -> Run:
+def unreadable(name: str, error: DataError, source: Path | None = None) -> Run:
+    """Return a run that cannot be read: whoever reads it gets the error."""
+
+    def load() -> Recording:
+        raise error
+
+    return Run(name, load, source)
+
+
+def or_excluded(run: Run) -> Run:
     """Return a run, excluded where reading it shows that it is damaged."""
     try:
         run.load()

@@ -8,22 +8,42 @@ from dataclasses import replace
 from typing import Self
 
 from drivers.registry import driver
-from drivers.teensy.profile import Profile
 from drivers.teensy.reference import REFERENCE
 from rig.configuration.config import Config
 from rig.errors import UsageError
+from rig.machines.machine import Machine
 from rig.machines.reference import ReferenceMachine
 from rig.protocols.motion import Motion
 from rig.protocols.protocol import Plan
 from rig.protocols.trajectory import SAMPLE_RATE_HZ
 
 
-def sampled_at(rate_hz: float) -> Profile:
-    """Return the reference rig's profile, with the tick of its core, sampled at another rate."""
-    return replace(REFERENCE, sampled_hz=rate_hz)
+class DeviceMachine(Machine):
+    """A machine with any device in the logger's place, at the rate of that."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self.profile = replace(REFERENCE, sampled_hz=rate_hz)  # with the tick of its core
+
+    @classmethod
+    def of(cls, config: Config) -> Self:
+        """Return the machine at the rate its device is asked at; 1000 Hz where that has none.
+
+        A fake is opened without options.
+
+        Raises:
+            UnknownDriverError: The driver is not installed, or does not load.
+        """
+        section = config.logger
+        asked = {} if config.is_simulated else section.options
+        options = {**driver(section.driver).options, **asked}
+        return cls(float(options.get("rate_hz", SAMPLE_RATE_HZ)))
+
+    def at(self, rate_hz: float) -> Self:
+        """Return the machine of a device with another rate."""
+        return type(self)(rate_hz)
 
 
-class DriveMachine(ReferenceMachine):
+class DriveMachine(DeviceMachine, ReferenceMachine):
     """A drive in place of the reference rig's motor and spindle.
 
     Args:
@@ -41,17 +61,8 @@ class DriveMachine(ReferenceMachine):
                 " the drive takes one.",
                 "Write a rate_hz that divides 1000, such as 50, 100, 125, 200, 250 or 500.",
             )
-        self.profile = sampled_at(rate_hz)
+        super().__init__(rate_hz)
         self._every = int(every)
-
-    @classmethod
-    def of(cls, config: Config) -> Self:
-        """Return the machine at the rate that the drive is asked at."""
-        return cls(rate_of(config))
-
-    def at(self, rate_hz: float) -> Self:
-        """Return the machine of a device with another rate."""
-        return type(self)(rate_hz)
 
     def first_look(self, config: Config) -> str:
         """Return the protocol without load."""
@@ -69,16 +80,3 @@ class DriveMachine(ReferenceMachine):
         setpoints = tuple(column[:: self._every] for column in motion.setpoints)
         first, last = (math.ceil(index / self._every) for index in (motion.first, motion.last))
         return Motion(setpoints, first, last)
-
-
-def rate_of(config: Config) -> float:
-    """Return the rate a device is asked at, by its options; 1000 Hz where it has none.
-
-    A fake is opened without options.
-
-    Raises:
-        UnknownDriverError: The driver is not installed, or does not load.
-    """
-    section = config.logger
-    asked = {} if config.is_simulated else section.options
-    return float({**driver(section.driver).options, **asked}.get("rate_hz", SAMPLE_RATE_HZ))

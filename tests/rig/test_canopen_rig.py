@@ -106,11 +106,6 @@ def test_the_guards_of_the_board_hold_here_too(change, message):
     assert drive_of(link).state is State.SWITCH_ON_DISABLED
 
 
-def test_load_is_refused_before_anything_moves(alone):
-    with pytest.raises(SafetyTripError, match="load_command_a"), Session(*alone) as session:
-        next(session.play(np.linspace(-1.0, -0.8, 600), np.full(600, 0.1)))
-
-
 def test_a_drive_that_falls_silent_is_missing_and_its_state_unknown(monkeypatch, alone):
     settings, link = alone
     unsafe = pytest.raises((SafetyTripError, DriverError), match=r"not confirm")

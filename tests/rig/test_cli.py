@@ -95,13 +95,6 @@ def test_an_error_that_nobody_raised_on_purpose_has_its_own_code():
     assert exit_code_of(ValueError("x")) == 70
 
 
-def test_a_folder_that_cannot_be_made_is_no_fault_of_the_program(tmp_path, said):
-    (tmp_path / "file").write_text("no folder")
-    printed = said("record --sim -p quick -o", tmp_path / "file" / "a", code=2).err
-    assert f"{tmp_path / 'file' / 'a'} cannot be made a folder" in printed
-    assert "Traceback" not in printed
-
-
 @pytest.mark.parametrize("module", ["rig.cli.record", "estimation.effects.ripple_motor"])
 def test_ctrl_c_while_modules_are_loaded_shows_no_traceback(module):
     """The second module is loaded by the command; a compiled one may end in an ImportError."""

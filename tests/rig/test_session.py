@@ -2,7 +2,6 @@
 
 import os
 import pty
-import signal
 import sys
 from collections.abc import Callable
 
@@ -69,21 +68,6 @@ def test_the_rig_is_disarmed_whatever_ends_the_session(error):
         assert next(session.play(HOLD, LOAD)).armed
         raise error
     assert not is_armed(link.board)
-
-
-@pytest.mark.usefixtures("hang_up_is_heard")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_sigterm_and_a_lost_terminal_take_the_way_out_of_ctrl_c(number):
-    config = simulated()
-    link = transport(config)
-    before = signal.getsignal(number)
-    with pytest.raises(KeyboardInterrupt), Session(config, link) as session:  # noqa: PT012
-        next(session.play(HOLD, LOAD))
-        os.kill(os.getpid(), number)
-        for _ in session.watch():
-            pass
-    assert not is_armed(link.board)
-    assert signal.getsignal(number) is before
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from estimation.copies import without_copies
 from estimation.recording import Recording
 from rig.errors import DataError, UsageError
 from rig.importers.derivatives import checked
+from rig.importers.registry import or_excluded, unreadable
 from rig.importers.table.arrays import read_mat, read_npy, read_npz, read_parquet
 from rig.importers.table.channels import to_samples
 from rig.importers.table.data import Layout
@@ -51,20 +52,11 @@ def open_table(path: Path, mapping: ColumnMapping, skip_bad: bool = False) -> Ca
         except DataError as error:
             if not skip_bad:
                 raise
-            bad.append(_unread(run.name, error))
+            bad.append(unreadable(run.name, error))
     if bad and not runs:
         bad[0].load()
     require_runs(runs, path, mapping)
-    return Campaign((*without_copies(Campaign.of(runs)).runs, *bad))
-
-
-def _unread(name: str, error: DataError) -> Run:
-    """Return a run that is excluded because of an error, which reading it raises."""
-
-    def load() -> Recording:
-        raise error
-
-    return Run(name, load, excluded=f"{error.what} {error.why}".strip())
+    return Campaign((*without_copies(Campaign.of(runs)).runs, *map(or_excluded, bad)))
 
 
 def require_runs(runs: Sequence[Recording], path: Path, mapping: ColumnMapping) -> None:
@@ -112,7 +104,7 @@ def read_runs(
                 if isinstance(error, NoColumnError) and not mapping.data.files and len(files) > 1:
                     raise DataError(error.what, error.why, _not_this(error, files)) from error
                 raise
-            bad.append(_unread("/".join((*folders, file.name)), error))
+            bad.append(unreadable("/".join((*folders, file.name)), error))
             continue
         for run in runs:
             name = "-".join([*folders, run.name])
