@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from drivers.errors import CommandRefusedError
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Identity, Result
-from rig.bench.logger import held_logger
+from rig.bench.logger import held_logger, read_for
 from rig.configuration.config import Config
 from rig.errors import UsageError
 from rig.machines.choose import machine_of
 
-REST_SAMPLES = 300
-"""Samples that are read first, so that the board has seen whether a shaft turns."""
+REST_S = 0.3
+"""How long the board is read first, so that it has seen whether a shaft turns."""
 INDEX_SAMPLES = 60_000
 """Samples in which the index is waited for."""
-SILENT_READS = 5
 READ_S = 0.2
 MOST_RAD = 200 * math.pi
 """Largest angle of a mark: a hundred turns."""
@@ -66,7 +65,7 @@ def reference_board(config: Config, here_rad: Sequence[float], at_index: bool = 
     with held_logger(config) as logger:
         logger.identify()
         logger.start()
-        _read_at_rest(logger)
+        read_for(logger, REST_S)
         if at_index:
             _reference_at_index(logger, counts)
         else:
@@ -77,24 +76,13 @@ def reference_board(config: Config, here_rad: Sequence[float], at_index: bool = 
 
 def _reference_at_index(logger: TeensyLogger, counts: Sequence[int]) -> None:
     """Wait until somebody has turned the spindle through its index and let it go."""
-    seen = silent = 0
+    seen = 0
     while True:
         try:
             logger.reference(counts, at_index=True)
             return
         except CommandRefusedError as error:
             waits = error.code in (Result.NO_INDEX, Result.NOT_AT_REST)
-            if not waits or seen >= INDEX_SAMPLES or silent >= SILENT_READS:
+            if not waits or seen >= INDEX_SAMPLES:
                 raise
-        samples = len(logger.read(READ_S).samples)
-        seen += samples
-        silent += not samples
-
-
-def _read_at_rest(logger: TeensyLogger) -> None:
-    """Read until the board has seen enough samples to decide whether a shaft turns."""
-    seen = silent = 0
-    while seen < REST_SAMPLES and silent < SILENT_READS:
-        samples = len(logger.read(READ_S).samples)
-        seen += samples
-        silent += not samples
+        seen += len(read_for(logger, READ_S).samples)
