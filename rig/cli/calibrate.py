@@ -33,6 +33,11 @@ def calibrate() -> None:
     """
 
 
+Ratio = Annotated[
+    float | None, Option(help="Ratio of the gear; if none, of the reference rig's file.")
+]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Keeping:
     """How a session is run and kept: the options that every command has."""
@@ -133,9 +138,7 @@ def current(
     motor_constant: Annotated[
         float | None, Option(help="Torque constant of the data sheet, N m/A, for the efficiency.")
     ] = None,
-    ratio: Annotated[
-        float | None, Option(help="Ratio of the gear; if none, of the reference rig's file.")
-    ] = None,
+    ratio: Ratio = None,
 ) -> "Procedure":
     """Motor current against the spindle's torque sensor: constant, friction, driver."""
     from calibration.chain import GEAR
@@ -154,9 +157,7 @@ def current(
 def gearbox(
     loads_a: Annotated[str, Option(help="Loads of both signs, A.")] = "-0.9,-0.5,0.5,0.9",
     repeats: Annotated[int, Option(min=1, help="Number of moves of each.")] = 1,
-    ratio: Annotated[
-        float | None, Option(help="Ratio of the gear; if none, of the reference rig's file.")
-    ] = None,
+    ratio: Ratio = None,
     stiffness_only: Annotated[bool, Option("--stiffness-only", help="Model no backlash.")] = False,
 ) -> "Procedure":
     """Gear: torsional stiffness and backlash."""
@@ -194,8 +195,9 @@ def ft(
     """Force sensor: bias, weight and centre of mass of its tool, and the lever arm to the jaw."""
     from calibration.sessions.ft import FtSession
 
-    x, y, z = _three(jaw_mm, "--jaw-mm")
-    about_x, about_y, about_z = map(radians, _three(jaw_turn_deg, "--jaw-turn-deg"))
+    x, y, z = _numbers(jaw_mm, "--jaw-mm", are_three=True)
+    turns_deg = _numbers(jaw_turn_deg, "--jaw-turn-deg", are_three=True)
+    about_x, about_y, about_z = map(radians, turns_deg)
     return FtSession(
         repeats=repeats, jaw_m=(x / 1e3, y / 1e3, z / 1e3), jaw_turn_rad=(about_x, about_y, about_z)
     )
@@ -237,22 +239,14 @@ for function in (check, add, list_, show, diff, use, diagnose):
     calibrate_app.command(function.__name__.rstrip("_"), rich_help_panel="Records")(function)
 
 
-def _numbers(words: str, option: str) -> list[float]:
+def _numbers(words: str, option: str, are_three: bool = False) -> list[float]:
     try:
-        return [float(word) for word in words.split(",")]
+        values = [float(word) for word in words.split(",")]
     except ValueError:
+        values = []
+    if not values or (are_three and len(values) != 3):
         raise UsageError(
-            f"{option} takes numbers with commas between.",
-            f"Given: {words}.",
-            f"Give them as in {option} 10,20,30.",
-        ) from None
-
-
-def _three(words: str, option: str) -> list[float]:
-    values = _numbers(words, option)
-    if len(values) != 3:
-        raise UsageError(
-            f"{option} takes three numbers with commas between.",
+            f"{option} takes {'three ' if are_three else ''}numbers with commas between.",
             f"Given: {words}.",
             f"Give them as in {option} 10,20,30.",
         )

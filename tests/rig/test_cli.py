@@ -17,15 +17,21 @@ from rig.output.console import plain
 pytestmark = pytest.mark.integration
 
 
-def test_help_imports_nothing_heavy():
+def run_without(heavy, *words):
+    """Run the command in a process of its own, which fails when it imports one of these."""
     code = (
-        "import sys; from rig.cli.main import main; main(['--help']);"
-        "heavy = {'torch', 'numba', 'scipy', 'matplotlib', 'numpy', 'pyarrow', 'pydantic'};"
-        "sys.exit(f'imported: {heavy & set(sys.modules)}' if heavy & set(sys.modules) else 0)"
+        f"import sys; from rig.cli.main import main; main({list(words)});"
+        f"heavy = {heavy} & set(sys.modules);"
+        "sys.exit(f'imported: {heavy}' if heavy else 0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "record" in done.stdout
+    return done
+
+
+def test_help_imports_nothing_heavy():
+    heavy = {"torch", "numba", "scipy", "matplotlib", "numpy", "pyarrow", "pydantic"}
+    assert "record" in run_without(heavy, "--help").stdout
 
 
 @pytest.mark.parametrize(
@@ -34,14 +40,7 @@ def test_help_imports_nothing_heavy():
 def test_a_slip_in_a_machine_file_is_named_before_anything_heavy_is_imported(tmp_path, words):
     file = tmp_path / "bench.toml"
     file.write_text('schema = "rig.machine/1"\n[machine]\nnam = "bench"\n')
-    typed = words.replace("FILE", str(file)).split()
-    code = (
-        f"import sys; from rig.cli.main import main; main({typed});"
-        "heavy = {'numba', 'scipy'} & set(sys.modules);"
-        "sys.exit(f'imported: {heavy}' if heavy else 0)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    done = run_without({"numba", "scipy"}, *words.replace("FILE", str(file)).split())
     assert "Did you mean 'nam'?" in done.stderr
 
 
