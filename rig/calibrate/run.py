@@ -50,9 +50,7 @@ def keep(
     """
     conclusion = procedure.conclude(measurements, lines)
     left = conclusion.residuals
-    drawn = scattered(left.series, left.label, left.unit, f"Residuals over {left.label}")
-    # a separate file needs its namespace
-    figure = str(drawn).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
+    figure = scattered(left.series, left.label, left.unit, f"Residuals over {left.label}")
     made_at = now_utc()
     with whole_folder(folder) as part:
         files = [RawFile.of(path) for path in write_raw(part, procedure.kind, measurements, lines)]

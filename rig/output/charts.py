@@ -126,8 +126,7 @@ def _environment() -> Environment:
 def render(template: str, context: Mapping[str, Any]) -> str:
     """Fill a template of this package, such as `diagnosis.html`, and put its charts into it.
 
-    Text is escaped; figures from `rig.output.figures` are markup already and are not. `charts` of
-    the context are drawn by the page.
+    Text is escaped. `charts` of the context are drawn by the page.
 
     Raises:
         jinja2.UndefinedError: The template uses a name that the context lacks.

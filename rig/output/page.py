@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from os.path import relpath
 from pathlib import Path
 
-from markupsafe import Markup
-
 from estimation.files import write_text_atomic
 from rig.output.console import present, results, show
 from rig.output.provenance import Provenance
@@ -26,7 +24,7 @@ class Page:
     paragraphs: Sequence[str]
     tables: Sequence[TextTable]
     provenance: Provenance
-    figures: Callable[[], Mapping[str, Markup]] = dict
+    figures: Callable[[], Mapping[str, str]] = dict
 
     def markdown(self, places: Sequence[str] = ()) -> str:
         """Return the page as Markdown, with its figures at places relative to it."""

@@ -8,6 +8,7 @@ import sys
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from xml.etree import ElementTree
 
 import click
 import numpy as np
@@ -78,6 +79,11 @@ def test_a_decision_has_its_three_parts(path):
 
 
 FIGURES = DOCS / "figures"
+
+
+@pytest.mark.parametrize("path", sorted(FIGURES.glob("*.svg")), ids=lambda p: p.stem)
+def test_a_figure_is_a_file_that_a_browser_shows(path):
+    assert ElementTree.parse(path).getroot().tag == "{http://www.w3.org/2000/svg}svg"  # noqa: S314
 
 
 def words(svg):

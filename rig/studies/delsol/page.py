@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
-from markupsafe import Markup
 
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, names_of
@@ -122,7 +121,7 @@ def page(study: DelSolStudy) -> Page:
     return Page(TITLE, [_lead(study), NOTE], tables, study.provenance, lambda: _figures(study))
 
 
-def _figures(study: DelSolStudy) -> Mapping[str, Markup]:
+def _figures(study: DelSolStudy) -> Mapping[str, str]:
     sides = ("paper's method", "ours")
     paper, ours = (np.median(_errors(study, method), axis=0) for method in (PAPER, OURS))
     joints = {f"joint {k + 1}": (paper[k], ours[k]) for k in range(JOINTS)}

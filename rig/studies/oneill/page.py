@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from markupsafe import Markup
 
 from estimation.recording import FloatArray
 from rig.output.figures import against, over_time
@@ -84,7 +83,7 @@ VARIABLES = {"spindle angle, rad": 0, "motor speed, rad/s": 2, "command (load)":
 """Channels of a row, by what the error is drawn over."""
 
 
-def _drawn(shown: Mapping[str, Sequence[Shown]]) -> dict[str, tuple[str, Markup]]:
+def _drawn(shown: Mapping[str, Sequence[Shown]]) -> dict[str, tuple[str, str]]:
     """Return caption and figure by name, of the runs of each target."""
     drawn = {}
     for target, runs in shown.items():

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from markupsafe import Markup
 
 from rig.arm.search import DAMPING, LEAST_GAIN, STRETCHES
 from rig.output.figures import paired_bars
@@ -86,7 +85,7 @@ def _notes(study: Study) -> list[str]:
     ]
 
 
-def _figures(study: Study) -> Mapping[str, Markup]:
+def _figures(study: Study) -> Mapping[str, str]:
     before, after = _mean(study, THESIS), _mean(study, EFFECTS)
     pairs = {f"J{k + 1}": (before[k], after[k]) for k in range(len(before))}
     caption = "NRMSD on the path that was not fitted, mean of both directions"

@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
-from markupsafe import Markup
 
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES, OWN
@@ -85,7 +84,7 @@ def page(study: WrenchStudy) -> Page:
     return Page(TITLE, [lead, *NOTES], tables, study.provenance, lambda: _figures(study))
 
 
-def _figures(study: WrenchStudy) -> Mapping[str, Markup]:
+def _figures(study: WrenchStudy) -> Mapping[str, str]:
     """Draw the median errors of each table by method, over all families."""
     drawn = {}
     for number, name in enumerate(TABLES, start=1):

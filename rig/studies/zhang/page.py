@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from markupsafe import Markup
 
 from estimation.recording import FloatArray
 from rig.arm.hidden import FAMILIES
@@ -119,7 +118,7 @@ def page(study: ZhangStudy) -> Page:
     return Page(TITLE, [lead, *NOTES], tables, study.provenance, lambda: _figures(study))
 
 
-def _figures(study: ZhangStudy) -> Mapping[str, Markup]:
+def _figures(study: ZhangStudy) -> Mapping[str, str]:
     """Draw how joints and instruments do, and the first arm's grasp and contact over time."""
     networks = study.median(f"I | M+C on M | {NETWORKS}")
     ours = study.median(f"I | M+C on M | {OURS}")

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from markupsafe import Markup
 
 from estimation.model_file import parse
 from estimation.recording import FloatArray
@@ -107,7 +106,7 @@ def _notes(study: Study) -> list[str]:
     ]
 
 
-def _figures(study: Study, haptics: Sequence[Sequence[Answer]]) -> Mapping[str, Markup]:
+def _figures(study: Study, haptics: Sequence[Sequence[Answer]]) -> Mapping[str, str]:
     """Draw the paper's kinds of figures for one grasper: Figures 12 to 14 and 16."""
     seed = 0
     short = next(name for name, one in PROTOTYPES.items() if one.name == study.prototype)
