@@ -32,18 +32,33 @@ def crc16(data: bytes) -> int:
 
 def cobs_encode(data: bytes) -> bytes:
     """Return `data` stuffed so that it holds no zero byte, without a delimiter."""
-    encoded = np.empty(len(data) + len(data) // MAX_BLOCK + 1, np.uint8)
-    size = compiled.cobs_encode(np.frombuffer(data, np.uint8), encoded)
-    return encoded[:size].tobytes()
+    encoded = bytearray()
+    *others, last = data.split(b"\x00")
+    for part in others:
+        for first in range(0, len(part) + 1, MAX_BLOCK):
+            encoded += _block(part[first : first + MAX_BLOCK])
+    for first in range(0, len(last) or 1, MAX_BLOCK):  # a full block at the end needs no more
+        encoded += _block(last[first : first + MAX_BLOCK])
+    return bytes(encoded)
+
+
+def _block(part: bytes) -> bytes:
+    return bytes([len(part) + 1]) + part
 
 
 def cobs_decode(encoded: bytes) -> bytes:
     """Return the bytes that `cobs_encode` stuffed; `FrameError` for what is not COBS."""
-    data = np.empty(len(encoded), np.uint8)
-    size = compiled.cobs_decode(np.frombuffer(encoded, np.uint8), data)
-    if size < 0:
-        raise FrameError("A frame is not COBS.", "Bytes were lost or changed on the link.")
-    return data[:size].tobytes()
+    data, position = bytearray(), 0
+    while position < len(encoded):
+        code = encoded[position]
+        part = encoded[position + 1 : position + code]
+        if len(part) != code - 1 or 0 in part:
+            raise FrameError("A frame is not COBS.", "Bytes were lost or changed on the link.")
+        data += part
+        position += code
+        if code <= MAX_BLOCK and position < len(encoded):
+            data.append(0)
+    return bytes(data)
 
 
 def encode_frame(payload: bytes) -> bytes:

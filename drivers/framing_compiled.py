@@ -1,4 +1,4 @@
-"""Compiled loops of `drivers.framing`: COBS of one frame; frames and CRCs of the bulk path."""
+"""Compiled loops of `drivers.framing`: frames and CRCs of the bulk path."""
 
 from binascii import crc_hqx
 from functools import lru_cache
@@ -37,44 +37,6 @@ def crc_tables(payload_size: int) -> tuple[NDArray[np.uint16], int]:
 
 
 # The loops below index flat arrays and never slice: a slice costs these kernels more than the copy.
-
-
-@numba.njit(cache=True)
-def cobs_encode(data: NDArray[np.uint8], encoded: NDArray[np.uint8]) -> int:
-    """Stuff `data` into `encoded`; return the size."""
-    code_at, size, code = 0, 1, 1
-    for index, value in enumerate(data):
-        if value != 0:
-            encoded[size] = value
-            size += 1
-            code += 1
-        full = code == MAX_BLOCK + 1
-        if value == 0 or (full and index + 1 < data.size):  # a full block at the end needs no more
-            encoded[code_at] = code
-            code_at, size, code = size, size + 1, 1
-    encoded[code_at] = code
-    return size
-
-
-@numba.njit(cache=True)
-def cobs_decode(encoded: NDArray[np.uint8], data: NDArray[np.uint8]) -> int:
-    """Undo `cobs_encode` into `data`; return the size, or -1 for what is not COBS."""
-    position = size = 0
-    while position < encoded.size:
-        code = int(encoded[position])
-        if code == 0 or position + code > encoded.size:
-            return -1
-        for offset in range(1, code):
-            value = encoded[position + offset]
-            if value == 0:
-                return -1
-            data[size] = value
-            size += 1
-        position += code
-        if code <= MAX_BLOCK and position < encoded.size:
-            data[size] = 0
-            size += 1
-    return size
 
 
 @numba.njit(cache=True)
