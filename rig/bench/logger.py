@@ -124,11 +124,9 @@ def _open_any(config: Config, pace: float | None) -> Transport:
                 'Write profile = "sensor".',
             )
         require_units(section.driver, device.channels)
-        rate_hz = device.channels[0].rate_hz
         return LogicLink(
             device,
             section.url,
-            rate_hz=rate_hz,
             is_cold=config.is_simulated,
             pace=paced,
             latch=None if config.is_simulated else TripLatch(section.url),

@@ -106,9 +106,8 @@ class LogicLink(HostLink):
     """A link to the logic of a logger, with the interface of `drivers.transport.Transport`.
 
     Args:
-        device: The drive; identified and started here, closed with this.
+        device: The drive; identified and started here, closed with this. Its rate is the ticks'.
         url: Where it is, for messages.
-        rate_hz: How often it is sampled.
         late_s: How late a tick may be and still be run, as its drive's `late_s`.
         is_cold: Whether the motor is known to be cold, as a simulated one; a real one may be warm
             from the session before.
@@ -121,7 +120,6 @@ class LogicLink(HostLink):
         device: Drive,
         url: str,
         *,
-        rate_hz: float = 1000.0,
         late_s: float = 0.0,
         is_cold: bool = True,
         pace: float | None = None,
@@ -129,6 +127,7 @@ class LogicLink(HostLink):
     ) -> None:
         super().__init__(url)
         self._device = device
+        rate_hz = device.channels[0].rate_hz
         self._period_us = round(1e6 / rate_hz)
         self._ticks_a_read = max(1, round(READ_S * rate_hz))
         self._pace = Pace(pace)

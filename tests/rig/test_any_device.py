@@ -214,8 +214,7 @@ def test_a_trip_stays_over_processes_until_it_is_cleared_by_its_name(name, tmp_p
 
     def link() -> LogicLink:
         device = DRIVES[name][1](SimulatedTransport(rig.fake))
-        rate_hz = device.channels[0].rate_hz
-        return LogicLink(device, "some", rate_hz=rate_hz, latch=latch)
+        return LogicLink(device, "some", latch=latch)
 
     hot = pytest.raises(SafetyTripError, match="too high for too long")
     with hot, Session(rig.config, link()) as session:
