@@ -55,12 +55,7 @@ class GearboxSession:
         """Return stiffness and backlash."""
         loads = condition(measurements, "load_command_a")
         if not (min(loads) < 0 < max(loads)):
-            raise BadDataError(
-                "levels",
-                f"The loads go from {min(loads):g} to {max(loads):g} A.",
-                "Backlash shows only where the gear leans to both sides.",
-                "Load both ways: some loads of each sign.",
-            )
+            raise _one_sided(f"The loads go from {min(loads):g} to {max(loads):g} A.")
         runs = [steady(m, (TORQUE, MOTOR, SPINDLE)) for m in measurements]
         twists = [(run[TORQUE], run[MOTOR] / self.gear_ratio - run[SPINDLE]) for run in runs]
         every = joined(runs, TORQUE)
@@ -118,14 +113,14 @@ def _best_zero(twists: Sequence[Twist]) -> tuple[float, Regression, Regression]:
         if abs(signs.mean()) < 0.99 and min(len(y) for _, y in runs) > 0:
             found[float(zero)] = (regress(runs), regress(plain))
     if not found:
-        raise BadDataError(
-            "levels",
-            "The gear carries torque of one sign only.",
-            "Backlash shows only where it leans to both sides.",
-            "Load both ways: some loads of each sign.",
-        )
+        raise _one_sided("The gear carries torque of one sign only.")
     best = min(found, key=lambda zero: (round(found[zero][0].residual_rms, 7), abs(zero)))
     return best, *found[best]
+
+
+def _one_sided(what: str) -> BadDataError:
+    why = "Backlash shows only where the gear leans to both sides."
+    return BadDataError("levels", what, why, "Load both ways: some loads of each sign.")
 
 
 def _refuse_no_slope(compliance: float, residual_rad: float, torque_n_m: FloatArray) -> None:
