@@ -24,8 +24,8 @@ class EstimationError(ExplainedError):
     """Base of every error this room raises on purpose."""
 
 
-class MissingExtraError(EstimationError):
-    """A library that this room needs here is not installed.
+class NeedsExtraError(ExplainedError):
+    """A library that is needed here is not installed.
 
     Attributes:
         extra: The project's extra that holds it, a key of `optional-dependencies`.
@@ -34,6 +34,10 @@ class MissingExtraError(EstimationError):
     def __init__(self, what: str, why: str, extra: str) -> None:
         self.extra = extra
         super().__init__(what, why, f"Install the project's extra {extra!r}.")
+
+
+class MissingExtraError(NeedsExtraError, EstimationError):
+    """A library that this room needs here is not installed."""
 
 
 class UnknownNameError(EstimationError):

@@ -8,7 +8,7 @@ from enum import IntEnum
 
 from calibration.errors import CalibrationError
 from drivers.errors import DriverError
-from estimation.errors import EstimationError, ExplainedError
+from estimation.errors import EstimationError, ExplainedError, NeedsExtraError
 from estimation.files import OutputError
 
 
@@ -38,16 +38,8 @@ class UsageError(RigError):
     exit_code = ExitCode.USAGE
 
 
-class MissingExtraError(UsageError):
-    """A library that a command needs is not installed.
-
-    Attributes:
-        extra: The project's extra that holds it, a key of `optional-dependencies`.
-    """
-
-    def __init__(self, what: str, why: str, extra: str) -> None:
-        self.extra = extra
-        super().__init__(what, why, f"Install the project's extra {extra!r}.")
+class MissingExtraError(NeedsExtraError, UsageError):
+    """A library that a command needs is not installed."""
 
 
 class DataError(RigError):
