@@ -49,22 +49,15 @@ def oneill(
     By default it fits Table I's linear models, in seconds. --networks trains the paper's networks,
     which takes long; after an interruption it resumes. --states and --kinds take minutes.
     """
-    from rig.studies.oneill.data import Source, open_reference
+    from rig.studies.oneill.data import open_reference, simulated_reference
     from rig.studies.oneill.page import page
     from rig.studies.oneill.study import run_study
 
-    if data is None:
-        from rig.simulation.campaign import simulate_reference_campaign
-
-        name = f"simulated reference campaign, seed {seed}"
-        source = Source(simulate_reference_campaign(seed), name, measured=False)
-    else:
-        source = open_reference(data)
+    source = simulated_reference(seed) if data is None else open_reference(data)
     with counting("runs", len(source.campaign)) as on_run:
         study = run_study(source, seed=seed, on_run=on_run)
     campaign = source.campaign.exclude(study.left_out)
-    deep, physical = None, None
-    every_kind: tuple[Any, ...] = ()
+    deep, physical, every_kind = None, None, None
     shown: dict[str, list[Any]] = {}
     if networks:
         from rig.studies.oneill.networks import Training, network_tables, run_networks
@@ -87,9 +80,9 @@ def oneill(
 
         with counted("kinds of estimators") as on_fit:
             every_kind = run_kinds(campaign, seed, on_fit)
-    found = {"networks": deep, "states": physical, "kinds": every_kind or None}
+    found = {"networks": deep, "states": physical, "kinds": every_kind}
     whole = asdict(study) | {name: each for name, each in found.items() if each is not None}
-    page(study, deep, physical, every_kind, shown).show(whole, out, json, figures)
+    page(study, deep, physical, every_kind or (), shown).show(whole, out, json, figures)
 
 
 @study_app.command()

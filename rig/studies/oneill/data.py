@@ -65,6 +65,14 @@ def open_reference(path: Path) -> Source:
     return Source(campaign, place.name, measured, tuple(notes))
 
 
+def simulated_reference(seed: int) -> Source:
+    """Simulate the paper's campaign."""
+    from rig.simulation.campaign import simulate_reference_campaign
+
+    name = f"simulated reference campaign, seed {seed}"
+    return Source(simulate_reference_campaign(seed), name, measured=False)
+
+
 def part_of(path: Path, instrument: str) -> Path:
     """Return the folder or archive of an instrument below a path, or the path itself."""
     if path.is_file() or path.name == instrument:
