@@ -64,7 +64,8 @@ def test_free_motion_identifies_the_error_of_the_coupling_matrix():
     tried = [*candidates(psm.table), *zhang_physics.of_long_slips()]
     wanted = ("wrist drive hysteresis", "cable slip J7", "long slip J3")
     effects = [effect for effect in tried if effect.name in wanted]
-    values = zhang_physics.fitted(psm.table, effects, runs, network=False).values
+    path = zhang_physics.prepared("coupled", psm.table, runs, effects)
+    values = path.values([effect.name for effect in effects])
     base = zhang_physics.base_block(1.0, zhang_physics.GRIPPER_FRICTIONS)
     declared = len(base.at)  # last of them the shares in joints 3 to 6
     true = psm.leak[1:3, 3] / psm.leak[3, 3]

@@ -186,15 +186,10 @@ def find_effects(arm: Arm, first: Sequence[PsmRun], second: Sequence[PsmRun]) ->
     return [named[name] for name in kept]
 
 
-def fitted(
-    arm: Arm, effects: Sequence[ArmEffect], runs: Sequence[PsmRun], network: bool = True
-) -> Physics:
+def fitted(arm: Arm, effects: Sequence[ArmEffect], runs: Sequence[PsmRun]) -> Physics:
     """Fit an arm with given effects, then a small network on each joint's rest."""
     path = prepared("fitted", arm, runs, effects)
     values = path.values([effect.name for effect in effects])
-    bare = Physics(arm, tuple(effects), values, (None,) * JOINTS)
-    if not network:
-        return bare
     left = path.torque - path.table @ values
     motions = [motion_of_run(run) for run in runs]
 
