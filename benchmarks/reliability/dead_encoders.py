@@ -16,10 +16,10 @@ from benchmarks.reliability.encoder_faults import (
     MOTOR,
     PER_RAD,
     SPINDLE,
-    TICK_FUNCTION,
     armed,
     frozen,
 )
+from drivers.teensy.core import TICK
 from drivers.teensy.protocol import Trip
 from rig.configuration.config import load_config
 from rig.simulation.bench import SimulatedBench
@@ -43,7 +43,7 @@ class DeadFrom:
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
         """Run ticks; see `drivers.teensy.core.FirmwareBench.advance_with_board`."""
-        board_tick = TICK_FUNCTION(tick_address)
+        board_tick = TICK(tick_address)
 
         def tick(_board: int, now_us: int, inputs: int, outputs: int) -> None:
             counts = list((ctypes.c_int32 * 7).from_address(inputs))
@@ -51,7 +51,7 @@ class DeadFrom:
             board_tick(board_address, now_us, given, outputs)
             self._tick += 1
 
-        between = TICK_FUNCTION(tick)
+        between = TICK(tick)
         address = ctypes.cast(between, ctypes.c_void_p).value
         assert address
         self._bench.advance_with_board(ticks, address, 0, tick_us)

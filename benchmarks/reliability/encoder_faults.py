@@ -13,16 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import CommandRefusedError
-from drivers.teensy.core import FirmwareBench, FirmwareBoard
+from drivers.teensy.core import TICK, FirmwareBench, FirmwareBoard
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import Trip
 from drivers.transport.simulated import SimulatedTransport
 from rig.configuration.config import load_config
 from rig.machines.choose import machine_of
 
-TICK_FUNCTION = ctypes.CFUNCTYPE(
-    None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_void_p
-)
 MOTOR, SPINDLE, JAW, PROXIMAL, DISTAL, CURRENT = range(6)
 PER_RAD = 4096 * 35 / math.tau, -8192 / math.tau, 4000 * 0.913 / math.tau
 AT_ZERO = 0.0, 0.0, 1.272 * 4000 / math.tau
@@ -47,7 +44,7 @@ class SmallRig:
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
         """Run ticks; see `drivers.teensy.core.FirmwareBench.advance_with_board`."""
-        tick = TICK_FUNCTION(tick_address)
+        tick = TICK(tick_address)
         outputs = (ctypes.c_int32 * 2)()
         for k in range(ticks):
             counts = [

@@ -20,12 +20,11 @@ from benchmarks.reliability.encoder_faults import (
     MOTOR,
     PROXIMAL,
     SPINDLE,
-    TICK_FUNCTION,
 )
 from benchmarks.reliability.fault_names import EVIDENCE, SAID
 from drivers.errors import DriverError
 from drivers.registry import fakes
-from drivers.teensy.core import FirmwareBoard
+from drivers.teensy.core import TICK, FirmwareBoard
 from drivers.teensy.driver import TeensyLogger
 from drivers.teensy.protocol import MISSING, STATUS_ARMED, Trip
 from drivers.transport.faulty import Fault, Faults, FaultyTransport
@@ -128,7 +127,7 @@ class ScriptedRig:
         self, ticks: int, tick_address: int, board_address: int, tick_us: int
     ) -> None:
         """Run the script; see `drivers.teensy.core.FirmwareBench.advance_with_board`."""
-        tick = TICK_FUNCTION(tick_address)
+        tick = TICK(tick_address)
         outputs = np.zeros(2, np.int32)
         for k in range(ticks):
             armed = self.board is not None and self.board.in_force

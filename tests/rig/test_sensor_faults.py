@@ -14,7 +14,6 @@ from benchmarks.reliability.encoder_faults import (
     MOTOR,
     PER_RAD,
     SPINDLE,
-    TICK_FUNCTION,
     frozen,
     losing,
     ride,
@@ -24,7 +23,7 @@ from benchmarks.reliability.faults import SENSOR_FAULTS, inject
 from benchmarks.reliability.targets import TARGETS
 from drivers.registry import fakes
 from drivers.teensy.control import Controllers
-from drivers.teensy.core import CoreGuard, FirmwareBoard
+from drivers.teensy.core import TICK, CoreGuard, FirmwareBoard
 from drivers.teensy.protocol import STATUS_LIMIT_TRIPPED, Kind, Result, Trip
 from drivers.transport.faulty import Fault
 from rig.configuration.config import load_config
@@ -141,7 +140,7 @@ class SmallGrasper:
         self._phases, self._count = 0, 0
 
     def advance_with_board(self, ticks, tick_address, board_address, tick_us):
-        tick = TICK_FUNCTION(tick_address)
+        tick = TICK(tick_address)
         outputs = (ctypes.c_int32 * 3)()
         for k in range(ticks):
             motor = np.floor(self.angle_rad * 2048 * 66 / math.tau).astype(int)
