@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.causes.equations import Equation
+from estimation.causes.laid import centred
 from estimation.causes.layout import Layout
 from estimation.causes.run_signals import ANGLES, RunSignals
 from estimation.derived import MOTION, rates_of
@@ -72,6 +73,28 @@ def signal(run: RunSignals, channel: str, equation: str) -> str:
 def declared_of(equation: Equation, run: RunSignals) -> FloatArray:
     """Return the declared columns with efforts predicted from other sensors, (n, declared)."""
     return _declared(equation, run)[run.grid[run.used[equation.name]]]
+
+
+def instead_noise(layout: Layout) -> Mapping[str, FloatArray]:
+    """Return the noise of columns of predicted efforts less that of the readings' own columns.
+
+    Equation to columns of all runs that zeros fill up, (runs, samples, declared), without those
+    equations that read no effort that is predicted.
+    """
+    found = {}
+    for name, equation in layout.equations.items():
+        names = [column.channel for column in equation.kinds]
+        runs = [*zip(layout.runs, layout.shaken, strict=False)]
+        predicted = [bool(c) and signal(runs[0][0], c, name) != c for c in names if runs]
+        if not any(predicted):
+            continue
+        columns = []
+        for run, shaken in runs:
+            own = declared_of(equation, shaken) - declared_of(equation, run)
+            own -= equation.noise(run)[run.grid[run.used[name]], :-1]
+            columns.append(own * np.array(predicted))
+        found[name] = centred(columns)[0]
+    return found
 
 
 def noise_share(runs: Sequence[RunSignals], channel: str, cutoff_hz: float = np.inf) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.causes.equations import SHAPE_STEP
-from estimation.causes.instruments import declared_of
+from estimation.causes.instruments import declared_of, instead_noise
 from estimation.causes.laid import TINY, Followed, Laid, Part, Projection, centred, inverse
 from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT, Numbers
@@ -108,6 +108,7 @@ class Joint:
         self.projection = Projection(
             {e.name: [declared_of(e, r) for r in self.runs] for e in layout.equations.values()},
             noise,
+            instead_noise(layout),
             {n: (weights[n, "within"], weights[n, "between"]) for n in layout.equations},
             {name: self._precision[[*at]] for name, at in self._equations_at.items()},
         )

@@ -117,6 +117,8 @@ class Projection:
     Args:
         declared: Equation to the declared columns of instrumented signals, of every run.
         noise: Equation to the noise of the declared columns and of the target, of every run.
+        instead: Equation to the noise of the columns of instrumented signals less that of the
+            declared ones, of every run; of equations without an instrument it may lack.
         weights: Equation to the weights of one squared residual within runs and between them.
         precision: Equation to the prior precision of each declared parameter. The derivative by the
             shape of a term that is as good as zero would explain anything without it.
@@ -126,10 +128,12 @@ class Projection:
         self,
         declared: Mapping[str, Sequence[FloatArray]],
         noise: Mapping[str, FloatArray],
+        instead: Mapping[str, FloatArray],
         weights: Mapping[str, tuple[float, float]],
         precision: Mapping[str, FloatArray],
     ) -> None:
         self.weights = weights
+        self._instead = {name: x.astype(np.float32) for name, x in instead.items()}
         self._inner, self._means, self._inverse = dict[str, Columns](), {}, {}
         self._noise = {name: x.astype(np.float32) for name, x in noise.items()}
         for name, columns in declared.items():
@@ -185,9 +189,25 @@ class Projection:
                 taken[name] = taken[name] / size[:, None]
         for noise in followed.values():
             noise /= np.maximum(size, NOTHING)[:, None]
-        across = {n: products(self._noise[n][:, None], x) for n, x in followed.items()}
-        own = {n: products(x, x) for n, x in followed.items()}
-        return Laid(inners, middles, taken, size, Followed(across, own))
+        return Laid(inners, middles, taken, size, self._followed(followed, taken))
+
+    def _followed(
+        self, noise: Mapping[str, Columns], taken: Mapping[str, FloatArray]
+    ) -> Followed:
+        """Return the products of the noise of columns, and of what was taken off by instruments."""
+        across = {n: products(self._noise[n][:, None], x) for n, x in noise.items()}
+        own = {n: products(x, x) for n, x in noise.items()}
+        for n, off in taken.items():
+            if n not in self._instead:
+                continue
+            instead = self._instead[n]
+            mixed = products(self._noise[n], instead)[:, None] @ off
+            square = off.swapaxes(1, 2) @ products(instead, instead)[:, None] @ off
+            if n in noise:
+                both = products(noise[n], instead[:, None]) @ off
+                mixed, square = mixed - across[n], square - both - both.swapaxes(2, 3) + own[n]
+            across[n], own[n] = -mixed, square
+        return Followed(across, own)
 
 
 def products(one: Columns, other: Columns) -> FloatArray:

@@ -186,22 +186,23 @@ def _judged(joint: Joint, group: Group, block: Block, usual: _Usual) -> _Judged:
 def _turned(joint: Joint, group: Group, outcome: Outcome) -> NDArray[np.bool_]:
     """Return which causes give the declared terms a factor that they cannot have, shape (n,).
 
-    One that is not negative would be so in some runs. Or all terms together would have a factor far
-    from one in the runs in which the cause acts, though these do not follow what the others
-    predict: it removes what the equation fits badly.
+    One that is not negative would be so in some runs. Or an error of the target would give all
+    terms a factor far from one in the runs in which it acts, though these do not follow what the
+    others predict: it removes what the equation fits badly.
     """
     found = np.zeros(len(group.candidates), dtype=np.bool_)
     for k, one in enumerate(group.candidates):
-        if not isinstance(one.cause, Source) or one.acts is None:
+        cause, home = one.cause, one.cause.place.home
+        if not isinstance(cause, Source) or one.acts is None:
             continue
-        at = joint.bounded_at(one.cause.place.home, one.cause.column)
+        at = joint.bounded_at(home, cause.column)
         if at is not None:
             change = float(outcome.amplitudes[k, 0] / one.size[0])
             found[k] = outcome.declared[k, at] + change < -TURNED * abs(change)
-        if outcome.promising[k]:
+        if joint.layout.equations[home].target in cause.reads and outcome.promising[k]:
             factor = outcome.factor(k, np.flatnonzero(one.acts))
-            if not 1.0 / FACTOR <= factor <= FACTOR:
-                found[k] |= joint.unlike(one.acts) > UNEXPLAINED
+            is_near = 1.0 / FACTOR <= factor <= FACTOR
+            found[k] |= not is_near and joint.unlike(one.acts) > UNEXPLAINED
     return found
 
 

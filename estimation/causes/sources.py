@@ -80,11 +80,6 @@ class Source:
         return None
 
     @property
-    def of_all(self) -> bool:
-        """Whether it changes the factor of all terms of its equation alike."""
-        return False
-
-    @property
     def is_declared(self) -> bool:
         """Whether it is a term of the declared equation, with another factor in some runs."""
         return False

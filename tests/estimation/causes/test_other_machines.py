@@ -381,3 +381,87 @@ def test_a_load_cell_may_have_another_gain_in_some_runs(factor: float) -> None:
     (finding,) = diagnose(runs, [axis()], split(runs)).findings
     assert (finding.family, finding.runs_affected) == ("sensor.gain", ("01", "04", "05"))
     assert finding.parameters["change"].value == pytest.approx(factor - 1.0, rel=0.02)
+
+
+CONTACT = """
+schema = "rig.machine/1"
+machine = { name = "belt", cutoff_hz = 30.0, run_offsets = true }
+[[axis]]
+name = "motor"
+unit = "rad"
+[[axis]]
+name = "carriage"
+unit = "m"
+[[transmission]]
+name = "belt"
+input = "motor"
+output = "carriage"
+ratio = 83.333333
+compliant = false
+[[actuator]]
+name = "motor_voltage_v"
+axis = "motor"
+[[sensor]]
+name = "motor_angle_rad"
+axis = "motor"
+reads = "position"
+counts = 318.3098861837907
+[[sensor]]
+name = "carriage_position_m"
+axis = "carriage"
+reads = "position"
+counts = 100000
+[[sensor]]
+name = "tool_force_n"
+axis = "carriage"
+reads = "effort"
+[[derived]]
+name = "belt_stretch_m"
+shares = [
+  { channel = "motor_angle_rad", over = 83.333333 },
+  { channel = "carriage_position_m", times = -1.0 },
+]
+[[equation]]
+name = "stretch"
+target = "belt_stretch_m"
+effects = [
+  { id = "compliance.link", channels.load = "tool_force_n" },
+  { id = "inertia.missing", channels.acceleration = "carriage_acceleration_m_s2" },
+  { id = "friction.viscous", channels.speed = "carriage_velocity_m_s" },
+  { id = "friction.coulomb", channels.speed = "carriage_velocity_m_s" },
+  { id = "sensor.offset" },
+]
+"""
+
+
+def _touching(seed: int) -> list[Recording]:
+    """Return runs of a carriage that touches a spring at one end; its encoders count."""
+    random, time = np.random.default_rng(seed), np.arange(4000) / 500.0
+    out = []
+    for k in range(12):
+        waves = zip(random.uniform(0.15, 0.9, 3), random.uniform(0, 2 * np.pi, 3), strict=True)
+        place = 0.06 * sum(np.sin(2 * np.pi * f * time + p) for f, p in waves) / 3
+        speed = np.gradient(place, time)
+        acceleration = np.gradient(speed, time)
+        force = 600.0 * (1 + k % 3) * np.maximum(0.0, place - 0.03)
+        belt = force + 1.0 * acceleration + 8.0 * speed + 2.0 * np.tanh(speed / 0.005)
+        angle = 83.333333 * (place + 1.7e-5 * belt)
+        turned = np.gradient(np.gradient(angle, time), time)
+        volts = (belt + 1.5 * turned / 83.333333 + 15.0 * speed) / 4.0
+        counts = [np.round(x * c) / c for x, c in ((angle, 318.3098861837907), (place, 100000))]
+        columns = {
+            "motor_voltage_v": volts + random.normal(0, 0.02, len(time)),
+            "motor_angle_rad": counts[0],
+            "carriage_position_m": counts[1],
+            "tool_force_n": force + random.normal(0, 0.25, len(time)),
+        }
+        out.append(Recording(f"{k:02d}", time, columns, started_at_ns=int(1e10 * k) + 1))
+    return out
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_force_of_one_sign_that_another_sensor_predicts_is_not_an_effect(seed: int) -> None:
+    """The prediction has the noise of the encoder that the stretch is read by."""
+    models = declared(plant_file.parse(CONTACT))
+    runs = _touching(seed)
+    assert diagnose(runs, models, split(runs)).findings == ()
