@@ -191,9 +191,7 @@ class Projection:
             noise /= np.maximum(size, NOTHING)[:, None]
         return Laid(inners, middles, taken, size, self._followed(followed, taken))
 
-    def _followed(
-        self, noise: Mapping[str, Columns], taken: Mapping[str, FloatArray]
-    ) -> Followed:
+    def _followed(self, noise: Mapping[str, Columns], taken: Mapping[str, FloatArray]) -> Followed:
         """Return the products of the noise of columns, and of what was taken off by instruments."""
         across = {n: products(self._noise[n][:, None], x) for n, x in noise.items()}
         own = {n: products(x, x) for n, x in noise.items()}
