@@ -18,6 +18,9 @@ from estimation.errors import EstimationError
 
 FloatArray = NDArray[np.float64]
 
+UNDATED_NS = 365 * 86_400 * 10**9
+"""Start of a run below which it is the time of a recorder's clock, not a date."""
+
 
 class Flag(IntFlag):
     """Faults of one sample; 0 is a valid sample."""
@@ -112,7 +115,8 @@ class Recording:
         notes: Operator's notes.
         marks: Operator's marks.
         stretches: Flagged segments with their reasons.
-        started_at_ns: Start of the run, ns since the Unix epoch, or None when not recorded.
+        started_at_ns: Start of the run, ns since the Unix epoch, or below `UNDATED_NS` since the
+            zero of a clock that all runs share and that has no date; None when not recorded.
         calibrations: Calibration name to content hash.
         source: File it was read from.
         excluded: Reason for excluding the run, or None when it counts.

@@ -15,7 +15,8 @@ from estimation.causes.instruments import noise_share
 from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.run_signals import EFFORTS
-from estimation.derived import origin_of
+from estimation.causes.sources import Source
+from estimation.derived import CAMPAIGN_TIME, origin_of
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Finding, is_unexplained
 from estimation.diagnosis.split import Sealed
@@ -98,6 +99,17 @@ def _loudest(equation: Equation, layout: Layout) -> tuple[str, float]:
 
 def _remedy(equation: Equation) -> str:
     return f"A cutoff_hz below {equation.model.low_pass.cutoff_hz:g} removes more of it."
+
+
+def pauses(recordings: Sequence[Recording], causes: Iterable[Source | Function]) -> Iterator[str]:
+    """Yield that time over a campaign lacks its pauses, if a cause reads it and no clock has it."""
+    read = [c.variables if isinstance(c, Function) else dict(c.channels).values() for c in causes]
+    is_read = any("time" in names or CAMPAIGN_TIME in names for names in read)
+    if is_read and any(r.started_at_ns is None for r in recordings):
+        yield (
+            "The start of the runs is not known: a time over the campaign is that of the recordings"
+            " one after the other, without the pauses between them."
+        )
 
 
 def at_bounds(models: Sequence[Model]) -> Iterator[str]:

@@ -121,6 +121,7 @@ def answer(
         *remarks.late(found.noticed, signals_of(layout)),
         *remarks.left(layout, left, over_noise, explained),
         *remarks.at_bounds(written),
+        *remarks.pauses(timed, (kept.scored.candidate.cause for kept, _ in judged)),
         *remarks.limits(timed, layout, sealed, read),
         *notes,
     ]

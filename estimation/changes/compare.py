@@ -33,7 +33,7 @@ from estimation.copies import copies
 from estimation.diagnosis.split import SplitError, periods
 from estimation.errors import EstimationError
 from estimation.model import Model
-from estimation.recording import FloatArray, Recording
+from estimation.recording import UNDATED_NS, FloatArray, Recording
 
 A, B, ON = "A:", "B:", "C:"
 """What the names of the runs of each campaign begin with."""
@@ -132,7 +132,10 @@ def _named(recordings: Iterable[Recording], mark: str) -> list[Recording]:
     if len(runs) == 1:
         with suppress(SplitError):  # one run, and no path of several periods
             runs = periods(runs[0])
-    return [replace(r, name=f"{mark}{r.name}") for r in runs]
+    dated = all((r.started_at_ns or 0) >= UNDATED_NS for r in runs)
+    starts = [r.started_at_ns if dated else None for r in runs]  # clocks have a zero each
+    named = zip(runs, starts, strict=True)
+    return [replace(r, name=f"{mark}{r.name}", started_at_ns=start) for r, start in named]
 
 
 def _check_number(campaign: str, runs: Sequence[Recording], least: int = 4) -> None:

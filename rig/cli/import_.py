@@ -104,7 +104,7 @@ def import_(
     mapping = read_mapping(None if machine is None else place_of(machine), flags)
     said: list[Remark] = []
     try:
-        recordings = list(read_runs(path, mapping, said, asks=preview))
+        recordings = read_runs(path, mapping, said, asks=preview)
     except NotMappedError:
         if not preview:
             raise

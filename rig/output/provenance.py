@@ -18,7 +18,9 @@ def now_utc() -> str:
 
 def utc_of(since_epoch_ns: int | None) -> str:
     """Return a time in ns since the Unix epoch as `now_utc` has it; empty where it is unknown."""
-    if since_epoch_ns is None:
+    from estimation.recording import UNDATED_NS
+
+    if since_epoch_ns is None or since_epoch_ns < UNDATED_NS:
         return ""
     return datetime.fromtimestamp(since_epoch_ns * 1e-9, UTC).isoformat(timespec="seconds")
 

@@ -49,7 +49,8 @@ class Samples:
         edges: First sample of each run, and the end of the last one.
         channels: Name to values, shape (n,) each; not finite where a cell is empty.
         conditions: Name to one value, or to values that must be constant in each run.
-        started_at_ns: Time of the first sample where the file holds dates, ns since 1970.
+        zero_ns: Date at which `time_s` is 0, ns since 1970; 0 where its clock has no date, and
+            None where no column holds the time.
         doubts: What is doubtful about the file, questions in words.
         remarks: What was assumed about its clock, in words.
     """
@@ -60,7 +61,7 @@ class Samples:
     edges: list[int]
     channels: dict[str, FloatArray]
     conditions: dict[str, float | str | Values]
-    started_at_ns: int | None = None
+    zero_ns: int | None = None
     doubts: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
@@ -74,7 +75,7 @@ def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:
     """
     data = mapping.data
     sources = data.columns or _by_name(raw, mapping)
-    time_s, started_at_ns, remarks = _clock(raw, mapping, sources.get(TIME))
+    time_s, zero_ns, remarks = _clock(raw, mapping, sources.get(TIME))
     edges = edges_of(raw, mapping, time_s)
     channels = {
         name: _channel(raw, mapping.where("columns", name), name, source, edges)
@@ -94,15 +95,13 @@ def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:
         *(text for name, source in mapped for text in unit_doubts(raw, name, source)),
         *mapped_twice(sources),
     )
-    return Samples(
-        raw, mapping, time_s, edges, channels, conditions, started_at_ns, doubts, remarks
-    )
+    return Samples(raw, mapping, time_s, edges, channels, conditions, zero_ns, doubts, remarks)
 
 
 def _clock(
     raw: Raw, mapping: ColumnMapping, source: Source | None
 ) -> tuple[FloatArray, int | None, tuple[str, ...]]:
-    """Return the time of each sample, s, that of the first one if known, ns, and remarks."""
+    """Return the time of each sample, s, when that is 0, ns since 1970 if known, and remarks."""
     where, rate_hz = mapping.where("columns", TIME), mapping.data.sample_rate_hz
     if source is not None and source.unit == DATE:
         return _dates(raw, where, source)
@@ -110,8 +109,9 @@ def _clock(
         time_s = _channel(raw, where, TIME, source, [])
         of_day = np.nanmin(time_s) >= 0.0 and np.nanmax(time_s) <= DAY_S
         if of_day and not mapping.data.runs.resets:
-            return _past_midnight(raw, time_s)
-        return time_s, None, ()
+            time_s, remarks = _past_midnight(raw, time_s)
+            return time_s, 0, remarks
+        return time_s, 0, ()
     if rate_hz is not None:
         return np.arange(len(raw)) / rate_hz, None, ()
     raise DataError(
@@ -121,15 +121,15 @@ def _clock(
     )
 
 
-def _past_midnight(raw: Raw, time_s: FloatArray) -> tuple[FloatArray, None, tuple[str, ...]]:
+def _past_midnight(raw: Raw, time_s: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Return a time of the day that goes on where it falls by about a day, and a remark on it."""
     steps = np.diff(time_s, prepend=time_s[0])
     falls = steps < -0.5 * DAY_S
     if not falls.any() or (steps > 0.5 * DAY_S).any():  # the clock does not come back
-        return time_s, None, ()
+        return time_s, ()
     place = raw.row(int(np.argmax(falls)))
     remark = f"the time falls by a day in {place}, at midnight, and is continued there"
-    return time_s + DAY_S * np.cumsum(falls), None, (remark,)
+    return time_s + DAY_S * np.cumsum(falls), (remark,)
 
 
 def _by_name(raw: Raw, mapping: ColumnMapping) -> dict[str, Source]:
@@ -251,10 +251,10 @@ def _dates(raw: Raw, where: str, source: Source) -> tuple[FloatArray, int | None
             after_samples(raw, [one is not None for one in read], index)
             or "Correct the file, or map another column.",
         )
-    since = np.array([(one - at[0]).total_seconds() for one in at])
+    since, remarks = np.array([(one - at[0]).total_seconds() for one in at]), tuple[str, ...]()
     if at[0].date() == NO_DATE:  # a time of the day alone: a run may go past midnight
-        return _past_midnight(raw, since)
-    return since, round(at[0].timestamp() * 1e6) * 1000, ()
+        since, remarks = _past_midnight(raw, since)
+    return since, round(at[0].timestamp() * 1e6) * 1000, remarks
 
 
 def _date(cell: str) -> datetime | None:

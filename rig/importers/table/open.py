@@ -1,14 +1,14 @@
 """Opening a table: the files at a path, read by their kind and cut into runs."""
 
+import itertools
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import takewhile
 from pathlib import Path
 
 from estimation.campaign import Campaign, Run
 from estimation.copies import without_copies
-from estimation.recording import Recording
+from estimation.recording import UNDATED_NS, Recording
 from rig.errors import DataError, UsageError
 from rig.importers.derivatives import checked
 from rig.importers.registry import or_excluded, unreadable
@@ -83,14 +83,40 @@ def read_runs(
     remarks: list[Remark],
     bad: list[Run] | None = None,
     asks: bool = False,
-) -> Iterator[Recording]:
-    """Yield the runs of a table, one file in memory at a time, without the check of derivatives.
+) -> list[Recording]:
+    """Return the runs of a table without the check of derivatives.
 
     Of files in several folders, the name of a run begins with those of its file: `monday-run1`.
     `remarks` gets a sentence on everything that was assumed, left out or filled in, and `bad` the
     files that cannot be read; without it the first of these is an error. With `asks` a file that
-    is cut into many tiny parts is read, with a question.
+    is cut into many tiny parts is read, with a question. Where the clock has no date, the start of
+    a run is known if no two runs are at one time of it: then it goes on from run to run.
     """
+    runs = list(_each_run(path, mapping, remarks, bad, asks))
+    starts = [r.started_at_ns for r in runs]
+    if all(start is not None and start >= UNDATED_NS for start in starts) or _goes_on(runs):
+        return runs
+    if len(runs) > 1:
+        clock = "no column holds the time" if None in starts else "the time begins again in a run"
+        remarks.append((path.name, f"{clock}, so the pauses between runs are not known"))
+    return [replace(r, started_at_ns=None) for r in runs]
+
+
+def _goes_on(runs: Sequence[Recording]) -> bool:
+    """Whether runs are after one another on a clock, in any order: more than one of them."""
+    spans = sorted((r.started_at_ns, r.duration_s) for r in runs if r.started_at_ns is not None)
+    each = itertools.pairwise(spans)
+    follow = all(start + 1e9 * length_s < after for (start, length_s), (after, _) in each)
+    return len(spans) == len(runs) > 1 and spans[0][0] >= 0 and follow
+
+
+def _each_run(
+    path: Path,
+    mapping: ColumnMapping,
+    remarks: list[Remark],
+    bad: list[Run] | None,
+    asks: bool,
+) -> Iterator[Recording]:
     taken: set[str] = set()
     files = files_at(path, mapping)
     several = len({file.parent for file in files}) > 1
@@ -133,7 +159,7 @@ def _not_this(error: NoColumnError, files: Sequence[Path]) -> str:
     """Return the remedy where a file of a folder is not a recording, after that of its column."""
     name, kind = error.raw.path.name, error.raw.path.suffix
     letters = zip(*(file.name for file in files if file.name != name), strict=False)
-    shared = takewhile(lambda same: len(set(same)) == 1, letters)
+    shared = itertools.takewhile(lambda same: len(set(same)) == 1, letters)
     stem = "".join(same[0] for same in shared).rstrip("0123456789")
     pattern = f"{stem}*{kind}" if not name.startswith(stem) else "PATTERN"
     own = f"; if it states values of each file, side_file = {name!r}"

@@ -82,9 +82,9 @@ def _run(samples: Samples, part: slice, name: str, remarks: list[Remark]) -> Rec
         key: _constant(mapping, key, value, part, name) for key, value in samples.conditions.items()
     }
     empty = ~np.all([np.isfinite(values) for values in channels.values()], axis=0)
-    start_ns = samples.started_at_ns
+    start_ns = samples.zero_ns
     if start_ns is not None:
-        start_ns += round(float(time_s[0] - samples.time_s[0]) * 1e9)
+        start_ns += round(float(time_s[0]) * 1e9)
     try:
         run = Recording(
             name=name,

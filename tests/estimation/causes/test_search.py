@@ -24,6 +24,7 @@ from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
+from estimation.causes.remarks import pauses
 from estimation.causes.scoring import assessed, best_of_each, tried
 from estimation.causes.search import Found, search
 from estimation.causes.verdict import answer, diagnose
@@ -755,6 +756,21 @@ def test_runs_without_a_cause_show_nothing_of_its_size() -> None:
     found = assessed(joint, groups_of(joint, claims), [[[0, 1, 2]]])
     assert max(abs(one.gain) for one in found) < 0.05
     assert max(one.gain for one in assessed(joint, groups_of(joint, claims), folds_of(layout))) > 1
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_time_over_the_campaign_is_stated_to_lack_pauses_that_are_not_known(known: bool) -> None:
+    runs = [r if known else replace(r, started_at_ns=None) for r in recordings()]
+    layout = _laid(runs, motor())
+    place = next(p for p in places_of(layout) if p.name == "motor")
+    sources = list(sources_at(layout, place))
+
+    def said(effect_id: str) -> list[str]:
+        (source, *_) = [s for s in sources if s.effect.id == effect_id]
+        return list(pauses(runs, [source]))
+
+    assert len(said("friction.warmup.campaign")) == (not known)
+    assert not said("friction.warmup")
 
 
 def test_a_cause_that_comes_once_costs_less_than_one_that_comes_and_goes() -> None:

@@ -286,6 +286,29 @@ def test_dates_are_a_clock_and_the_start_of_the_run(tmp_path):
     assert run.started_at_ns == 1714564800 * 10**9
 
 
+@pytest.mark.parametrize(
+    ("starts_s", "known_s", "remark"),
+    [
+        ((38.5, 0.0, 76.25), (38.5, 0.0, 76.25), ""),  # files whose names are in another order
+        ((0.0, 0.0, 0.0), None, "the time begins again in a run"),
+        ((0.0, 0.2, 40.0), None, "the time begins again in a run"),
+    ],
+)
+def test_a_clock_that_goes_on_from_file_to_file_is_the_start_of_the_runs(
+    tmp_path, starts_s, known_s, remark
+):
+    for number, start_s in enumerate(starts_s):
+        columns = {"t": [start_s + 0.1 * k for k in range(4)], "enc": [number, 1, 2, 3]}
+        text_table(tmp_path / f"{number}.csv", columns)
+    text, remarks = SECONDS + 'motor_angle_rad = "enc:deg"\n', []
+    runs = read_runs(tmp_path, machine(tmp_path, text), remarks)
+    assert [run.started_at_ns for run in runs] == (
+        [None] * 3 if known_s is None else [round(1e9 * start_s) for start_s in known_s]
+    )
+    said = [f"{remark}, so the pauses between runs are not known"] if remark else []
+    assert [text for _, text in remarks if "pauses" in text] == said
+
+
 def cut(tmp_path, rule, columns):
     path = tmp_path / "run.csv"
     text_table(path, columns)
