@@ -21,10 +21,11 @@ class Change:
         confidence: Probability of this name next to the other changes, that of no change included.
         parameters: Parameter to its change from A to B (of an effect: its amplitude), SI.
         ci95: Parameter to the 95 % interval of that, over runs.
-        unit: Parameter to its unit.
+        unit: Parameter, and shape parameter, to its unit.
         before: Parameter to its value in A; None of an effect.
         shape: Shape parameter of an effect to its value, SI.
         depends_on: Variables that an effect depends on.
+        form: Id of the form of the effect, such as `friction.load.power`.
     """
 
     verdict: str
@@ -40,6 +41,7 @@ class Change:
     before: Mapping[str, float | None]
     shape: Mapping[str, float] = field(default_factory=dict)
     depends_on: tuple[str, ...] = ()
+    form: str = ""
 
 
 @dataclass(frozen=True)

@@ -89,11 +89,13 @@ def stated(
             for label, (a, b, v) in zip(labels, ends, strict=True)
         },
         unit={
-            p.name: term.unit(p, joint.layout.equations[source.place.home].target) for p in chosen
+            p.name: term.unit(p, joint.layout.equations[source.place.home].target)
+            for p in (*chosen, *source.effect.shape)
         },
         before=dict.fromkeys(labels, _before(source, joint, base, shared)),
         shape={p.name: float(x) for p, x in zip(source.effect.shape, source.shape, strict=True)},
         depends_on=variables_of(one.candidate),
+        form=source.effect.id,
     )
 
 

@@ -113,14 +113,14 @@ class LoadedBearing(Remembering):
 
 
 UNIT_LOAD = 0.1
-"""Reference load of the power law, N m: there the loss is mu times the load."""
+"""Reference load of the power law, N m or N: there the loss is mu times the load."""
 
 
 class PowerLoadFriction(LoadFriction):
     """Friction that is not proportional to the load: contacts that flatten, or teeth that seat.
 
-    Equation: torque = mu L (|load| / L)^exponent tanh(speed / width), L = 0.1 N m, load in N m,
-    width in rad/s, mu and exponent without unit.
+    Equation: torque = mu L (|load| / L)^exponent tanh(speed / width), L = 0.1 N m or, of a force,
+    0.1 N, load in N m, width in rad/s, mu and exponent without unit.
 
     Check: repeat the same motion against three stiffnesses, and free.
 
@@ -131,9 +131,7 @@ class PowerLoadFriction(LoadFriction):
     id = "friction.load.power"
     meaning = "friction that grows with a power of the load"
     balances: ClassVar = {"motor": -1, "cable": 1}
-    amplitudes = (
-        Parameter("friction", "target / load", "loss per unit of load at 0.1 N m", lower=0.0),
-    )
+    amplitudes = (Parameter("friction", "target / load", "share of a load of 0.1", lower=0.0),)
     shape = (
         Parameter("exponent", "1", "power of the load", 2.0 / 3.0, 2.5, points=5),
         Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-3, 1e2),

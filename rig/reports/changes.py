@@ -1,10 +1,10 @@
 """A comparison of two campaigns in sentences and tables."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from estimation.changes.difference import Change, Difference
 from rig.output.table import TextTable
-from rig.reports.diagnosis_words import confidence, label, wave
+from rig.reports.diagnosis_words import confidence, in_unit, label, wave
 
 PLAIN = {"came": "new effect", "went": "effect that is gone", "moved": "changed parameter"}
 """How something changed, as in the JSON, to the words of a sentence."""
@@ -27,18 +27,25 @@ def _sentence(change: Change) -> str:
         set_of = f"One of these changed, not distinguishable on these runs: {names}. "
         how = f"most likely {how}"
     sizes = [_size(change, name) for name in change.parameters]
-    if "order" in change.shape:
-        repeats = wave(change.shape["order"], change.depends_on)
+    for name, value in _shape(change).items():
+        shown = {name: in_unit(value, change.unit[name])}
+        repeats = wave(value, change.depends_on) if name == "order" else shown
         sizes += [f"{name} {text}".strip() for name, text in repeats.items()]
+    form = f" ({change.form})" if change.form not in ("", change.family) else ""
     for word, plain in PLAIN.items():
         how = how.replace(word, plain)
-    return f"{set_of}{how.capitalize()}: {change.name}, {', '.join(sizes)} ({sure})."
+    return f"{set_of}{how.capitalize()}: {change.name}{form}, {', '.join(sizes)} ({sure})."
+
+
+def _shape(change: Change) -> Mapping[str, float]:
+    """Return the shape of an effect, without which its amplitudes state little."""
+    return {} if change.how == "moved" else change.shape
 
 
 def _size(change: Change, name: str) -> str:
     value, unit, before = change.parameters[name], change.unit[name], change.before[name]
     low, high = change.ci95[name]
-    named = label(change.family, name)
+    named = label(change.form or change.family, name)
     text = f"{named} {value:+.4g} {unit} ({low:+.4g} to {high:+.4g})".replace(" 1 (", " (")
     return text if before is None else f"{text} from {before:.4g}"
 
@@ -51,8 +58,12 @@ def change_table(found: Difference) -> TextTable:
             low, high = change.ci95[name]
             known, interval = change.before[name], f"{low:+.4g} to {high:+.4g}"
             before = "-" if known is None else f"{known:.4g}"
-            named, unit = label(change.family, name), change.unit[name]
+            named, unit = label(change.form or change.family, name), change.unit[name]
             rows.append((change.name, named, before, f"{value:+.4g}", interval, unit))
+        rows += [
+            (change.name, name, "-", f"{value:.4g}", "", change.unit[name])
+            for name, value in _shape(change).items()
+        ]
     heads = ("change", "parameter", "in A", "A to B", "95 %", "unit")
     return TextTable("What changed", heads, rows)
 

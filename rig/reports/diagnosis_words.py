@@ -11,6 +11,9 @@ from estimation.plant_models import WORDS
 from rig.output.table import counted
 
 NO_NEXT = "None is proposed: no named hypotheses compete."
+PART_OF_THE_NAME = "half the ", "share of a load of "
+"""What the description of a parameter begins with whose number is misread without it."""
+
 QUICK = "None was searched for: --quick does not search for one. Diagnose without it."
 
 
@@ -173,10 +176,10 @@ def sizes_of(finding: Finding) -> dict[str, str]:
 
 
 def label(effect: str, name: str) -> str:
-    """Return the name of a parameter of an effect; of one that is half of a size, with that."""
+    """Return the name of a parameter of an effect, with what it is half of or a share of."""
     known = catalogue().get(effect)
     for parameter in (*known.amplitudes, *known.shape) if known else ():
-        if parameter.name == name and parameter.description.startswith("half the "):
+        if parameter.name == name and parameter.description.startswith(PART_OF_THE_NAME):
             return f"{name} ({parameter.description})"
     return name
 

@@ -173,6 +173,38 @@ def test_a_parameter_that_is_half_of_a_size_is_labelled_so(form):
     assert changes.change_table(found).rows[0][1] == named
 
 
+def test_a_change_is_stated_with_the_form_and_the_shape_of_its_effect():
+    """A share of a load says little without the power of that load."""
+    change = Change(
+        verdict="came",
+        how="came",
+        name="friction.load at motor",
+        equation="motor",
+        family="friction.load",
+        form="friction.load.power",
+        alternatives=(),
+        confidence=0.99,
+        parameters={"friction": 0.67},
+        ci95={"friction": (0.56, 0.7)},
+        unit={"friction": "1", "exponent": "1", "width": "rad/s"},
+        before={"friction": None},
+        shape={"exponent": 2.0 / 3.0, "width": 0.4},
+    )
+    found = Difference((change,), {})
+    named = "friction (share of a load of 0.1)"
+    assert next(changes.lines(found)) == (
+        f"New effect: friction.load at motor (friction.load.power), {named} +0.67"
+        " (+0.56 to +0.7), exponent 0.667, width 0.4 rad/s (confidence 99%)."
+    )
+    assert [row[1:4] for row in changes.change_table(found).rows] == [
+        (named, "-", "+0.67"),
+        ("exponent", "-", "0.6667"),
+        ("width", "-", "0.4"),
+    ]
+    moved = replace(change, verdict="moved", how="moved", before={"friction": 0.1})
+    assert "exponent" not in next(changes.lines(Difference((moved,), {})))
+
+
 def test_the_page_has_the_period_of_a_wave_along_a_travel():
     finding = Finding(
         balance="carriage",
