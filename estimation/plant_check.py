@@ -133,14 +133,12 @@ def check(
         return CheckedPlant(found, tuple(missing(plant)), tuple(unused(plant)))
     recordings = list(campaign.evidence)
     columns = shared_columns(recordings) if recordings else []
-    contradictions = tuple(_contradictions(plant, recordings, str(file or plant.name)))
+    contradicted = tuple(contradictions(plant, recordings, str(file or plant.name)))
     return CheckedPlant(
-        equations=tuple(
-            _fitted(model, campaign, columns, bool(contradictions)) for model in models
-        ),
+        equations=tuple(_fitted(model, campaign, columns, bool(contradicted)) for model in models),
         missing=tuple(missing(plant)),
         unused=tuple(unused(plant)),
-        contradictions=contradictions,
+        contradictions=contradicted,
         runs=len(recordings),
     )
 
@@ -243,8 +241,10 @@ def _one_way(model: Model, campaign: Campaign) -> Iterator[str]:
             )
 
 
-def _contradictions(plant: Plant, recordings: Sequence[Recording], file: str) -> Iterator[str]:
-    """Yield where recorded travels are not as the file states."""
+def contradictions(
+    plant: Plant, recordings: Sequence[Recording], file: str = "the machine file"
+) -> Iterator[str]:
+    """Yield where recorded travels, or the noise of a reading, are not as the file states."""
     for axis in plant.axes:
         readings = [s.name for s in plant.sensors if (s.axis, s.reads) == (axis.name, "position")]
         for first, second in pairwise(readings):

@@ -132,7 +132,7 @@ def fit(
     options.require_machine(machine)
 
     from estimation import model_file
-    from rig.importers.questions import questions
+    from rig.importers.questions import doubts
     from rig.machines.recordings import open_recordings
     from rig.machines.shipped import read_machine
     from rig.reports.fit import held_out_sentence, parameter_table
@@ -145,7 +145,7 @@ def fit(
         return
     done = _fitted(declared_models(model, machine), campaign, folds, seed)
     plant = None if machine is None else read_machine(machine)
-    asked = questions(list(campaign.evidence), plant)
+    asked = doubts(list(campaign.evidence), plant)
     said: list[str | TextTable] = [f"Check: {line}" for line in asked]
     one = "One run: there is no error on runs that it was not fitted on."
     for fitted, error in done:

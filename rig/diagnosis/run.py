@@ -23,7 +23,7 @@ from estimation.recording import FloatArray, Recording
 from rig.diagnosis.ledger import Ledger, Look, look_at
 from rig.diagnosis.propose import propose
 from rig.diagnosis.subject import Subject
-from rig.importers.questions import questions
+from rig.importers.questions import doubts
 from rig.output.table import counted
 
 LEAST_SHARED = 200
@@ -76,7 +76,7 @@ def run_diagnosis(
     if not quick:
         on_stage("choosing the experiment that separates the alternatives")
         proposed = propose(found, recordings, executor)
-    asked_of = (f"Check: {line}" for line in questions(whole, asked.plant))
+    asked_of = (f"Check: {line}" for line in doubts(whole, asked.plant))
     fitted = (e.model for e in found.layout.equations.values())
     ignored = filter(None, map(offsets_note, fitted)) if asked.of_machine else ()
     notes = [*found.diagnosis.notes, *lost, *ignored, *asked_of]

@@ -16,6 +16,7 @@ from estimation.errors import EstimationError
 from estimation.fitting import fit
 from estimation.opposed import opposed
 from estimation.plant import Plant
+from estimation.plant_check import contradictions
 from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
 from estimation.turned import turned_runs
@@ -75,6 +76,12 @@ def questions(recordings: Sequence[Recording], plant: Plant | None = None) -> li
         f"{n}: {text}" for n in names for text in of_channel(n, recordings, limits.get(n, 0.0))
     ]
     return [*found, *of_runs(recordings)]
+
+
+def doubts(recordings: Sequence[Recording], plant: Plant | None) -> list[str]:
+    """Return where runs contradict the file of their machine, if known, and the questions."""
+    contradicted = () if plant is None else contradictions(plant, recordings)
+    return [*contradicted, *questions(recordings, plant)]
 
 
 def of_runs(recordings: Sequence[Recording]) -> Iterator[str]:

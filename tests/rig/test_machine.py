@@ -42,6 +42,24 @@ lap_s = 3.0
 """
 
 
+GEARED_SLIDE = """
+[[axis]]
+name = "motor"
+unit = "rad"
+[[transmission]]
+name = "screw"
+input = "motor"
+output = "carriage"
+ratio = 500.0
+[[sensor]]
+name = "motor_angle_rad"
+axis = "motor"
+reads = "position"
+[data]"""
+MOTOR_COLUMN = 'motor_angle_rad = "x:rad"\n'
+"""A motor whose angle changes by 1000 rad per metre."""
+
+
 def slide_table(folder, runs=8):
     time_s = np.arange(0.0, 3.0 * runs, 2e-3)
     turns = 2 * np.pi * time_s
@@ -264,6 +282,20 @@ def test_a_clipped_channel_is_asked_about_at_every_step(slide, tmp_path, said, a
     flagged = '[[data.invalid]]\nwhen = "abs(drive_force_n) >= 42"\nreason = "clipped"\n'
     file.write_text(file.read_text() + flagged)
     assert "clipped" not in said("machine check", file, table).out
+
+
+def test_counts_that_contradict_the_ratio_are_named_by_every_command(slide, said, answered):
+    """A fit is then wrong by that factor, and its error may be as small as with the right one."""
+    file, table = slide
+    text = SLIDE.replace("[data]", GEARED_SLIDE).replace(
+        "[data.runs]", f"{MOTOR_COLUMN}[data.runs]"
+    )
+    file.write_text(text)
+    wrong = "states the ratio 500 for screw, but motor_angle_rad changes 1000 times as much"
+    assert wrong in " ".join(said("machine check", file, table, code=1).out.split())
+    assert f"Check: the machine file {wrong}" in said("fit", table, "--machine", file).out
+    notes = answered("diagnose --quick", table, "--machine", file)["notes"]
+    assert any(note.startswith(f"Check: the machine file {wrong}") for note in notes)
 
 
 def test_a_column_that_was_not_recorded_is_named(slide, said):
