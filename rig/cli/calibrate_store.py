@@ -174,7 +174,7 @@ def diagnose(
     from rig.diagnosis.ledger import Ledger, default_ledger
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import of_calibration
-    from rig.reports.diagnosis_words import sentences
+    from rig.reports.diagnosis_words import lines
 
     asked = of_calibration(declared_by_record(_holding(record, store).get(record)))
     looks = Ledger(ledger or default_ledger())
@@ -182,7 +182,7 @@ def diagnose(
         done, look = run_diagnosis(asked, looks, seed=seed, on_stage=on_stage)
     looks.enter(look)
     data = done.diagnosis.to_json() if json else None
-    present(json, data, *sentences(done.diagnosis), *done.diagnosis.notes)
+    present(json, data, *lines(done.diagnosis))
 
 
 def store_of(folder: Path | None, settings: "Config | None" = None) -> "CalibrationStore":

@@ -66,7 +66,7 @@ def diagnose(
     from rig.diagnosis.run import run_diagnosis
     from rig.diagnosis.subject import subject
     from rig.reports.diagnosis import write
-    from rig.reports.diagnosis_words import sentences
+    from rig.reports.diagnosis_words import lines
 
     kept = _kept_with(path)
     page_file = report / "diagnosis.html" if report else kept and kept.with_suffix(".html")
@@ -92,7 +92,7 @@ def diagnose(
     written += write(done, seed, page_file, json_out)
     looks.enter(look)
     found = done.diagnosis
-    present(json_, found.to_json(), *sentences(found), *found.notes, *written)
+    present(json_, found.to_json(), *lines(found), *written)
 
 
 def _with_models(

@@ -29,6 +29,9 @@ RELATED = 0.5
 LEAST = 100
 """Samples from which a correlation is one."""
 
+CONSTANT = "and varies in the other runs; is the sensor connected and within its range"
+"""What is asked of a channel that has one value in a run."""
+
 POSITIONS, MOTIONS = ("rad", "m"), ("rad", "m", "rad/s", "m/s", "rad/s^2", "m/s^2")
 """Units of which the rate counts, and those of motion: two motions may be independent."""
 
@@ -53,6 +56,9 @@ def in_another_unit(recordings: Sequence[Recording]) -> Iterator[str]:
                 runs.setdefault((name, unit, how), []).append((run, ratio))
     for (name, unit, how), places in runs.items():
         where = ", ".join(run for run, _ in places)
+        if unit == CONSTANT:
+            yield f"{name}: it is constant in {where}, {unit} there?"
+            continue
         yield (
             f"{name}: it varies {places[0][1]:.3g} times as much{how} in {where} as in the other"
             f" runs, and other channels as usual; {unit or 'are unit and gain right'} there?"
@@ -124,9 +130,9 @@ def _to_usual(values: Sequence[float]) -> FloatArray:
 
 
 def _spread(recording: Recording, name: str) -> float:
-    """Return the standard deviation of a channel."""
+    """Return the standard deviation of a channel; exactly 0 of a constant one."""
     values = recording[name][recording.valid & np.isfinite(recording[name])]
-    return float(np.std(values)) if values.size else np.nan
+    return float(np.std(values - values[0])) if values.size else np.nan
 
 
 def _noise(recording: Recording, name: str) -> float:
@@ -143,6 +149,8 @@ def _within(values: ArrayLike, usual: float, factor: float = ALIKE) -> NDArray[n
 
 def _unit(name: str, ratio: float, ratios: FloatArray) -> str:
     """Return the wrong unit that explains a ratio, as far as other runs agree; or nothing."""
+    if ratio == 0.0:
+        return CONSTANT
     alike = ratios[_within(ratios, 1.0)]
     allowed = max(SURE, float(alike.max()), 1 / float(alike.min()))
     for unit in CONFUSED[unit_of(name)]:

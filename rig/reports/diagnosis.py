@@ -42,6 +42,7 @@ def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
     """
     drawn = charts(diagnosis, signals)
     sealed = diagnosis.sealed
+    doubts, limits = words.said_of_recordings(diagnosis)
     method = (
         f"The model was fitted and searched on {len(sealed.discover)} training runs. The"
         f" {len(sealed.confirm)} held-out test runs ({', '.join(sealed.confirm)}) were opened once,"
@@ -52,7 +53,7 @@ def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
         "diagnosis.html",
         {
             "title": f"Diagnosis: {VERDICTS[diagnosis.verdict]}",
-            "sentences": words.sentences(diagnosis),
+            "sentences": [*doubts, *words.sentences(diagnosis)],
             "cards": [card(finding, diagnosis) for finding in diagnosis.findings],
             "errors": error_table(diagnosis),
             "charts": drawn,
@@ -63,7 +64,7 @@ def page(diagnosis: Diagnosis, signals: Traces, provenance: Provenance) -> str:
                 *_moved(diagnosis, signals),
             ],
             "others": words.other_sentences(diagnosis),
-            "limits": [*diagnosis.notes, CONFIDENCE],
+            "limits": [*limits, CONFIDENCE],
             "next_experiment": words.next_sentence(diagnosis),
             "method": method,
             "provenance": provenance,

@@ -35,6 +35,21 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     return lines + [f"{name}: not decided. {why}" for name, why in diagnosis.undecided.items()]
 
 
+def lines(diagnosis: Diagnosis) -> list[str]:
+    """Return everything that is said, one line each.
+
+    The doubts about the recordings come first: a finding may be of what they name.
+    """
+    doubts, limits = said_of_recordings(diagnosis)
+    return [*doubts, *sentences(diagnosis), *limits]
+
+
+def said_of_recordings(diagnosis: Diagnosis) -> tuple[list[str], list[str]]:
+    """Return the notes that are doubts about the recordings, and all others."""
+    doubts = [note for note in diagnosis.notes if note.startswith("Check: ")]
+    return doubts, [note for note in diagnosis.notes if note not in doubts]
+
+
 def _above_noise(diagnosis: Diagnosis) -> str:
     """Return which errors are above the noise of the readings, and by what; empty if none is."""
     above = {name: r for name, r in diagnosis.over_noise.items() if is_unexplained(r)}

@@ -25,7 +25,7 @@ from rig.output.provenance import Provenance, commit
 from rig.output.table import TextTable, to_markdown, to_rich
 from rig.reports import changes
 from rig.reports.diagnosis import card, parameter_table
-from rig.reports.diagnosis_words import check_of, meaning, meaning_of, sentences, sizes_of
+from rig.reports.diagnosis_words import check_of, lines, meaning, meaning_of, sentences, sizes_of
 from rig.reports.fit import parameter_table as fitted_table
 from tests.rig.browser import Opened, chromium
 
@@ -220,6 +220,13 @@ def test_the_page_has_the_period_of_a_wave_along_a_travel():
     diagnosis = Diagnosis((finding,), {}, {"carriage": "N"}, {}, {}, Sealed((), ("a",), 0, "", ""))
     assert "confidence more than 99%" in sentences(diagnosis)[0]
     assert ("Confidence", "more than 99%") in card(finding, diagnosis)["facts"]
+
+
+def test_what_may_be_wrong_with_the_recordings_comes_before_what_is_found_in_them():
+    notes = ("motor: a limit.", "Check: tool_force_n: is it clipped?")
+    said = lines(Diagnosis((), {}, {}, {}, {}, Sealed((), ("a",), 0, "", ""), notes=notes))
+    assert [said[0], said[-1]] == [notes[1], notes[0]]
+    assert said[1].startswith("No unmodelled effect found")
 
 
 def test_a_plan_states_what_its_numbers_are():

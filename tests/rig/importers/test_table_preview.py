@@ -224,7 +224,6 @@ def of_runs(tmp_path, angles, currents):
         (np.pi / 180, "is it stated in deg without being so there?"),
         (180 / np.pi, "is it in deg there?"),
         (1 / 20, "are unit and gain right there?"),
-        (0.0, "are unit and gain right there?"),
     ],
 )
 def test_one_run_in_another_unit_is_asked_once(tmp_path, factor, question):
@@ -233,6 +232,21 @@ def test_one_run_in_another_unit_is_asked_once(tmp_path, factor, question):
     assert "motor_angle_rad: it varies" in found
     assert "in run3 as in the other runs" in found
     assert question in found
+
+
+def test_a_run_in_which_a_channel_is_constant_is_asked_about_as_that(tmp_path):
+    """At any value: rounding of the mean is no variation."""
+    for number in range(6):
+        wave = np.sin(TIME * (2 + 0.1 * number))
+        columns = {"motor_angle_rad": wave, "load_force_n": 122.9 + (number != 3) * wave}
+        text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
+    found = preview(read_runs(tmp_path, read_mapping(None, []), []), []).questions
+    (asked,) = [one for one in found if "constant" in one]
+    assert asked == (
+        "load_force_n: it is constant in run3, and varies in the other runs; is the sensor"
+        " connected and within its range there?"
+    )
+    assert not any("times as much" in one for one in found)
 
 
 @pytest.mark.parametrize(
