@@ -114,6 +114,21 @@ class Errors:
         return replace(self, centred=self.raw)
 
 
+def that_falls(
+    before: Errors, after: Errors, with_means: bool, least: float
+) -> tuple[Errors, Errors, bool]:
+    """Return errors without and with a cause, of the kind by which it is confirmed.
+
+    That is the kind stated, with the means of runs left in or removed, or the other one where the
+    logarithm of that stated falls by less than `least`. Also whether the means are left in.
+    """
+    kinds = {False: (before, after), True: (before.with_means(), after.with_means())}
+    old, new = kinds[with_means]
+    if new.rmse > old.rmse * np.exp(-least):
+        with_means = not with_means
+    return *kinds[with_means], with_means
+
+
 class Refit:
     """One equation, fitted on the training runs, on all runs, which have the campaign's time.
 

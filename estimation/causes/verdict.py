@@ -28,7 +28,7 @@ from estimation.causes.instruments import add_instruments
 from estimation.causes.layout import Layout, lay_out, on_one_clock
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.refit import Addition, Errors
+from estimation.causes.refit import Addition, Errors, that_falls
 from estimation.causes.refits import Refits
 from estimation.causes.scoring import DIGITS, probabilities
 from estimation.causes.search import Found, search
@@ -240,12 +240,12 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
     if falls[stated] < least:
         refits.parts, refits.open = parts, uncounted
         return None
-    old, new = before[stated], after[stated]
-    if not refits.layout.equations[stated].model.run_offsets:
-        old, new = old.with_means(), new.with_means()
+    has_means = not refits.layout.equations[stated].model.run_offsets
+    old, new, has_means = that_falls(before[stated], after[stated], has_means, least)
     finding = replace(
         named(one, sealed.may_name),
         error_of=stated,
+        with_means=has_means,
         rmse_before=old.rmse,
         rmse_after=new.rmse,
         runs_improved=sum(new.by_run[name] < x for name, x in old.by_run.items()),

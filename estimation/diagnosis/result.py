@@ -65,8 +65,9 @@ class Finding:
         parameters: Name to value.
         error_of: Equation whose error is stated: its own, or another one whose error falls most
             where its own does not fall.
-        rmse_before: That error on the test runs before this finding, after those found earlier:
-            each run's mean removed, unless the equation has no offsets of runs.
+        with_means: Whether the means of runs are left in that error: where the equation has no
+            offsets of runs, or where it does not fall without them.
+        rmse_before: That error on the test runs before this finding, after those found earlier.
         rmse_after: The same after it.
         runs_improved: Test runs whose error it lowers.
         runs_total: Test runs.
@@ -86,6 +87,7 @@ class Finding:
     confidence: float | None = None
     parameters: Mapping[str, Value] = field(default_factory=dict)
     error_of: str
+    with_means: bool = False
     rmse_before: float = math.nan
     rmse_after: float = math.nan
     runs_improved: int = 0

@@ -50,6 +50,8 @@ class Finding(_Strict):
     parameters: dict[str, Parameter]
     error_of: Balance
     """Equation of the errors: its own, or another one where its own does not fall."""
+    with_means: bool
+    """Whether the means of runs are left in these errors."""
     rmse_before: Number | None
     rmse_after: Number | None
     runs_improved: int

@@ -63,7 +63,7 @@ def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:
     scale, shown = display(unit, finding.rmse_before)
     tested = counted(finding.runs_total, "test run" if exploratory else "held-out test run")
     fall = (
-        f"error{of_another(finding)} on {tested}{' (exploratory)' * exploratory}"
+        f"error{of_which(finding)} on {tested}{' (exploratory)' * exploratory}"
         f" {scale * finding.rmse_before:.3g} -> {in_unit(scale * finding.rmse_after, shown)}"
         f" (lower in {finding.runs_improved} of {counted(finding.runs_total, 'run')})"
     )
@@ -71,9 +71,10 @@ def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:
     return f"{finding.balance}: {_claim(finding)}; {fall}.{also}"
 
 
-def of_another(finding: Finding) -> str:
-    """Return which equation the errors are of, where that is not the finding's own."""
-    return f" of {finding.error_of}" if finding.error_of != finding.balance else ""
+def of_which(finding: Finding) -> str:
+    """Return the equation of the errors, if not the finding's, and whether means of runs count."""
+    other = f" of {finding.error_of}" if finding.error_of != finding.balance else ""
+    return other + " with the means of runs" * finding.with_means
 
 
 def _where(finding: Finding, runs: int) -> str:

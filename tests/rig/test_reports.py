@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from estimation.causes.isolability import Isolable
+from estimation.causes.refit import Errors, that_falls
 from estimation.changes.difference import Change, Difference
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.split import Sealed
@@ -257,6 +258,39 @@ def test_a_finding_whose_own_equation_gains_nothing_states_the_error_of_another(
     own = replace(finding, error_of="motor")
     (sentence,) = sentences(Diagnosis((own,), {}, units, {}, {}, Sealed((), ("a", "b"), 0, "", "")))
     assert "; error on 2 held-out test runs 0.004 -> 0.001 N" in sentence
+
+
+@pytest.mark.parametrize(
+    ("within", "means", "is_stated", "with_means"),
+    [
+        ((4.0, 1.0), False, (4.0, 1.0), False),
+        ((4.0, 1.0), True, (5.0, 3.0), True),
+        ((4.0, 4.1), False, (5.0, 3.0), True),  # confirmed by the means of runs alone
+    ],
+)
+def test_a_finding_states_the_error_by_which_it_is_confirmed(within, means, is_stated, with_means):
+    """One that rises next to a confirmed finding contradicts it."""
+    runs = {"a": 1}
+    before, after = (
+        Errors({"a": own**2}, {"a": total**2}, runs)
+        for own, total in zip(within, (5.0, 3.0), strict=True)
+    )
+    old, new, has_means = that_falls(before, after, means, 0.01)
+    assert ((old.rmse, new.rmse), has_means) == (is_stated, with_means)
+    finding = Finding(
+        balance="motor",
+        family="unknown",
+        verdict="depends_on",
+        error_of="motor",
+        with_means=has_means,
+        rmse_before=old.rmse,
+        rmse_after=new.rmse,
+        runs_total=1,
+    )
+    (said,) = sentences(
+        Diagnosis((finding,), {}, {"motor": "N"}, {}, {}, Sealed((), (), 0, "", ""))
+    )
+    assert ("error with the means of runs on" in said) == with_means
 
 
 def test_a_table_is_the_same_in_every_medium():
