@@ -21,7 +21,7 @@ SURE = 0.9
 """Probability from which a single name is given; below it the verdict is a set."""
 
 IN_SET = 0.95
-"""Probability that a set covers."""
+"""Share of the probability of all effects that a set covers."""
 
 VARIABLE_OF_ROLE: Mapping[str, str] = {
     "speed": "velocity",
@@ -110,6 +110,7 @@ def named(one: Kept, may_name: bool) -> Finding:
             if p.family in others and where != place.name
         },
         probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]},
+        no_effect=round(max(0.0, 1.0 - sum(p.share for p in one.likely)), 4),
     )
     cause = lead.best.candidate.cause
     if isinstance(cause, Function):
@@ -283,10 +284,13 @@ def _gain_before(cause: Source, refits: Refits, equation: str) -> float:
 
 
 def others_in_set(name: str, shares: Mapping[str, float]) -> list[str]:
-    """Return the names besides one that a verdict lists, of all with their probabilities."""
+    """Return the names besides one that a verdict lists, of all with their probabilities.
+
+    A sure name has none. What is left of all probability is that of no effect.
+    """
     covered, others = shares[name], list[str]()
-    for other, share in shares.items():
-        if other != name and covered < (IN_SET if others else SURE) * sum(shares.values()):
+    for other, share in shares.items() if covered < SURE else ():
+        if other != name and covered < IN_SET * sum(shares.values()):
             others.append(other)
             covered += share
     return others

@@ -60,6 +60,7 @@ class Finding:
         alternatives: Families that these runs cannot distinguish from it.
         alternative_places: Family to the place where it would act, where that is another one.
         probabilities: Family to its probability, for the family and its alternatives.
+        no_effect: Probability of none; the rest to one is that of families that are not listed.
         depends_on: Variables it depends on.
         confidence: Probability that the name is right, or None without a name.
         parameters: Name to value.
@@ -83,6 +84,7 @@ class Finding:
     alternatives: tuple[str, ...] = ()
     alternative_places: Mapping[str, str] = field(default_factory=dict)
     probabilities: Mapping[str, float] = field(default_factory=dict)
+    no_effect: float = 0.0
     depends_on: tuple[str, ...] = ()
     confidence: float | None = None
     parameters: Mapping[str, Value] = field(default_factory=dict)

@@ -45,6 +45,8 @@ class Finding(_Strict):
     """Of the alternatives that would act at another place."""
     probabilities: dict[Family, Annotated[float, Field(ge=0, le=1)]]
     """Of the family and its alternatives."""
+    no_effect: Annotated[float, Field(ge=0, le=1)]
+    """Probability that none of all effects is missing here."""
     depends_on: list[Variable]
     confidence: Annotated[float, Field(ge=0, le=1)] | None
     parameters: dict[str, Parameter]

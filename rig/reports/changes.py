@@ -22,9 +22,10 @@ def lines(found: Difference) -> Iterator[str]:
 
 def _sentence(change: Change) -> str:
     sure, how, set_of = f"confidence {confidence(change.confidence)}", change.how, ""
-    if change.verdict == "one_of":
+    if change.alternatives:  # without any, no change has the rest of the confidence
         names = ", ".join([change.name, *change.alternatives])
         set_of = f"One of these changed, not distinguishable on these runs: {names}. "
+    if change.verdict == "one_of":
         how = f"most likely {how}"
     sizes = [_size(change, name) for name in change.parameters]
     for name, value in _shape(change).items():

@@ -208,6 +208,11 @@ def _probabilities(findings: Sequence[Finding]) -> TextTable | None:
     ]
     if not rows:
         return None
+    rows += [
+        [f"{finding.balance}: no effect, not {finding.family}", f"{100 * finding.no_effect:.1f} %"]
+        for finding in findings
+        if finding.no_effect
+    ]
     note = "Among all candidates, the other findings being part of the model."
     return TextTable("Probability of each name", ["effect", "probability"], rows, note)
 

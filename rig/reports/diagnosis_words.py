@@ -91,7 +91,8 @@ def _claim(finding: Finding) -> str:
     others = ", ".join(placed(finding, name) for name in finding.alternatives)
     also = f"; also possible: {others}; these runs cannot distinguish them" if others else ""
     if finding.verdict == "one_of":
-        return _named(finding) + (also or "; these runs are not enough to be sure of it")
+        none = f", and no effect at all has {finding.no_effect:.0%}" * (finding.no_effect >= 0.01)
+        return _named(finding) + (also or "; these runs are not enough to be sure of it") + none
     if finding.verdict == "depends_on":
         return f"unmodelled effect of unknown form; it depends on {variables_of(finding)}{also}"
     return "the model is incomplete, and the cause cannot be identified from these runs"

@@ -95,10 +95,13 @@ def test_an_alternative_at_another_place_is_said_with_that_place(diagnosed):
 
 def test_a_name_without_alternatives_is_not_said_to_have_one(diagnosed):
     (finding,) = diagnosed[0].findings
-    alone = replace(finding, alternatives=(), runs_improved=1, runs_total=1)
+    alone = replace(finding, alternatives=(), no_effect=0.12, runs_improved=1, runs_total=1)
     (text,) = sentences(replace(diagnosed[0], findings=(alone,)))
     assert "also possible" not in text
-    assert "these runs are not enough to be sure of it" in text
+    assert "these runs are not enough to be sure of it, and no effect at all has 12%" in text
+    assert "no effect, not " in page(
+        replace(diagnosed[0], findings=(alone,)), diagnosed[1], Provenance.now(1)
+    )
     assert "error on 1 held-out test run " in text
 
 

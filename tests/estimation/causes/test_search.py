@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from benchmarks.rigs import draw
 from estimation import model_file, plant_file
 from estimation.causes.candidates import Claim, groups_of
-from estimation.causes.findings import family_probabilities
+from estimation.causes.findings import family_probabilities, others_in_set
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
@@ -771,6 +771,20 @@ def test_a_time_over_the_campaign_is_stated_to_lack_pauses_that_are_not_known(kn
 
     assert len(said("friction.warmup.campaign")) == (not known)
     assert not said("friction.warmup")
+
+
+@pytest.mark.parametrize(
+    ("shares", "others"),
+    [
+        ({"a": 0.92, "b": 0.06}, []),
+        ({"a": 0.85, "b": 0.06, "c": 0.03}, ["b"]),  # not sure, though most of what an effect has
+        ({"a": 0.42}, []),  # the rest is that of no effect
+    ],
+)
+def test_a_set_has_nearly_all_that_effects_have_unless_one_is_sure(
+    shares: dict[str, float], others: list[str]
+) -> None:
+    assert others_in_set("a", shares) == others
 
 
 def test_a_cause_that_comes_once_costs_less_than_one_that_comes_and_goes() -> None:
