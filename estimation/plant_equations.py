@@ -5,7 +5,8 @@ Along the chain of axes that an actuator drives:
 - from the actuator to the first sensor of effort: effort = gain x drive - inertia - friction;
 - between two sensors of effort: effort = ratio x effort behind + inertia + friction;
 - without a sensor of effort: drive = weights + inertia + friction, in the unit of the drive;
-  a second drive of the axis is taken off, times the ratio of their gains;
+  a second drive of the axis is taken off, times the ratio of their gains; what a compliant
+  transmission drives has an inertia of its own where its travel is read;
 - across a compliant transmission with its travel read at both ends and its effort at one: the bend
   of known ratio, or the output's travel where the ratio is fitted, = compliance x effort.
 
@@ -206,6 +207,15 @@ def _motion(plant: Plant, speed_of: str, acceleration_of: str, sign: int) -> lis
     return parts
 
 
+def _swung(plant: Plant, chain: Chain, driven: str) -> Iterator[Part]:
+    """Yield the inertias behind a transmission that bends: they move otherwise than the drive."""
+    for joint in chain.joints:
+        behind = joint.output != driven and plant.position(joint.output)
+        if joint.compliant and behind and driven in chain.axes[: chain.axes.index(joint.output)]:
+            acceleration = plant.moved(joint.output, ACCELERATION)
+            yield Part("inertia.missing", 1, {"acceleration": acceleration})
+
+
 def _efforts(plant: Plant, chain: Chain) -> Iterator[Written]:
     """Yield the equations of what the drive and the transmissions of a chain lose."""
     reading = [(k, s) for k, axis in enumerate(chain.axes) if (s := plant.effort(axis)) is not None]
@@ -218,7 +228,7 @@ def _efforts(plant: Plant, chain: Chain) -> Iterator[Written]:
             if load.axis in chain.axes
         ]
         others = [Part("transmission.ratio", -1, {"load": one.name}) for one in chain.also]
-        parts = (*weights, *_motion(plant, driven, driven, 1))
+        parts = (*weights, *_motion(plant, driven, driven, 1), *_swung(plant, chain, driven))
         if parts:
             yield Written(chain.actuator.axis, drive, (*others, *parts, OFFSET))
         return

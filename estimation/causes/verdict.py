@@ -274,7 +274,7 @@ def _shown(one: _Opened, refits: Refits) -> float:
 def _confirmed(found: Found, held_out: HeldOut) -> tuple[list[Kept], list[tuple[Candidate, str]]]:
     """Return the causes with evidence on the test runs next to the others, and the rest with why.
 
-    The one with the least evidence goes first: two effects may need one another.
+    By all runs some effect has to be more probable than none. The one with the least evidence goes first: two effects may need one another.
     """
     left, rejected, numbers = list[Kept](), list[tuple[Candidate, str]](), held_out.numbers
     for ranked in found.conditional:
@@ -286,9 +286,14 @@ def _confirmed(found: Found, held_out: HeldOut) -> tuple[list[Kept], list[tuple[
             for one in left
         ]
         least = min(range(len(left)), key=lambda k: tested[k][1])
+        why = "not confirmed on the test runs"
         if tested[least][1] >= math.log(numbers.kept_evidence):
-            return [one for one, _ in tested], rejected
-        rejected.append((left.pop(least).scored.candidate, "not confirmed on the test runs"))
+            known = [sum(p.share for p in one.likely) for one, _ in tested]
+            least = min(range(len(left)), key=known.__getitem__)
+            why = "is less probable than no effect, by all runs"
+            if known[least] >= 0.5:
+                return [one for one, _ in tested], rejected
+        rejected.append((left.pop(least).scored.candidate, why))
     return [], rejected
 
 

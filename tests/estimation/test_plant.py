@@ -161,11 +161,18 @@ def test_without_a_torque_sensor_the_drive_is_the_target_and_the_gap_is_named():
     plant = replace(whole, sensors=tuple(s for s in whole.sensors if s.reads != "effort"))
     (drive,) = equations(plant)
     assert drive.target == "motor_current_a"
-    assert [part.sign for part in drive.parts] == [1, 1, 1, 1]
+    assert [(part.id, part.sign, *part.channels.values()) for part in drive.parts] == [
+        ("inertia.missing", 1, "motor_acceleration_rad_s2"),
+        ("friction.viscous", 1, "motor_velocity_rad_s"),
+        ("friction.coulomb", 1, "motor_velocity_rad_s"),
+        ("inertia.missing", 1, "spindle_acceleration_rad_s2"),
+        ("inertia.missing", 1, "jaw_acceleration_rad_s2"),
+        ("sensor.offset", 1),
+    ]
     gaps = " ".join(f"{gap.what} {gap.needed}" for gap in missing(plant))
     assert "A sensor of effort (N m) on one of motor, spindle, jaw" in gaps
     assert "The bend of cable cannot be identified" in gaps
-    assert unused(plant) == ["spindle_angle_rad", "jaw_angle_rad"]
+    assert unused(plant) == []
 
 
 def test_the_effort_that_is_needed_of_each_axis_is_in_the_unit_of_that_axis():
