@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -32,10 +33,19 @@ from estimation.turned import turned_runs
 ALIKE = 3.0
 """Factor between a noise that is stated and that of the recordings."""
 
-OFFSETS_IGNORED = (
-    "The fit ignores it (run_offsets = true). State false where a load differs from run to run:"
-    " without its differences gain and friction may be confused."
+OFFSETS_IGNORED = "The fit ignores it (run_offsets = true)"
+OF_A_LOAD = (
+    "; with false it would explain most of it. State false if the zeros of the sensors can be"
+    " trusted: without the differences of a load from run to run, gain and friction may be"
+    " confused."
 )
+OF_ZEROS = (
+    ", and with false it would not explain it: zeros that differ from run to run, or a load that"
+    " the equation does not read."
+)
+
+EXPLAINED = 0.5
+"""Share of the error between runs below which a fit with their means explains most of it."""
 
 
 @dataclass(frozen=True)
@@ -186,8 +196,9 @@ def _fitted(
         found = replace(found, limits=(*limits, *signs))
     if not fitted.run_offsets:
         return replace(found, relative_error=evidence.rmse_with_means / size)
-    means = between_runs(evidence)
-    return replace(found, relative_error=evidence.rmse / size, between_runs=means / size)
+    limits = (*found.limits, *filter(None, [offsets_note(fitted, campaign)]))
+    means = between_runs(evidence) / size
+    return replace(found, relative_error=evidence.rmse / size, between_runs=means, limits=limits)
 
 
 def between_runs(evidence: Evidence) -> float:
@@ -195,18 +206,25 @@ def between_runs(evidence: Evidence) -> float:
     return math.sqrt(max(evidence.rmse_with_means**2 - evidence.rmse**2, 0.0))
 
 
-def offsets_note(model: Model) -> str:
+def offsets_note(model: Model, campaign: Campaign) -> str:
     """Return that a fit ignores an error of runs' means that is larger than that within runs.
 
-    Empty where it is smaller, and of a model that has no offset for each run.
+    And whether a fit with the means would explain it. Empty where it is smaller, and of a model
+    that has no offset for each run. The campaign has the runs of the fit.
     """
     evidence = model.evidence
     if evidence is None or not model.run_offsets or between_runs(evidence) <= evidence.rmse:
         return ""
-    times = between_runs(evidence) / evidence.rmse
+    times, remedy = between_runs(evidence) / evidence.rmse, OF_ZEROS
+    with suppress(EstimationError):
+        runs = campaign.select(evidence.runs)
+        whole = fit(replace(model, run_offsets=False), runs, bootstrap=0).evidence
+        assert whole is not None  # noqa: S101  a fit sets its evidence
+        if between_runs(whole) < EXPLAINED * between_runs(evidence):
+            remedy = OF_A_LOAD
     return (
-        f"{model.balance}: the error between runs, in their means, is {times:.2g} times that within"
-        f" runs. {OFFSETS_IGNORED}"
+        f"The error between runs, in their means, is {times:.2g} times that within runs."
+        f" {OFFSETS_IGNORED}{remedy}"
     )
 
 

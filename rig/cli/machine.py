@@ -114,7 +114,6 @@ def check_lines(plant: "Plant", found: "CheckedPlant") -> list[str]:
 
 def _parameter_lines(equation: "CheckedEquation") -> list[str]:
     from estimation.model import AT_BOUND
-    from estimation.plant_check import OFFSETS_IGNORED
 
     lines = []
     for one in equation.parameters:
@@ -128,9 +127,6 @@ def _parameter_lines(equation: "CheckedEquation") -> list[str]:
     if equation.relative_error is not None:
         share = 100 * equation.relative_error
         lines.append(f"  Residual: {share:.3f} % of the root mean square of {equation.target}.")
-        if equation.between_runs and equation.between_runs > equation.relative_error:
-            between = 100 * equation.between_runs
-            lines.append(f"  Between runs, in their means: {between:.3f} %. {OFFSETS_IGNORED}")
     lines += [f"  {limit}" for limit in equation.limits]
     if equation.trouble:
         is_fitted = equation.relative_error is not None

@@ -13,6 +13,7 @@ import numpy as np
 
 from estimation.arm.balances import declared_arm
 from estimation.arm.shared import laid_out
+from estimation.campaign import Campaign
 from estimation.causes.layout import on_one_clock
 from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
@@ -77,8 +78,10 @@ def run_diagnosis(
         on_stage("choosing the experiment that separates the alternatives")
         proposed = propose(found, recordings, executor)
     asked_of = (f"Check: {line}" for line in doubts(whole, asked.plant))
-    fitted = (e.model for e in found.layout.equations.values())
-    ignored = filter(None, map(offsets_note, fitted)) if asked.of_machine else ()
+    fitted = [e.model for e in found.layout.equations.values()] if asked.of_machine else []
+    runs = Campaign.of(recordings)
+    means = [(model.balance, offsets_note(model, runs)) for model in fitted]
+    ignored = [f"{name}: {note[0].lower()}{note[1:]}" for name, note in means if note]
     notes = [*found.diagnosis.notes, *lost, *ignored, *asked_of]
     if seen:
         share = f"{len(seen)} of the {counted(len(sealed.confirm), 'test run')}"
