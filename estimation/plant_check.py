@@ -15,7 +15,7 @@ from estimation.derived import measured_channels
 from estimation.errors import EstimationError, nearest
 from estimation.filters import LowPass
 from estimation.fitting import fit
-from estimation.model import Evidence, Model, balance_channels, settled
+from estimation.model import Evidence, Model, balance_channels, parameter_keys, settled
 from estimation.noise import (
     noise_width,
 )
@@ -53,6 +53,7 @@ class Identified:
     """A parameter of an equation, by its effect.
 
     Attributes:
+        effect: Id of the effect, with its channels where several terms have it.
         value: Fitted on the recordings; None without them.
         at_bound: Whether that is the least or the largest value that makes sense.
     """
@@ -156,15 +157,14 @@ def check(
 def _described(model: Model, values: bool = False) -> CheckedEquation:
     parameters = tuple(
         Identified(
-            term.effect.id,
+            key.removesuffix(f".{parameter.name}"),
             parameter.name,
             term.unit(parameter, model.target),
             parameter.description,
             term.values[parameter.name].value if values else None,
             values and term.is_at_bound(parameter),
         )
-        for term in model.terms
-        for parameter in term.parameters
+        for term, parameter, key in parameter_keys(model)
     )
     return CheckedEquation(model.balance, model.description, parameters, model.target, model.unit)
 

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from estimation.recording import FloatArray, Recording, shared_columns
 
+MANY, MOST_NAMED = 0.01, 6
+"""Share of a run's flagged samples from which it is named, and the most runs that are."""
+
 
 def _gaps(recording: Recording) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return begin and length of the gaps of a run's clock, s, and which of them are jumps.
@@ -40,6 +43,15 @@ def steady(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]
             " motion meanwhile is not known."
         )
     return kept, lost
+
+
+def flagged(recordings: Sequence[Recording]) -> list[str]:
+    """Return a sentence on the runs of which many samples are flagged, or nothing."""
+    counts = {r.name: int((~r.valid).sum()) for r in recordings}
+    many = [r for r in recordings if counts[r.name] > MANY * len(r)]
+    shown = ", ".join(f"{counts[r.name]} of {len(r)} in {r.name}" for r in many[:MOST_NAMED])
+    more = f" and in {len(many) - MOST_NAMED} other runs" if len(many) > MOST_NAMED else ""
+    return [f"Samples that are flagged and do not count: {shown}{more}."] if many else []
 
 
 def audit(recordings: Sequence[Recording], read: Set[str] = frozenset()) -> list[str]:

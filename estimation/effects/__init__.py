@@ -87,7 +87,8 @@ def effect(name: str) -> Effect:
     """
     known = catalogue()
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
+        abbreviated = [one for one in known if all(part in one for part in name.split("."))]
+        near = difflib.get_close_matches(name, abbreviated or known, n=1, cutoff=0.3)
         meant = f"Did you mean {near[0]!r}? " if near else ""
         fix = f"{meant}`rig effects` lists them."
         raise UnknownEffectError(f"There is no effect {name!r}.", fix=fix)

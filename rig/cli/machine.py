@@ -144,7 +144,11 @@ def new(
         Option(help="Axis, NAME:rad or NAME:m, in the order they drive one another."),
     ] = None,
     transmission: Annotated[
-        list[str] | None, Option(help="INPUT:OUTPUT:RATIO; without a ratio it is fitted.")
+        list[str] | None,
+        Option(
+            help="INPUT:OUTPUT:RATIO; without a ratio it is fitted. It is written as compliant,"
+            " with an equation of its deflection, where both its travels are read."
+        ),
     ] = None,
     actuator: Annotated[
         list[str] | None, Option(help="AXIS:CHANNEL, such as motor:motor_current_a.")
@@ -180,4 +184,10 @@ def new(
             f"replace COLUMN:UNIT under [data.columns] in it, then: rig import {from_} --machine"
             f" {out} --preview"
         )
-    present(json_, {"machine": out}, f"Machine: {out}. Next: {step}")
+    bending = [
+        f"{one.name} is written as compliant, since both its travels are read. If it is rigid,"
+        " state compliant = false: it then has no equation of its deflection."
+        for one in plant.transmissions
+        if one.compliant
+    ]
+    present(json_, {"machine": out}, f"Machine: {out}. Next: {step}", *bending)

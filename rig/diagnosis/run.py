@@ -17,7 +17,7 @@ from estimation.campaign import Campaign
 from estimation.causes.layout import on_one_clock
 from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
-from estimation.diagnosis.audit import steady
+from estimation.diagnosis.audit import flagged, steady
 from estimation.diagnosis.split import cut_and_split, path_of, period_of
 from estimation.plant_check import offsets_note
 from estimation.recording import FloatArray, Recording
@@ -82,7 +82,7 @@ def run_diagnosis(
     runs = Campaign.of(recordings)
     means = [(model.balance, offsets_note(model, runs)) for model in fitted]
     ignored = [f"{name}: {note[0].lower()}{note[1:]}" for name, note in means if note]
-    notes = [*found.diagnosis.notes, *lost, *ignored, *asked_of]
+    notes = [*found.diagnosis.notes, *lost, *flagged(whole), *ignored, *asked_of]
     if seen:
         share = f"{len(seen)} of the {counted(len(sealed.confirm), 'test run')}"
         was = "was" if len(seen) == 1 else "were"

@@ -4,7 +4,7 @@ import math
 
 from estimation.cross_validation import HeldOutError
 from estimation.effects import Parameter
-from estimation.model import Estimate, Model
+from estimation.model import Estimate, Model, parameter_keys
 from rig.output.table import TextTable, counted
 from rig.reports.diagnosis_words import display, in_unit, label
 
@@ -12,14 +12,14 @@ from rig.reports.diagnosis_words import display, in_unit, label
 def parameter_table(model: Model) -> TextTable:
     """Return a fitted model's parameters."""
     rows = []
-    for term in model.terms:
-        for parameter in term.parameters:
-            known = term.values[parameter.name]
-            unit = term.unit(parameter, model.target)
-            sign = "+" if term.sign == 1 else "-"
-            name = f"{term.effect.id}, {label(term.effect.id, parameter.name)}"
-            interval = _interval(known, parameter)
-            rows.append([name, sign, f"{known.value:.4g}", interval, unit])
+    for term, parameter, key in parameter_keys(model):
+        known = term.values[parameter.name]
+        unit = term.unit(parameter, model.target)
+        sign = "+" if term.sign == 1 else "-"
+        effect = key.removesuffix(f".{parameter.name}")
+        name = f"{effect}, {label(term.effect.id, parameter.name)}"
+        interval = _interval(known, parameter)
+        rows.append([name, sign, f"{known.value:.4g}", interval, unit])
     evidence = model.evidence
     note = ""
     if evidence is not None:

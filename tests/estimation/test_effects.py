@@ -262,6 +262,8 @@ def test_units_of_parameters_follow_from_the_channels():
 
 
 def test_an_unknown_effect_names_the_nearest():
+    with pytest.raises(UnknownEffectError, match=r"'friction\.(coulomb|viscous)_asymmetry'"):
+        effect("friction.asym")
     with pytest.raises(UnknownEffectError, match=r"Did you mean 'friction\.coulomb'"):
         effect("friction.columb")
 

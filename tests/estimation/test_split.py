@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.diagnosis.audit import audit, steady
+from estimation.diagnosis.audit import audit, flagged, steady
 from estimation.diagnosis.split import (
     SplitError,
     claim,
@@ -18,7 +18,7 @@ from estimation.diagnosis.split import (
     periods,
     split,
 )
-from estimation.recording import Recording
+from estimation.recording import Flag, Recording
 from rig.importers.registry import open_campaign
 from tests.estimation.synthetic import runs
 
@@ -60,6 +60,16 @@ def test_a_run_that_jumps_is_left_out_and_one_that_skips_or_is_flagged_is_kept()
     (skip,) = [s for s in audit(kept) if "skips" in s]
     assert skip.startswith("The clock of 2 runs skips 2 times, the longest by 0.251 s at")
     assert "of flagged:" in skip
+
+
+def test_runs_with_many_flagged_samples_are_named():
+    whole = moving()
+    flags = np.zeros(len(whole), np.uint8)
+    flags[300:900] = Flag.MISSING
+    runs = [whole, replace(whole, name="empty", flags=flags)]
+    assert flagged(runs) == ["Samples that are flagged and do not count: 600 of 20000 in empty."]
+    flags = np.where(np.arange(len(whole)) < 310, flags, 0).astype(np.uint8)
+    assert flagged([whole, replace(whole, name="hardly", flags=flags)]) == []
 
 
 def test_the_split_is_stratified_repeatable_and_sealed():

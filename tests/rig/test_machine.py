@@ -457,8 +457,9 @@ def test_a_transmission_bends_where_both_its_travels_are_read(tmp_path, said, bo
     words = "--axis motor:rad --axis slide:m --transmission motor:slide:200"
     words += " --actuator motor:motor_current_a --sensor motor:motor_angle_rad"
     words += " --sensor slide:slide_position_m" if both else " --sensor slide:rope_force_n"
-    said("machine new", tmp_path / "new.toml", words)
+    printed = said("machine new", tmp_path / "new.toml", words).out
     assert read_machine(tmp_path / "new.toml").transmissions[0].compliant == both
+    assert ("motor_to_slide is written as compliant" in printed) == both
 
 
 def test_a_sensor_of_no_axis_is_written_from_an_option(tmp_path, said):

@@ -423,6 +423,16 @@ def test_a_run_that_cannot_be_read_may_be_skipped(folder, said):
     assert "001-b" in (folder / "p.html").read_text()
 
 
+def test_two_terms_of_one_effect_are_labelled_by_their_channels():
+    """Such as the inertia of a motor and that behind its gear."""
+    kind, values = catalogue()["inertia.missing"], {"inertia": Estimate(0.7)}
+    of_axes = [Term(kind, -1, {"acceleration": f"{a}_acceleration_rad_s2"}, values) for a in "ab"]
+    rows = fitted_table(Model("m", "motor", "motor_torque_n_m", tuple(of_axes))).rows
+    assert [row[0] for row in rows] == [
+        f"inertia.missing({a}_acceleration_rad_s2), inertia" for a in "ab"
+    ]
+
+
 @pytest.mark.parametrize(
     ("ci95", "shown"),
     [
