@@ -274,7 +274,8 @@ def _shown(one: _Opened, refits: Refits) -> float:
 def _confirmed(found: Found, held_out: HeldOut) -> tuple[list[Kept], list[tuple[Candidate, str]]]:
     """Return the causes with evidence on the test runs next to the others, and the rest with why.
 
-    By all runs some effect has to be more probable than none. The one with the least evidence goes first: two effects may need one another.
+    By all runs some effect has to be more probable than none. The one with the least evidence goes
+    first: two effects may need one another.
     """
     left, rejected, numbers = list[Kept](), list[tuple[Candidate, str]](), held_out.numbers
     for ranked in found.conditional:

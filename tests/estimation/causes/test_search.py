@@ -56,6 +56,7 @@ from tests.estimation.causes.synthetic import (
 
 def _only(runs: list[Recording], *models: Model) -> Finding:
     (finding,) = diagnose(runs, models, split(runs)).findings
+    assert finding.no_effect <= 0.5
     return finding
 
 
