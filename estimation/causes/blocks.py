@@ -137,7 +137,7 @@ def evaluate(
     promising = _gain(joint, block, base, amplitudes, usual) >= joint.numbers.cause_cost
     errors = []
     if promising.any():
-        errors = _errors(joint, block.only(promising), folds, precision[promising])
+        errors = errors_of(joint, block.only(promising), folds, precision[promising])
     # runs that have offsets of their own show nothing of a cause by their means
     parts = [p for p in block.of if p[1] == "within" or not joint.has_offsets(p[0])]
     cross, own, right = block.summed(parts)
@@ -185,11 +185,23 @@ def _declared(joint: Joint, block: Block, base: FloatArray, amplitudes: FloatArr
     return np.asarray(joint.whole(base) - np.einsum("cdk,ck->cd", block.taken, amplitudes))
 
 
-def _errors(
-    joint: Joint, block: Block, folds: Folds, precision: FloatArray
+def errors_of(
+    joint: Joint,
+    block: Block,
+    folds: Folds,
+    precision: FloatArray,
+    judged: Block | None = None,
 ) -> list[Mapping[Part, FloatArray]]:
-    """Return the squared errors on what each family of folds left out, (runs, causes) a part."""
-    fitting = _Fitting(joint, block, precision)
+    """Return the squared errors on what each family of folds left out, (runs, causes) a part.
+
+    Args:
+        joint: The regression.
+        block: The causes that are fitted.
+        folds: Families of folds.
+        precision: Prior precision of their amplitudes, shape (causes, k).
+        judged: The same causes by whose columns the errors are judged; the fitted ones if None.
+    """
+    fitting, judged = _Fitting(joint, block, precision), judged or block
     errors: list[Mapping[Part, FloatArray]] = []
     for family in folds:
         fits = joint.left_out(family)
@@ -197,7 +209,7 @@ def _errors(
         found = {}
         for p in joint.parts:
             found[p] = np.zeros((len(joint.runs), len(precision)))
-            found[p][fits.runs] = _squared(joint, block, p, fits.runs, base, amplitudes)
+            found[p][fits.runs] = _squared(joint, judged, p, fits.runs, base, amplitudes)
         errors.append(found)
     return errors
 

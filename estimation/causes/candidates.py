@@ -197,6 +197,22 @@ def laid_out(joint: Joint, claim: Claim) -> Candidate | None:
     return groups[0].candidates[0] if groups else None
 
 
+def as_read(joint: Joint, candidate: Candidate) -> Laid | None:
+    """Return a cause of readings in the unit of, and less as much declared as, a laid out one."""
+    cause = replace(candidate.cause, as_read=True)
+    read = _columns(Claim(cause, candidate.acts), joint.runs)
+    known = _columns(candidate, joint.runs)
+    if read is None or known is None:
+        return None
+    laid, size = candidate.laid, candidate.laid.size
+    inners, middles = {}, {}
+    for name, (inner, means) in _stacked(joint, [read], [known]).items():
+        inners[name] = laid.inner[name] + inner / size[:, None]
+        shifts = means / size if candidate.has_means(joint) else 0.0 * means
+        middles[name] = laid.means[name] + shifts
+    return replace(laid, inner=inners, means=middles)
+
+
 def _columns(one: Claim, runs: Sequence[RunSignals]) -> list[Mapping[str, FloatArray]] | None:
     """Return a cause's columns of every run; None where one is not finite."""
     columns = []

@@ -54,12 +54,15 @@ class Function:
         variables: Names of its variables, as a verdict lists them.
         knots: Places of each variable's hat functions; none of a direction.
         width: Speed over which friction changes its sign.
+        as_read: Whether its variables are read, also where another sensor or the equation predicts
+            them.
     """
 
     place: Place
     variables: tuple[str, ...]
     knots: tuple[tuple[float, ...], ...]
     width: float
+    as_read: bool = False
 
     family = "unknown"
     is_declared = False
@@ -85,12 +88,12 @@ class Function:
         self, run: RunSignals, variable: str, knots: tuple[float, ...], equation: str
     ) -> FloatArray:
         """Return a variable's hat functions on the run's grid, or one and the direction."""
-        values = variable_of(run, self.place, variable, equation, self.width)
+        channel = _channel(run, self.place, variable, "" if self.as_read else equation)
+        values = _values_of(run, variable, channel, self.width)
         if variable == "velocity_sign":
             if "turn" in self.variables:  # what repeats in both directions is a ripple
                 return values[:, None]
             return np.column_stack([np.ones(len(values)), values])
-        channel = _channel(run, self.place, variable, equation)
         return run.once(("hats", variable, channel, knots), lambda: _hats(values, knots))
 
 
@@ -159,9 +162,10 @@ def variable_of(
     run: RunSignals, place: Place, variable: str, equation: str, width: float
 ) -> FloatArray:
     """Return a variable's values on the run's grid, shape (n,)."""
-    if variable == "time":
-        return run.on_grid(CAMPAIGN_TIME)
-    name = _channel(run, place, variable, equation)
+    return _values_of(run, variable, _channel(run, place, variable, equation), width)
+
+
+def _values_of(run: RunSignals, variable: str, name: str, width: float) -> FloatArray:
     key = (variable, name, width if variable == "velocity_sign" else 0.0)
     return run.once(key, lambda: _worked_out(run, variable, name, width))
 

@@ -70,6 +70,12 @@ def signal(run: RunSignals, channel: str, equation: str) -> str:
     return name if name in run.channels else channel
 
 
+def stands_for_itself(run: RunSignals, channel: str, equation: str) -> bool:
+    """Whether an equation's own estimate stands for its target."""
+    estimate = run.channels.get(estimated(channel, equation))
+    return estimate is not None and run.channels.get(instrumented(channel, equation)) is estimate
+
+
 def declared_of(equation: Equation, run: RunSignals) -> FloatArray:
     """Return the declared columns with efforts predicted from other sensors, (n, declared)."""
     return _declared(equation, run)[run.grid[run.used[equation.name]]]

@@ -7,11 +7,12 @@ import numpy as np
 
 from estimation.causes.acting import TURNS, in_other_runs, moved_terms, on_some_runs
 from estimation.causes.angles import groups_apart
-from estimation.causes.blocks import Products
+from estimation.causes.blocks import Products, block_of, errors_of
 from estimation.causes.candidates import (
     Candidate,
     Claim,
     Group,
+    as_read,
     candidates,
     groups_of,
     laid_out,
@@ -20,11 +21,12 @@ from estimation.causes.criterion import base_errors, extrapolated, score
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import Function
 from estimation.causes.grids import RELATIVE, least_order, order_step
+from estimation.causes.instruments import stands_for_itself
 from estimation.causes.joint import Joint
 from estimation.causes.layout import Layout
 from estimation.causes.nuisances import noticed, skews, with_skews
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.scoring import Scored, assessed, best_of_each, tried
+from estimation.causes.scoring import DIGITS, Scored, assessed, best_of_each, tried
 from estimation.causes.sources import LATE, Bend, Source
 from estimation.causes.weights import reweighted
 from estimation.effects import Parameter
@@ -34,6 +36,9 @@ MOST_CAUSES = 3
 
 KNOTS_OF_BEND, BENT = 5, 24
 """Hat functions of a form's deviation from its equation, and families that are given one."""
+
+LOADED = ("loss", "actuator", "deflection")
+"""Kinds of places at which a cause may depend on a load that the equation explains."""
 
 REFINED = 8
 """Names whose shapes are refined after the grid, and those whose choices of runs are."""
@@ -208,7 +213,38 @@ def competing(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]
     best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
     bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
     more = assessed(joint, groups_of(joint, bent), folds)
-    return _by_whole_form(joint, best_of_each([*best, *more]), folds)
+    ranked = _by_reading(joint, best_of_each([*best, *more]), folds)
+    return _by_whole_form(joint, ranked, folds)
+
+
+def _by_reading(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list[Scored]:
+    """Return a ranking in which what depends on the target shows by its reading.
+
+    The estimate of a target that a cause reads has the error that the equation makes, so a function
+    of what the equation lacks is one of the estimate too. The cause is fitted with the estimate,
+    which has none of the reading's noise, and judged by the reading.
+    """
+    spreads = [extrapolated(joint, family) for family in folds]
+    before, out = base_errors(joint, folds), list[Scored]()
+    for one in ranked:
+        candidate, cause = one.candidate, one.candidate.cause
+        doubtful = one.score > 0.0 and cause.place.kind in LOADED and not cause.is_declared
+        if doubtful and any(
+            stands_for_itself(joint.runs[0], channel, name)
+            for channel in cause.reads
+            for name in cause.place.equations
+        ):
+            read = as_read(joint, candidate)
+            if read is not None:
+                blocks = (block_of(joint, laid) for laid in (candidate.laid, read))
+                fitted, judged = blocks
+                after = errors_of(joint, fitted, folds, candidate.precision[None], judged)
+                gain = round(float(score(joint, spreads, before, after)[0]), DIGITS)
+                price = one.price.score(joint.numbers)
+                if gain < one.gain:
+                    one = replace(one, gain=gain, score=gain - price)
+        out.append(one)
+    return sorted(out, key=lambda one: -one.score)
 
 
 def _by_whole_form(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list[Scored]:

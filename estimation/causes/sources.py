@@ -55,6 +55,8 @@ class Source:
         ahead: Whether its reading is what is late, so that its whole form is an advance of that
             reading, and a delay of what other sensors predict for it.
         bend: Its deviation from its equation, after the column itself; none if None.
+        as_read: Whether its channels are read, also where another sensor or the equation predicts
+            them.
         tried: How many points it was chosen from by the error, of which it is the only candidate;
             0 where all of them are.
     """
@@ -67,6 +69,7 @@ class Source:
     odd: bool = False
     ahead: bool = False
     bend: Bend | None = None
+    as_read: bool = False
     tried: int = 0
 
     @property
@@ -199,6 +202,8 @@ class Source:
         return made
 
     def _names(self, run: RunSignals, equation: str) -> tuple[str, ...]:
+        if self.as_read:
+            return tuple(channel for _, channel in self.channels)
         return tuple(signal(run, channel, equation) for _, channel in self.channels)
 
 
