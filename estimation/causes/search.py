@@ -19,7 +19,7 @@ from estimation.causes.candidates import (
 )
 from estimation.causes.criterion import base_errors, extrapolated, score
 from estimation.causes.folds import Folds, folds_of
-from estimation.causes.functions import Function
+from estimation.causes.functions import LOOSE_PLACES, Function
 from estimation.causes.grids import RELATIVE, least_order, order_step
 from estimation.causes.instruments import stands_for_itself
 from estimation.causes.joint import Joint
@@ -36,9 +36,6 @@ MOST_CAUSES = 3
 
 KNOTS_OF_BEND, BENT = 5, 24
 """Hat functions of a form's deviation from its equation, and families that are given one."""
-
-LOADED = ("loss", "actuator", "deflection")
-"""Kinds of places at which a cause may depend on a load that the equation explains."""
 
 REFINED = 8
 """Names whose shapes are refined after the grid, and those whose choices of runs are."""
@@ -227,24 +224,30 @@ def _by_reading(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list[Sc
     spreads = [extrapolated(joint, family) for family in folds]
     before, out = base_errors(joint, folds), list[Scored]()
     for one in ranked:
-        candidate, cause = one.candidate, one.candidate.cause
-        doubtful = one.score > 0.0 and cause.place.kind in LOADED and not cause.is_declared
-        if doubtful and any(
-            stands_for_itself(joint.runs[0], channel, name)
-            for channel in cause.reads
-            for name in cause.place.equations
-        ):
-            read = as_read(joint, candidate)
-            if read is not None:
-                blocks = (block_of(joint, laid) for laid in (candidate.laid, read))
-                fitted, judged = blocks
-                after = errors_of(joint, fitted, folds, candidate.precision[None], judged)
-                gain = round(float(score(joint, spreads, before, after)[0]), DIGITS)
-                price = one.price.score(joint.numbers)
-                if gain < one.gain:
-                    one = replace(one, gain=gain, score=gain - price)
+        candidate = one.candidate
+        read = as_read(joint, candidate) if one.score > 0.0 and _is_of_target(joint, one) else None
+        if read is not None:
+            fitted, judged = (block_of(joint, laid) for laid in (candidate.laid, read))
+            after = errors_of(joint, fitted, folds, candidate.precision[None], judged)
+            gain = round(float(score(joint, spreads, before, after)[0]), DIGITS)
+            if gain < one.gain:
+                one = replace(one, gain=gain, score=gain - one.price.score(joint.numbers))
         out.append(one)
     return sorted(out, key=lambda one: -one.score)
+
+
+def _is_of_target(joint: Joint, one: Scored) -> bool:
+    """Whether a cause reads a target for which the estimate of its equation stands."""
+    cause, run = one.candidate.cause, joint.runs[0]
+    return (
+        cause.place.kind in LOOSE_PLACES
+        and not cause.is_declared
+        and any(
+            stands_for_itself(run, channel, name)
+            for channel in cause.reads
+            for name in cause.place.equations
+        )
+    )
 
 
 def _by_whole_form(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list[Scored]:
