@@ -88,7 +88,7 @@ class Function:
         self, run: RunSignals, variable: str, knots: tuple[float, ...], equation: str
     ) -> FloatArray:
         """Return a variable's hat functions on the run's grid, or one and the direction."""
-        channel = _channel(run, self.place, variable, "" if self.as_read else equation)
+        channel = _channel(run, self.place, variable, equation, self.as_read)
         values = _values_of(run, variable, channel, self.width)
         if variable == "velocity_sign":
             if "turn" in self.variables:  # what repeats in both directions is a ripple
@@ -170,11 +170,13 @@ def _values_of(run: RunSignals, variable: str, name: str, width: float) -> Float
     return run.once(key, lambda: _worked_out(run, variable, name, width))
 
 
-def _channel(run: RunSignals, place: Place, variable: str, equation: str) -> str:
+def _channel(
+    run: RunSignals, place: Place, variable: str, equation: str, as_read: bool = False
+) -> str:
     """Return the channel that a variable's values come from in an equation."""
     if variable == "time":
         return CAMPAIGN_TIME
-    return signal(run, _read(place, variable), equation)
+    return signal(run, _read(place, variable), equation, as_read)
 
 
 def _worked_out(run: RunSignals, variable: str, name: str, width: float) -> FloatArray:

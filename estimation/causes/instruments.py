@@ -6,7 +6,7 @@ through the other declared equations: an instrumental variable. Angles are used 
 """
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -62,12 +62,23 @@ def add_instruments(layout: Layout, train: Sequence[str]) -> None:
             for channel in good:
                 run.channels[instrumented(channel, equation.name)] = others[channel]
             _add_estimate(equation, run, takes_its_place)
+        if takes_its_place:
+            _add_readings(equation, layout.runs, trained)
 
 
-def signal(run: RunSignals, channel: str, equation: str) -> str:
-    """Return the channel that stands for another one in an equation: its prediction if any."""
-    name = instrumented(channel, equation)
-    return name if name in run.channels else channel
+def signal(run: RunSignals, channel: str, equation: str, as_read: bool = False) -> str:
+    """Return the channel that stands for another one in an equation: its prediction if any.
+
+    Or, as it is read, the reading of a target that its equation's estimate stands for.
+    """
+    known = (read(channel, equation),) if as_read else ()
+    names = (*known, instrumented(channel, equation))
+    return next((name for name in names if name in run.channels), channel)
+
+
+def read(channel: str, equation: str) -> str:
+    """Return the name under which the reading of a target is kept in the scale of its estimate."""
+    return f"{channel} read for {equation}"
 
 
 def stands_for_itself(run: RunSignals, channel: str, equation: str) -> bool:
@@ -200,6 +211,24 @@ def _add_estimate(equation: Equation, run: RunSignals, takes_its_place: bool) ->
     run.channels[instrumented(equation.target, equation.name)] = target
     for speed in rates_of(equation.target)[:1]:
         run.channels[instrumented(speed, equation.name)] = np.gradient(target) * run.rate_hz
+
+
+def _add_readings(equation: Equation, runs: Sequence[RunSignals], train: Container[str]) -> None:
+    """Add the target's reading in the scale of its estimate, with the mean of that in each run.
+
+    Next to what the equation lacks, the estimate may be far too small.
+    """
+    target, across, square = equation.target, 0.0, 0.0
+    estimate = estimated(target, equation.name)
+    for run in runs:
+        if run.name in train:
+            own = run.channels[target] - run.channels[target].mean()
+            across += float(own @ run.channels[estimate])
+            square += float(own @ own)
+    for run in runs:
+        own = run.channels[target] - run.channels[target].mean()
+        scaled = across / (square or 1.0) * own
+        run.channels[read(target, equation.name)] = scaled + run.channels[estimate].mean()
 
 
 def _propagated(

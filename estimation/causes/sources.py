@@ -202,9 +202,7 @@ class Source:
         return made
 
     def _names(self, run: RunSignals, equation: str) -> tuple[str, ...]:
-        if self.as_read:
-            return tuple(channel for _, channel in self.channels)
-        return tuple(signal(run, channel, equation) for _, channel in self.channels)
+        return tuple(signal(run, channel, equation, self.as_read) for _, channel in self.channels)
 
 
 def _worked_out(
