@@ -65,6 +65,12 @@ def score(
     return np.asarray(total)
 
 
+def gained(joint: Joint, folds: Folds, after: Sequence[Mapping[Part, FloatArray]]) -> FloatArray:
+    """Return the scores of errors on what folds left out against those of the base alone."""
+    spreads = [extrapolated(joint, family) for family in folds]
+    return score(joint, spreads, base_errors(joint, folds), after)
+
+
 def log_ratio(
     joint: Joint, part: Part, before: FloatArray | float, after: FloatArray
 ) -> FloatArray:

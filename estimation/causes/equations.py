@@ -98,8 +98,8 @@ class Equation:
         for term in self.terms:
             linear = isinstance(term.effect, Proportional) and not term.effect.id.startswith(LINKS)
             channel = next(iter(term.channels.values())) if linear else ""
-            for p in term.effect.amplitudes:
-                found.append(Column(term.sign, channel, False, p.lower == 0.0))
+            sizes = term.effect.amplitudes
+            found += [Column(term.sign, channel, False, p.lower == 0.0) for p in sizes]
             found += [Column(term.sign, channel, True, False)] * len(term.effect.shape)
         return found
 

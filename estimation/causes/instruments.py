@@ -98,15 +98,16 @@ def instead_noise(layout: Layout) -> Mapping[str, FloatArray]:
     Equation to columns of all runs that zeros fill up, (runs, samples, declared), without those
     equations that read no effort that is predicted.
     """
-    found = {}
+    found = dict[str, FloatArray]()
+    if not layout.shaken:
+        return found
     for name, equation in layout.equations.items():
         names = [column.channel for column in equation.kinds]
-        runs = [*zip(layout.runs, layout.shaken, strict=False)]
-        predicted = [bool(c) and signal(runs[0][0], c, name) != c for c in names if runs]
+        predicted = [bool(c) and signal(layout.runs[0], c, name) != c for c in names]
         if not any(predicted):
             continue
         columns = []
-        for run, shaken in runs:
+        for run, shaken in zip(layout.runs, layout.shaken, strict=True):
             own = declared_of(equation, shaken) - declared_of(equation, run)
             own -= equation.noise(run)[run.grid[run.used[name]], :-1]
             columns.append(own * np.array(predicted))

@@ -198,13 +198,13 @@ class Projection:
         for n, off in taken.items():
             if n not in self._instead:
                 continue
-            instead = self._instead[n]
-            mixed = products(self._noise[n], instead)[:, None] @ off
+            instead, none = self._instead[n], np.zeros(())
+            across[n] = across.get(n, none) - products(self._noise[n], instead)[:, None] @ off
             square = off.swapaxes(1, 2) @ products(instead, instead)[:, None] @ off
+            own[n] = own.get(n, none) + square
             if n in noise:
                 both = products(noise[n], instead[:, None]) @ off
-                mixed, square = mixed - across[n], square - both - both.swapaxes(2, 3) + own[n]
-            across[n], own[n] = -mixed, square
+                own[n] -= both + both.swapaxes(2, 3)
         return Followed(across, own)
 
 

@@ -17,7 +17,7 @@ from estimation.causes.candidates import (
     groups_of,
     laid_out,
 )
-from estimation.causes.criterion import base_errors, extrapolated, score
+from estimation.causes.criterion import base_errors, gained
 from estimation.causes.folds import Folds, folds_of
 from estimation.causes.functions import LOOSE_PLACES, Function
 from estimation.causes.grids import RELATIVE, least_order, order_step
@@ -117,11 +117,9 @@ class Ranking:
 
         The causes' own scores do not add up to it: each is cautious about the base it was found on.
         """
-        joint, numbers = self.joint, self.joint.numbers
-        spreads = [extrapolated(joint, family) for family in self.folds]
-        before, after = (base_errors(j, self.folds) for j in (joint, self._with(causes)))
-        gain = float(score(joint, spreads, before, after))
-        return gain - sum(one.price.score(numbers) for one in causes)
+        after = base_errors(self._with(causes), self.folds)
+        prices = [one.price.score(self.joint.numbers) for one in causes]
+        return float(gained(self.joint, self.folds, after)) - sum(prices)
 
     def _with(self, causes: Sequence[Scored]) -> Joint:
         joint = self.joint
@@ -221,15 +219,14 @@ def _by_reading(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list[Sc
     of what the equation lacks is one of the estimate too. The cause is fitted with the estimate,
     which has none of the reading's noise, and judged by the reading.
     """
-    spreads = [extrapolated(joint, family) for family in folds]
-    before, out = base_errors(joint, folds), list[Scored]()
+    out = list[Scored]()
     for one in ranked:
         candidate = one.candidate
         read = as_read(joint, candidate) if one.score > 0.0 and _is_of_target(joint, one) else None
         if read is not None:
             fitted, judged = (block_of(joint, laid) for laid in (candidate.laid, read))
             after = errors_of(joint, fitted, folds, candidate.precision[None], judged)
-            gain = round(float(score(joint, spreads, before, after)[0]), DIGITS)
+            gain = round(float(gained(joint, folds, after)[0]), DIGITS)
             if gain < one.gain:
                 one = replace(one, gain=gain, score=gain - one.price.score(joint.numbers))
         out.append(one)
