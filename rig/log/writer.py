@@ -105,14 +105,14 @@ class LogWriter:
         self._pending_lock = Lock()
         self._waiting_since_s = 0.0
         self._closed = False
+        self._thread = ThreadPoolExecutor(1, "log")
         try:
             self._file = self.part.open("xb")
         except OSError as error:
             raise LogWriteError(f"The log {self.part} cannot be made.", str(error)) from None
-        self._thread = ThreadPoolExecutor(1, "log")
         try:
             self._in_turn(self._begin, streams, run_metadata, attachments, run.started_at_ns or 0)
-        except LogWriteError:
+        except BaseException:  # an interruption too: the file holds nothing that was recorded
             self.discard()
             raise
 

@@ -180,12 +180,18 @@ class Typed:
         return os.waitstatus_to_exitcode(status)
 
 
+def has_samples(path):
+    if not path.stat().st_size:
+        return False
+    return any(topic.rows.size for topic in read_log(path, tolerant=True).topics.values())
+
+
 @pytest.mark.usefixtures("hang_up_is_heard")
 def test_recording_closes_its_log_and_the_rig_is_safe(tmp_path):
     out = tmp_path / "campaign"
     protocol = protocol_file(tmp_path, duration_s=2000.0)
     command = Typed("record", "-p", str(protocol), "-o", str(out))
-    assert command.close_terminal(lambda _: bool(list(out.glob("*.part")))) == 130
+    assert command.close_terminal(lambda _: any(map(has_samples, out.glob("*.part")))) == 130
     (path,) = out.glob("*.mcap*")
     assert not read_log(path).end.clean
 

@@ -296,6 +296,22 @@ def test_an_interrupt_while_bytes_are_written_loses_and_spoils_nothing(tmp_path,
         list(StreamReader(file, validate_crcs=True).records)
 
 
+class InterruptedOnce(Interrupted):
+    def write(self, data):
+        size = super().write(data)
+        Interrupted.pressed = False
+        return size
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interrupt_while_a_log_is_begun_leaves_no_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(Path, "open", lambda path, mode: InterruptedOnce(path, mode))
+    monkeypatch.setattr(Interrupted, "pressed", True)
+    with pytest.raises(KeyboardInterrupt):
+        LogWriter(tmp_path / "a.mcap", RunInfo("a"), [STREAM])
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_killed_recorder_loses_at_most_a_quarter_second(tmp_path, seed):
     killed = kill_once(tmp_path, seed)
