@@ -100,16 +100,16 @@ class Ranking:
     ) -> None:
         self.joint, self.folds, self.pool = joint, folds, pool
         self._rank = rank or competing
-        self._known: list[tuple[object, list[Scored]]] = []
+        self._known: list[tuple[list[object], list[Scored]]] = []
 
     def next_to(self, causes: Sequence[Scored]) -> list[Scored]:
-        """Return the best of each name next to causes."""
+        """Return the best of each name next to causes, in whatever order they were found."""
         claims = [(one.candidate.cause, one.candidate.acts) for one in causes]
         for known, ranked in self._known:
-            if known == claims:
+            if len(known) == len(claims) and all(claim in known for claim in claims):
                 return ranked
         ranked = self._rank(self._with(causes), self.pool, self.folds)
-        self._known.append((claims, ranked))
+        self._known.append(([*claims], ranked))
         return ranked
 
     def worth(self, causes: Sequence[Scored]) -> float:
@@ -293,7 +293,8 @@ def _bent(joint: Joint, one: Scored) -> Claim | None:
     if not high > low or amplitude == 0.0:
         return None
     knots = tuple(float(x) for x in np.linspace(low, high, KNOTS_OF_BEND))
-    bend = Bend(knots, joint.numbers.bend_share * amplitude)
+    # to two digits, so that a cause is the same one whatever it was found next to
+    bend = Bend(knots, float(f"{joint.numbers.bend_share * amplitude:.1e}"))
     return Claim(replace(cause, bend=bend), candidate.acts, candidate.choices)
 
 
