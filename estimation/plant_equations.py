@@ -120,7 +120,9 @@ def signals(plant: Plant) -> Signals:
     joined = _joined(plant)
     own = {*(s.name for s in plant.sensors), *plant.integrals, *(c.name for c in plant.derived)}
     positions = (c for c in joined if c.name not in own)
-    return Signals((*bends, *positions, *plant.derived), rest, readings, joined, plant.integrals)
+    loads = tuple(load.name for load in plant.loads)
+    derived = (*bends, *positions, *plant.derived)
+    return Signals(derived, rest, readings, joined, plant.integrals, loads)
 
 
 def _joined(plant: Plant) -> tuple[Combination, ...]:

@@ -97,6 +97,7 @@ class Signals:
         joined: Positions that follow from another's by the ratio of a transmission. One whose axis
             has no encoder is among the combinations, too; else a reading can be compared with it.
         integrals: Positions that no sensor reads, to the speeds that they are the integrals of.
+        loads: Known forces and torques, which are no sensor's: a weight by a formula of the angle.
     """
 
     combinations: tuple[Combination, ...] = ()
@@ -104,6 +105,7 @@ class Signals:
     readings: Mapping[str, Reading] = field(default_factory=dict)
     joined: tuple[Combination, ...] = ()
     integrals: Mapping[str, str] = field(default_factory=dict)
+    loads: tuple[str, ...] = ()
 
     @property
     def temperatures(self) -> tuple[str, ...]:

@@ -86,7 +86,8 @@ def places_of(layout: Layout) -> list[Place]:
         found.append(_own(layout, equation, own, angles))
         found += _actuators(equation, own)
     found = _one_of_each(found)
-    sensors = [n for n in layout.measured if n not in _computed(layout)]
+    known = {*_computed(layout), *signals_of(layout).loads}
+    sensors = [n for n in layout.measured if n not in known]
     for sensor in sensors:
         if (both := _both(layout, sensor)) is not None:
             found += [_behind(layout, sensor, *both, angles), *_levers(sensor, *both, angles)]

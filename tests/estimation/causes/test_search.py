@@ -925,6 +925,16 @@ def _assert_not_read(name, delay, scale, integrated, filtered, noise):
     assert name not in read
 
 
+def test_a_known_load_has_no_errors_of_a_sensor() -> None:
+    runs, channel = recordings(runs=6), "proximal_torque_n_m"
+    known = replace(motor(), signals=replace(motor().signals, loads=(channel,)))
+    read, stated = (
+        {place.name for place in places_of(lay_out([model], runs, [r.name for r in runs]))}
+        for model in (motor(), known)
+    )
+    assert read - stated == {f"sensor {channel}"}
+
+
 def test_no_candidate_carries_the_noise_of_its_own_equations_torque_sensor() -> None:
     quiet, random = recordings(runs=6), np.random.default_rng(1)
     noisy = []
