@@ -2,7 +2,7 @@
 
 A campaign contains run *handles*. A handle has the run's name and conditions and loads the
 recording on request, so a campaign may be larger than memory: iterate over it and keep only what
-you need.
+you need. `held` keeps a small one in memory, for what walks it many times.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -19,6 +19,9 @@ from estimation.recording import Recording
 
 SHOWN = 4
 """Runs that the text of a campaign names."""
+
+MOST_HELD = 40_000_000
+"""Values that are kept in memory: 320 MB."""
 
 
 class CampaignError(EstimationError):
@@ -77,12 +80,7 @@ class Campaign:
     @classmethod
     def of(cls, recordings: Iterable[Recording]) -> "Campaign":
         """Make a campaign of recordings held in memory."""
-        return cls(
-            tuple(
-                Run(r.name, load=lambda r=r: r, excluded=r.excluded)  # type: ignore[misc]
-                for r in recordings
-            )
-        )
+        return cls(tuple(Run(r.name, partial(_itself, r), excluded=r.excluded) for r in recordings))
 
     def __repr__(self) -> str:
         names = ", ".join(self.names if len(self) <= SHOWN else (*self.names[:SHOWN], "..."))
@@ -104,6 +102,17 @@ class Campaign:
     def evidence(self) -> "Campaign":
         """The runs that are not excluded."""
         return Campaign(tuple(run for run in self.runs if run.excluded is None))
+
+    def held(self) -> "Campaign":
+        """Return the campaign with its recordings in memory, as many as there is room for."""
+        left, runs = MOST_HELD, []
+        for run in self.runs:
+            if run.excluded is None and left > 0:
+                recording = run.load()
+                left -= len(recording) * (1 + len(recording.columns))
+                run = replace(run, load=partial(_itself, recording))
+            runs.append(run)
+        return Campaign(tuple(runs))
 
     def exclude(self, reasons: Mapping[str, str]) -> "Campaign":
         """Return a campaign in which some runs are excluded, each with its reason.
@@ -162,6 +171,10 @@ class Campaign:
             Split(evidence.select(set(evidence.names) - names), evidence.select(names))
             for names in tested
         ]
+
+
+def _itself(recording: Recording) -> Recording:
+    return recording
 
 
 def in_folds(runs: int, count: int, seed: int = 0) -> list[NDArray[np.int_]]:

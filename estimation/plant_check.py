@@ -142,6 +142,7 @@ def check(
             for model in models
         )
         return CheckedPlant(found, tuple(missing(plant)), tuple(unused(plant)))
+    campaign = campaign.held()  # it is walked many times
     recordings = list(campaign.evidence)
     columns = shared_columns(recordings) if recordings else []
     contradicted = tuple(contradictions(plant, recordings, str(file or plant.name)))

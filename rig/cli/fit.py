@@ -143,6 +143,7 @@ def fit(
     if model in ("states", "network"):
         _learn(_recipe(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)
         return
+    campaign = campaign.held()  # it is walked many times
     done = _fitted(declared_models(model, machine), campaign, folds, seed)
     plant = None if machine is None else read_machine(machine)
     asked = doubts(list(campaign.evidence), plant)

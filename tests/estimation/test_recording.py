@@ -96,7 +96,8 @@ def test_a_compliance_has_the_unit_of_an_angle_by_a_torque():
     assert not is_same("rad/?", "rad")
 
 
-def test_a_campaign_is_walked_run_by_run():
+def counted(names: str) -> tuple[Campaign, list[str]]:
+    """Return a campaign of such runs, and the list of those that were read."""
     loaded: list[str] = []
 
     def handle(name: str) -> Run:
@@ -106,7 +107,26 @@ def test_a_campaign_is_walked_run_by_run():
 
         return Run(name, load)
 
-    campaign = Campaign(tuple(handle(n) for n in "abc"))
+    return Campaign(tuple(handle(n) for n in names)), loaded
+
+
+def test_a_held_campaign_is_read_once_and_not_where_it_is_excluded():
+    campaign, loaded = counted("abc")
+    held = campaign.exclude({"b": "the cable slipped"}).held()
+    walks = [[run.name for run in held.evidence] for _ in range(3)]
+    assert walks == 3 * [["a", "c"]]
+    assert loaded == ["a", "c"]
+
+
+def test_a_campaign_larger_than_memory_is_read_as_it_is_walked(monkeypatch):
+    monkeypatch.setattr("estimation.campaign.MOST_HELD", 1)
+    campaign, loaded = counted("ab")
+    assert [run.name for run in campaign.held()] == ["a", "b"]
+    assert loaded == ["a", "b"]
+
+
+def test_a_campaign_is_walked_run_by_run():
+    campaign, loaded = counted("abc")
     walk = iter(campaign)
     assert loaded == []
     assert next(walk).name == "a"
