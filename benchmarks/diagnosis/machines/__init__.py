@@ -39,6 +39,7 @@ from estimation.diagnosis.split import path_of
 from estimation.recording import Recording
 from rig.importers.table.mapping import read_mapping
 from rig.importers.table.open import read_runs
+from rig.machines.shipped import place_of
 
 MODELS = Path(__file__).parent
 ASYMMETRY = "friction.viscous_asymmetry"
@@ -148,7 +149,7 @@ def case(folder: Path, hand_over: HandOver) -> Case:
 def read(folder: Path, hand_over: HandOver) -> list[Recording]:
     """Return the runs of a folder as a hand-over cuts and names them."""
     flags = [(path, value, str(value)) for path, value in hand_over.changes.items()]
-    mapping = read_mapping(Path(hand_over.machine), flags)
+    mapping = read_mapping(place_of(Path(hand_over.machine)), flags)
     names = hand_over.renamed
     runs = []
     for run in read_runs(folder, mapping, []):
