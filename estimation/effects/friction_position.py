@@ -41,6 +41,35 @@ class PositionFriction(Pointwise):
         return along, square, inputs["position"] * square
 
 
+class ViscousPositionFriction(Pointwise):
+    """A seal, a screw or a cable whose viscous friction is larger at some positions than at others.
+
+    Equation: torque = (a position + b position^2) speed, in addition to viscous friction. position
+    in rad, speed in rad/s, a in N m s/rad^2, b in N m s/rad^3.
+
+    Check: move over the whole travel at two speeds without load, and inspect lubrication and
+    alignment where the friction is large.
+
+    Source: Popovic and Goldenberg 1998 (friction of a drive as a function of its position).
+    """
+
+    id = "friction.position.viscous"
+    meaning = "viscous friction that varies along the travel"
+    family = "friction.position"
+    balances: ClassVar = PositionFriction.balances
+    roles: ClassVar = PositionFriction.roles
+    amplitudes = (
+        Parameter("slope", "target / speed / position", "linear change with position"),
+        Parameter("bend", "target / speed / position / position", "quadratic change with position"),
+    )
+    told_apart_by = "sweeps without load at two speeds, in both directions"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        along = inputs["position"] * inputs["speed"]
+        return along, inputs["position"] * along
+
+
 @numba.njit(cache=True)
 def _walk_sticking(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
     for i in range(len(now)):
