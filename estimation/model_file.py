@@ -12,8 +12,9 @@ channels.speed = "motor_velocity_rad_s"
 parameters.friction = { value = 0.012, unit = "N m", spread = 0.0003 }
 
 A model of another machine than the reference rig states that machine's derived channels, its speeds
-of standstill, its sensors, the positions that are integrals of a speed and its known loads under
-`[[signals.derived]]`, `[signals.rest]`, `[signals.sensors]`, `[signals.integrals]` and `[signals]`.
+of standstill, its sensors, the positions that are integrals of a speed, its known loads and its
+actuators under `[[signals.derived]]`, `[signals.rest]`, `[signals.sensors]`, `[signals.integrals]`
+and `[signals]`.
 
 A file of several equations contains each under `[[models]]`, with `[models.processing]`,
 `[[models.effects]]`, `[models.signals]` and `[models.fit]`, and has the schema `rig.models/1`.
@@ -194,8 +195,8 @@ def _signals(top: Table) -> Signals:
     derived, joined = (read_combinations(table.tables(key, [])) for key in ("derived", "joined"))
     integrals = table.table("integrals")
     speeds = {position: integrals.take(position, str) for position in integrals.content}
-    loads = tuple(str(name) for name in table.take("loads", list, []))
-    found = Signals(derived, slowest, readings, joined, speeds, loads)
+    loads, actuators = (tuple(map(str, table.take(k, list, []))) for k in ("loads", "actuators"))
+    found = Signals(derived, slowest, readings, joined, speeds, loads, actuators)
     table.finish()
     return found
 
@@ -226,8 +227,8 @@ def _lines(model: Model, within: str = "") -> list[str]:
     lines += ["", f"[{within}processing]", *entries(asdict(model.low_pass))]
     lines += entries({"run_offsets": model.run_offsets, "samples": model.counted})
     if model.signals != reference():
-        loads = list(model.signals.loads)
-        lines += ["", f"[{within}signals]", *entries({"loads": loads})] if loads else []
+        known = {key: list(getattr(model.signals, key)) for key in ("loads", "actuators")}
+        lines += ["", f"[{within}signals]", *entries({k: v for k, v in known.items() if v})]
         lines += ["", f"[{within}signals.rest]", *entries(model.signals.rest)]
         lines += ["", f"[{within}signals.sensors]"] if model.signals.readings else []
         lines += entries({name: _known(one) for name, one in model.signals.readings.items()})

@@ -120,9 +120,9 @@ def signals(plant: Plant) -> Signals:
     joined = _joined(plant)
     own = {*(s.name for s in plant.sensors), *plant.integrals, *(c.name for c in plant.derived)}
     positions = (c for c in joined if c.name not in own)
-    loads = tuple(load.name for load in plant.loads)
     derived = (*bends, *positions, *plant.derived)
-    return Signals(derived, rest, readings, joined, plant.integrals, loads)
+    loads, actuators = (tuple(part.name for part in of) for of in (plant.loads, plant.actuators))
+    return Signals(derived, rest, readings, joined, plant.integrals, loads, actuators)
 
 
 def _joined(plant: Plant) -> tuple[Combination, ...]:

@@ -98,6 +98,7 @@ class Signals:
             has no encoder is among the combinations, too; else a reading can be compared with it.
         integrals: Positions that no sensor reads, to the speeds that they are the integrals of.
         loads: Known forces and torques, which are no sensor's: a weight by a formula of the angle.
+        actuators: What drives the machine: a current, a voltage, or the force itself.
     """
 
     combinations: tuple[Combination, ...] = ()
@@ -106,6 +107,7 @@ class Signals:
     joined: tuple[Combination, ...] = ()
     integrals: Mapping[str, str] = field(default_factory=dict)
     loads: tuple[str, ...] = ()
+    actuators: tuple[str, ...] = ()
 
     @property
     def temperatures(self) -> tuple[str, ...]:

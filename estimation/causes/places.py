@@ -86,13 +86,14 @@ def places_of(layout: Layout) -> list[Place]:
         found.append(_own(layout, equation, own, angles))
         found += _actuators(equation, own)
     found = _one_of_each(found)
-    known = {*_computed(layout), *signals_of(layout).loads}
+    signals = signals_of(layout)
+    known = {*_computed(layout), *signals.loads, *signals.actuators}
     sensors = [n for n in layout.measured if n not in known]
     for sensor in sensors:
         if (both := _both(layout, sensor)) is not None:
             found += [_behind(layout, sensor, *both, angles), *_levers(sensor, *both, angles)]
     found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
-    warmth = tuple(n for n in signals_of(layout).temperatures if n in layout.measured)
+    warmth = tuple(n for n in signals.temperatures if n in layout.measured)
     if warmth:
         for k, place in enumerate(found):
             if place.kind in ("loss", "actuator"):
@@ -219,7 +220,8 @@ def _is_difference(equation: Equation, channel: str) -> bool:
 def _actuators(equation: Equation, angles: Sequence[str]) -> Iterator[Place]:
     """Yield the places of the actuators that an equation reads as terms or as its target."""
     read = [t.channels["source"] for t in equation.terms if t.effect.id == "motor.torque_constant"]
-    if not read and (equation.of_angle or equation.target.endswith(EFFORTS)):
+    is_driven = equation.target in equation.model.signals.actuators
+    if not read and not is_driven and (equation.of_angle or equation.target.endswith(EFFORTS)):
         return
     for current in dict.fromkeys(read) or [equation.target]:
         roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
