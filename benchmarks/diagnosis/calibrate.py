@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import beta
 
-from benchmarks.rigs import CALIBRATE, draw
+from benchmarks.rigs import CALIBRATE, NoCaseError, draw
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.findings import Probability
@@ -127,9 +127,12 @@ def main() -> int:
     asked = [("clean" if k % 2 else SILENCED, k) for k in range(options.clean)]
     asked += [(kind, k) for k in range(options.cases) for kind in KINDS]
     done = []
-    for kind, k in asked:
-        done.append(_searched(options.out, kind, options.seed + k, models))
-        sys.stderr.write(f"{len(done)} of {len(asked)}: {done[-1].name}\n")
+    for number, (kind, k) in enumerate(asked, start=1):
+        try:
+            done.append(_searched(options.out, kind, options.seed + k, models))
+            sys.stderr.write(f"{number} of {len(asked)}: {done[-1].name}\n")
+        except NoCaseError as error:  # about one seed in a thousand
+            sys.stderr.write(f"{number} of {len(asked)} left out: {error}\n")
     write_text_atomic(options.page, _page(done, options.seed))
     sys.stderr.write(f"{options.page} written\n")
     return 0

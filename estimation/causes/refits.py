@@ -90,6 +90,17 @@ class Refits:
         parts = [p for p in self.parts[name] if p is not without]
         return self.of[name].errors(self.of[name].solve(parts), self.open)
 
+    def sizes(self, name: str) -> dict[str, float]:
+        """Return the size of an equation's error in each run, training runs too.
+
+        Root mean squares, in the target's unit, less the mean where runs have offsets of their own.
+        """
+        solved, own = self.after(name), self.layout.equations[name].model.run_offsets
+        found = {r: self.of[name].residuals(solved, r) for r in self.of[name].recordings}
+        left = {run: one[-1] for run, one in found.items() if one is not None}
+        spread = np.std if own else lambda x: np.sqrt(np.mean(x**2))
+        return {run: float(spread(x)) for run, x in left.items() if len(x)}
+
     def models(self) -> list[Model]:
         """Return the models with the causes that a file can hold; see `Refit.written`."""
         return [self.of[name].written(self.parts[name]) for name in self.of]

@@ -5,13 +5,14 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, S
 
 import numpy as np
 
-from estimation.causes.apart import Apart
+from estimation.causes.apart import LARGER, Apart
 from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Equation
 from estimation.causes.findings import Kept, written_term
 from estimation.causes.folds import unvaried
 from estimation.causes.functions import Function
 from estimation.causes.instruments import noise_share
+from estimation.causes.laid import TINY
 from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT
 from estimation.causes.run_signals import EFFORTS
@@ -85,6 +86,24 @@ def left(
         if own > MOST_ERROR * error:
             whose = noise_of(channel, equation.model.signals)
             yield f"{name}: most of that error is {whose}. {_remedy(equation)}"
+
+
+def far(layout: Layout, sizes: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
+    """Yield the run of which an equation's error is far larger than that of all others.
+
+    `sizes` has the error of each equation in each run, in the unit of the target.
+    """
+    noises = over_noise(layout, {name: max(found.values()) for name, found in sizes.items()})
+    for name, found in sizes.items():
+        *_, second, largest = ("", "", *sorted(found, key=found.__getitem__))
+        if not second or not is_unexplained(noises.get(name, math.inf)):
+            continue
+        if found[largest] > LARGER * found[second]:
+            factor = f"{found[largest] / max(found[second], TINY):.2g}"
+            yield (
+                f"{name}: the error in {largest} is {factor} times that in any other run. Check"
+                f" what happened in it, or exclude the run: --exclude {largest}."
+            )
 
 
 def _loudest(equation: Equation, layout: Layout) -> tuple[str, float]:

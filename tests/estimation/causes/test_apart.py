@@ -65,6 +65,20 @@ def test_the_run_that_is_apart_is_named_with_its_channel_and_no_other_run(
     assert float(said[1]) == pytest.approx(factor, rel=0.2)
 
 
+@pytest.mark.parametrize("knocked", [None, 2, 5])
+def test_a_run_with_a_far_larger_error_is_named(knocked: int | None) -> None:
+    """A sensor that is knocked in the middle of one run follows from no other run."""
+    runs = turning(lambda angle, speed, acceleration: 0.0 * speed)[:8]
+    if knocked is not None:
+        torque = runs[knocked]["crank_torque_n_m"].copy()
+        torque[len(torque) // 2 :] += 10.0 * np.std(torque)
+        runs[knocked] = runs[knocked].with_columns(crank_torque_n_m=torque)
+    found = diagnose(runs, [axis()], split(runs))
+    said = [re.search(r"the error in (\S+) is \S+ times", note) for note in found.notes]
+    named = [match[1] for match in said if match]
+    assert named == ([] if knocked is None else [runs[knocked].name])
+
+
 def test_a_slow_run_in_another_unit_shows_in_its_mean() -> None:
     runs = hoisted()
     runs[5] = runs[5].with_columns(rope_force_n=10.0 * runs[5]["rope_force_n"])
