@@ -14,7 +14,7 @@ from estimation.causes.joint import Joint
 from estimation.causes.laid import centred
 from estimation.causes.layout import Layout
 from estimation.causes.places import Place, places_of
-from estimation.causes.run_signals import RunSignals
+from estimation.causes.run_signals import EFFORTS, RunSignals
 from estimation.causes.scoring import is_possible
 from estimation.causes.sources import Source
 from estimation.effects import effect
@@ -231,7 +231,7 @@ def gains_of(layout: Layout) -> Iterator[Moved]:
     """
     for place in places_of(layout):
         target, of_all = layout.equations[place.home].target, reads_target_alone(layout, place)
-        if place.name == f"actuator {target}" and of_all:
+        if place.name == f"actuator {target}" and of_all and not target.endswith(EFFORTS):
             constant, source = effect("motor.torque_constant"), (("source", target),)
             yield Moved(place, constant, source, (), (0,), of_all=True)
         elif place.kind == "torque sensor" and (of_all or len(place.enters) > 1):

@@ -12,7 +12,7 @@ from estimation.causes.grids import axis, last_order, least_order, turns
 from estimation.causes.layout import Layout
 from estimation.causes.orders import largest_orders, orders_elsewhere
 from estimation.causes.places import Place
-from estimation.causes.run_signals import ANGLES
+from estimation.causes.run_signals import ANGLES, EFFORTS
 from estimation.causes.sources import Source
 from estimation.effects import Effect, catalogue
 
@@ -199,6 +199,9 @@ def _acts(layout: Layout, effect: Effect, place: Place) -> bool:
     if not set(effect.roles) <= set(place.roles):
         return False
     kind = place.home.partition(".")[0]
+    is_force = place.kind == "actuator" and place.roles["current"][0].endswith(EFFORTS)
+    if is_force and not effect.id.startswith("motor."):
+        return False  # a drive that is stated as a force has a sensor's place, too
     if (place.home, place.kind) == ("calibration.encoder", "deflection"):
         return False  # slower than a count a sample, the pattern of the counts passes for a bend
     is_known = kind in KNOWN and any(name in layout.measured for name in SENSORS)

@@ -87,7 +87,7 @@ def places_of(layout: Layout) -> list[Place]:
         found += _actuators(equation, own)
     found = _one_of_each(found)
     signals = signals_of(layout)
-    known = {*_computed(layout), *signals.loads, *signals.actuators}
+    known = {*_computed(layout), *signals.loads}
     sensors = [n for n in layout.measured if n not in known]
     for sensor in sensors:
         if (both := _both(layout, sensor)) is not None:
