@@ -308,7 +308,7 @@ def variables_of(candidate: Candidate) -> tuple[str, ...]:
     ]
     if cause.family == "friction.dwell":
         found = ["dwell" if v == "time" else v for v in found]
-    follows_speed = cause.effect.id == "friction.warmup.viscous" or cause.family.endswith(
+    follows_speed = cause.effect.id.endswith(".viscous") or cause.family.endswith(
         ("viscous_asymmetry", "drag", "stribeck", "load_viscous")
     )
     if cause.family.startswith("friction.") and not follows_speed:

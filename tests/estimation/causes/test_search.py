@@ -96,6 +96,13 @@ def test_a_cause_of_one_axis_is_named_with_its_size(runs, family, parameter, val
     assert finding.parameters[parameter].value == pytest.approx(value, rel=0.05)
 
 
+def test_viscous_friction_that_varies_along_the_travel_is_named_with_its_variables():
+    finding = _only(turning(lambda angle, speed, _: 0.01 * angle * speed, size=3.0), axis())
+    assert (finding.form, finding.verdict) == ("friction.position.viscous", "identified")
+    assert {*finding.depends_on} == {"velocity", "crank_angle"}
+    assert finding.parameters["slope"].value == pytest.approx(0.01, rel=0.05)
+
+
 @pytest.mark.parametrize("late_s", [0.01, 0.02])
 def test_what_is_late_in_part_is_stated_by_how_much_it_is_late(late_s: float) -> None:
     """In slow motion only the product of the part and its time is known."""
