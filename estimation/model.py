@@ -109,7 +109,7 @@ class Term:
     def unit(self, parameter: Parameter, target: str) -> str:
         """Return the unit symbol of a parameter when this term estimates `target`."""
         roles = {role: unit_of(channel) for role, channel in self.channels.items()}
-        return evaluate(parameter.unit, {"target": unit_of(target), **roles})
+        return evaluate(parameter.unit, {"target": unit_of(target), "rad": "rad", **roles})
 
     def numbers(self, parameters: Sequence[Parameter]) -> list[float]:
         """Return the values of parameters; NotFittedError where one has none."""

@@ -55,8 +55,10 @@ SEVERAL = "rig.models/1"
 OF_PARAMETER = ("value", "unit", "spread", "ci95")
 """Keys of a parameter."""
 
-SAME_UNIT = {"kg": "N s^2/m", "kg m^2": "N m s^2/rad"}
-"""Unit that a file may state for a parameter, to how it follows from the channels."""
+SAME_UNIT = {"kg": "N s^2/m", "kg m^2": "N m s^2/rad", "1": "rad/m"}
+"""Unit that a file may state for a parameter, to how it follows from the channels.
+
+Files of earlier versions state an order along a position without a unit."""
 
 
 class ModelFileError(ModelError):
@@ -282,7 +284,7 @@ def _check_units(term: Term, target: str, stated: Mapping[str, str]) -> None:
     for parameter in term.parameters:
         unit = term.unit(parameter, target)
         written = stated.get(parameter.name, unit)
-        if not is_same(SAME_UNIT.get(written, written), unit):
+        if not any(is_same(one, unit) for one in (written, SAME_UNIT.get(written, written))):
             raise ModelError(
                 f"{term.effect.id}: {parameter.name} is stated in {stated[parameter.name]!r},"
                 f" not in {unit!r}.",

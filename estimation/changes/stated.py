@@ -1,11 +1,14 @@
 """A change that was found, with its names, its size and an interval over runs."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
-from estimation.causes.candidates import Group
+from estimation.causes.candidates import Candidate, Claim, Group, laid_out
 from estimation.causes.findings import SURE, others_in_set, variables_of
+from estimation.causes.grids import order_step
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import Numbers
 from estimation.causes.scoring import Scored, probabilities
@@ -56,6 +59,8 @@ def stated(
     competes in its place, the likeliest first; `joint` is the regression without changes. The runs
     of its interval are random.
     """
+    others = [c.candidate for c in causes if c is not one]
+    one = replace(one, candidate=_between_the_grid(one.candidate, joint, others))
     source, acts = _source(one), one.candidate.acts
     assert acts is not None  # noqa: S101 - every candidate acts in the runs of one campaign
     name = _name(source)
@@ -64,8 +69,8 @@ def stated(
     term = Term(source.effect, channels=dict(source.channels))
     chosen = [source.effect.amplitudes[k] for k in source.parts]
     labels = [p.name for p in chosen]
-    for cause in (*(c for c in causes if c is not one), one):
-        joint = joint.with_cause(cause.candidate.laid, cause.candidate.precision)
+    for cause in (*others, one.candidate):
+        joint = joint.with_cause(cause.laid, cause.precision)
     base = joint.fitted_on(np.ones(len(joint.runs)))
     values = [float(x) for x in base[-len(labels) :] / one.candidate.size[: len(labels)]]
     shared, spread = values[0] * float(np.mean(acts)), _spread(one, joint, random)
@@ -97,6 +102,40 @@ def stated(
         depends_on=variables_of(one.candidate),
         form=source.effect.id,
     )
+
+
+def _between_the_grid(
+    candidate: Candidate, joint: Joint, others: Sequence[Candidate], steps: float = 4.0
+) -> Candidate:
+    """Return a wave along a position with the order of the least error next to other causes.
+
+    The search tries orders that are this many of the least steps apart. Another effect stays as it
+    was found.
+    """
+    source = candidate.cause
+    assert isinstance(source, Source)  # noqa: S101 - no candidate here has an unknown form
+    position = dict(source.channels)[source.turning] if source.is_wave else "_angle_rad"
+    if position.endswith("_angle_rad"):
+        return candidate
+    for other in others:
+        joint = joint.with_cause(other.laid, other.precision)
+    k = [p.name for p in source.effect.shape].index("order")
+
+    def of(order: float) -> Candidate:
+        shape = (*source.shape[:k], order, *source.shape[k + 1 :])
+        claim = replace(Claim(replace(source, shape=shape)), acts=candidate.acts, given=True)
+        return laid_out(joint, claim) or candidate
+
+    def error(order: float) -> float:
+        tried = of(order)
+        grown = joint.with_cause(tried.laid, tried.precision)
+        vector = np.append(grown.fitted_on(np.ones(len(joint.runs))), -1.0)
+        parts = [joint.weights[p] * vector @ grown.gram[p].sum(axis=0) @ vector for p in grown.gram]
+        return float(sum(parts))
+
+    reach = steps * order_step(joint.layout, position)
+    ends = source.shape[k] - reach, source.shape[k] + reach
+    return of(float(minimize_scalar(error, bounds=ends, method="bounded").x))
 
 
 def _before(source: Source, joint: Joint, base: FloatArray, shared: float) -> float | None:

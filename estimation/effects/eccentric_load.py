@@ -25,7 +25,11 @@ class EccentricLoad(Waves):
         Parameter("sine", "target / load", "eccentricity along one axis, of the lever arm"),
         Parameter("cosine", "target / load", "eccentricity along the other"),
     )
-    shape = (Parameter("order", "1", "periods per turn", 0.5, 16.5, linear=True, points=33),)
+    shape = (
+        Parameter(
+            "order", "rad / output_angle", "periods per turn", 0.5, 16.5, linear=True, points=33
+        ),
+    )
     told_apart_by = "the same sweep against two loads"
 
 
@@ -66,5 +70,9 @@ class EccentricPulley(OutputHarmonics):
     family = "eccentric.load"
     balances: ClassVar = {"gearbox": 1, "stretch": 1}
     amplitudes = harmonics_in("target")
-    shape = (Parameter("order", "1", "periods per turn", 0.5, 16.5, linear=True, points=33),)
+    shape = (
+        Parameter(
+            "order", "rad / output_angle", "periods per turn", 0.5, 16.5, linear=True, points=33
+        ),
+    )
     told_apart_by = "the same sweep against two loads"

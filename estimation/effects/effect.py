@@ -32,7 +32,7 @@ class Parameter:
 
     Attributes:
         name: Name, unique in the effect.
-        unit: Unit expression over `target` and the effect's roles, such as `target / speed`.
+        unit: Unit expression over `target`, the effect's roles and `rad`, such as `target / speed`.
         description: Meaning in words.
         lower: Smallest physically meaningful value, in SI units.
         upper: Largest physically meaningful value.

@@ -24,5 +24,9 @@ class CurrentRipple(Waves):
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"motor_angle": "motor_angle_rad", "current": "motor_current_a"}
     amplitudes = waves_in("target / current")
-    shape = (Parameter("order", "1", "periods per turn", 0.5, 20.5, linear=True, points=401),)
+    shape = (
+        Parameter(
+            "order", "rad / motor_angle", "periods per turn", 0.5, 20.5, linear=True, points=401
+        ),
+    )
     told_apart_by = "the same slow sweep at two currents"

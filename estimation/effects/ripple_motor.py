@@ -22,5 +22,9 @@ class MotorRipple(Waves):
     id = "ripple.motor"
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"motor_angle": "motor_angle_rad"}
-    shape = (Parameter("order", "1", "periods per turn", 0.5, 20.5, linear=True, points=401),)
+    shape = (
+        Parameter(
+            "order", "rad / motor_angle", "periods per turn", 0.5, 20.5, linear=True, points=401
+        ),
+    )
     told_apart_by = "a sweep at a slow constant speed, and coasting without current"

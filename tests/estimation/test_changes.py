@@ -165,7 +165,10 @@ def test_a_ripple_that_came_is_stated_with_its_period():
     sentence = next(lines(found))
     assert sentence.startswith("New effect: ripple.motor at motor, ")
     period = re.search(r", period (\S+) m \(confidence", sentence)
-    assert float(period[1]) == pytest.approx(0.02, rel=0.02)
+    assert float(period[1]) == pytest.approx(0.02, rel=0.005)
+    (change,) = found.changes
+    assert change.unit["order"] == "rad/m"
+    assert 2.0 * np.pi / change.shape["order"] == pytest.approx(0.02, rel=0.002)
 
 
 @pytest.mark.long

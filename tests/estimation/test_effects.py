@@ -259,6 +259,11 @@ def test_units_of_parameters_follow_from_the_channels():
     damping = effect("friction.viscous").amplitudes[0]
     assert Term(effect("friction.viscous")).unit(damping, "distal_torque_n_m") == "N m s/rad"
     assert Term(effect("friction.viscous")).unit(damping, "jaw_angle_rad") == "s"
+    ripple = effect("ripple.motor")
+    (order,) = ripple.shape
+    assert Term(ripple).unit(order, "proximal_torque_n_m") == "1"
+    screw = Term(ripple, channels={"motor_angle": "carriage_position_m"})
+    assert screw.unit(order, "drive_force_n") == "rad/m"
 
 
 def test_an_unknown_effect_names_the_nearest():
