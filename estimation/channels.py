@@ -26,6 +26,9 @@ UNIT_BY_SUFFIX: dict[str, str] = {
     "m3_s": "m^3/s",
     "kg_s": "kg/s",
     "n_m_a": "N m/A",
+    "n_s_per_m": "N s/m",
+    "n_per_m": "N/m",
+    "n_per_a": "N/A",
     "n_m": "N m",
     "hz": "Hz",
     "rad": "rad",
@@ -39,7 +42,9 @@ UNIT_BY_SUFFIX: dict[str, str] = {
     "k": "K",
     "kg": "kg",
 }
-"""Unit symbol of each name suffix; the longest suffix that matches wins."""
+"""Unit symbol of each name suffix; the longest suffix that matches wins.
+
+A word `per` is where it would be another unit without: `_n_m` is N m."""
 
 ESTIMATED = "estimated_"
 """A column so prefixed holds an estimate, made live, of the channel its name goes on with. It may

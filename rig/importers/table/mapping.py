@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 from pydantic import ValidationError
 
-from estimation.channels import UNIT_BY_SUFFIX, UnknownUnitError, unit_of
+from estimation.channels import UNIT_BY_SUFFIX, UnknownUnitError, ending_of, unit_of
 from estimation.derived import origin_of
 from estimation.files import not_utf8
 from rig.configuration.validation import explain, line_of
@@ -215,8 +215,8 @@ def _check_source(mapping: ColumnMapping, part: str, name: str, source: Source) 
 def _renamed(name: str, unit: str) -> str:
     """Return a name like this one that a unit fits, or an example."""
     suffix = _suffix_of(unit)
-    stem = name.rsplit("_", 1)[0]
-    return f"{stem}_{suffix}" if suffix else "one of the suffixes of docs/signs-and-units.md"
+    stem = name.removesuffix(ending_of(name))
+    return f"{stem}{suffix}" if suffix else "one of the suffixes of docs/signs-and-units.md"
 
 
 def _example(name: str, unit: str) -> str:

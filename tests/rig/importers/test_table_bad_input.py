@@ -39,6 +39,18 @@ ANGLE = "motor_angle_rad"
 MAPPINGS = {
     "a column that is not there": ("angle:deg", "angel:deg", 5, "'angel'", "mean 'angle'?"),
     "a unit of another travel": ("angle:deg", "angle:mm", 5, "'mm' is not a unit", "motor_angle_m"),
+    "a unit of another speed": (
+        *(f'{ANGLE} = "angle:deg"', 'motor_velocity_rad_s = "angle:mm/s"'),
+        *(5, "or the name motor_velocity_m_s"),
+    ),
+    "a stiffness of a carriage": (
+        *("\n$", '\n[data.conditions]\nspring_n_m = "current:N/mm"\n'),
+        *(7, "spring_n_m, which is in N m", "or the name spring_n_per_m"),
+    ),
+    "a stiffness of a shaft": (
+        *("\n$", '\n[data.conditions]\nspring_n_m = "current:N m/deg"\n'),
+        *(7, "or the name spring_n_m_rad"),
+    ),
     "counts": ("angle:deg", "angle:count", 5, "'count' is not a unit", "rev/4096"),
     "no dimension": ("angle:deg", "angle:1", 5, f"is not a unit of {ANGLE}"),
     "no unit that is known": ("angle:deg", "angle:grad", 5, "'grad' is not a unit", "N cm"),
