@@ -42,6 +42,48 @@ lap_s = 3.0
 """
 
 
+PENDULUM = r"""
+schema = "rig.machine/1"
+[machine]
+name = "pendulum"
+cutoff_hz = 10.0
+run_offsets = false
+[[axis]]
+name = "arm"
+unit = "rad"
+[[sensor]]
+name = "arm_angle_rad"
+axis = "arm"
+reads = "position"
+[[sensor]]
+name = "arm_current_a"
+[[sensor]]
+name = "scaled_arm_angle_rad"
+[[equation]]
+name = "swing"
+target = "arm_current_a"
+[[equation.effects]]
+id = "inertia.missing"
+channels.acceleration = "arm_acceleration_rad_s2"
+[[equation.effects]]
+id = "inertia.missing"
+channels.acceleration = "scaled_arm_acceleration_rad_s2"
+[[equation.effects]]
+id = "friction.viscous"
+channels.speed = "arm_velocity_rad_s"
+[data]
+file_name = '\d_m(?P<mass>\d\.\d+)'
+[data.columns]
+time_s = "t"
+arm_angle_rad = "q"
+arm_current_a = "i"
+[data.conditions]
+mass_kg = "mass"
+[data.formulas]
+scaled_arm_angle_rad = "mass_kg * 0.3**2 * arm_angle_rad"
+"""
+"""A pendulum whose inertia follows its weight."""
+
 GEARED_SLIDE = """
 [[axis]]
 name = "motor"
@@ -229,6 +271,25 @@ axis = "carriage"
     printed = said("machine check", file).out
     assert "friction.viscous, damping" in printed
     assert "Not identified" not in printed
+
+
+def test_an_inertia_that_follows_a_condition_is_an_effect_of_the_scaled_angle(tmp_path, answered):
+    runs, file = tmp_path / "runs", tmp_path / "pendulum.toml"
+    runs.mkdir()
+    time_s, random = np.arange(0, 6, 0.01), np.random.default_rng(1)
+    for k, mass in enumerate((0.1, 0.2, 0.35, 0.5)):
+        rate = 2.0 + 0.7 * k
+        angle = np.sin(rate * time_s)
+        speed, acceleration = rate * np.cos(rate * time_s), -(rate**2) * angle
+        current = (0.02 + 1.5 * mass * 0.3**2) * acceleration + 0.1 * speed
+        columns = np.column_stack([time_s, angle, current + random.normal(0, 1e-3, time_s.size)])
+        np.savetxt(runs / f"{k}_m{mass:.2f}.csv", columns, "%.6f", ",", header="t,q,i", comments="")
+    file.write_text(PENDULUM)
+    (found,) = answered("machine check", file, runs)["check"]["equations"]
+    values = {one["effect"]: one["value"] for one in found["parameters"]}
+    of = "inertia.missing({}arm_acceleration_rad_s2)"
+    assert values[of.format("")] == pytest.approx(0.02, rel=0.05)
+    assert values[of.format("scaled_")] == pytest.approx(1.5, rel=0.05)
 
 
 def test_a_temperature_that_causes_may_read_is_not_unused(tmp_path, said):

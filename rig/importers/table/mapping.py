@@ -166,8 +166,13 @@ def worked_out(
         except (ValueError, TypeError) as error:
             raise DataError(f"{where}: {error}.", f"There are {', '.join(known)}.") from error
     fix = ""
-    if origin_of(lacking[0])[1]:
-        fix = f"Let an effect of an [[equation]] read {lacking[0]}: it is differentiated there."
+    origin, times = origin_of(lacking[0])
+    if times:
+        fix = (
+            f"Let an effect of an [[equation]] read {lacking[0]}: it is differentiated there."
+            f" For its product with a condition, write a formula scaled_{origin}, {origin} times"
+            f" the condition, and let the effect read scaled_{lacking[0]}."
+        )
     raise UsageError(
         f"{where}: no channel or condition is called {lacking[0]!r}.",
         f"Formulas read columns and conditions only. There are {', '.join(known)}.",

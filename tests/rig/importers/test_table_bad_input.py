@@ -79,6 +79,7 @@ MAPPINGS = {
     "a formula of a derived channel": (
         *("\n$", '\n[data.formulas]\nweight_n = "motor_acceleration_rad_s2"\n'),
         *(7, "Formulas read columns and conditions only", "[[equation]] read motor_accel"),
+        *("a formula scaled_motor_angle_rad", "read scaled_motor_acceleration_rad_s2"),
     ),
     "a formula that is code": (
         *("\n$", '\n[data.formulas]\nweight_n_m = "__import__(1)"\n'),
