@@ -7,6 +7,7 @@ from typing import Any
 
 from estimation.causes.findings import IN_SET, SURE
 from estimation.causes.isolability import NOTHING, Isolable, isolability
+from estimation.causes.sources import READ_LATE
 from estimation.effects import catalogue
 from rig.diagnosis.subject import declared_models, subject
 from rig.errors import UsageError
@@ -16,11 +17,15 @@ from rig.simulation.campaign import simulate_reference_campaign
 
 @dataclass(frozen=True)
 class Plan:
-    """The expected conclusion on each effect, the vaguest first, from so many runs of a source."""
+    """The expected conclusion on each effect, the vaguest first, from so many runs of a source.
+
+    `run_offsets` states whether runs have offsets of their own in some equation.
+    """
 
     source: str
     runs: int
     effects: tuple[Isolable, ...]
+    run_offsets: bool = True
 
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON types."""
@@ -71,7 +76,8 @@ def plan_of(
         models = declared_models(model, balance)
         recordings = list(simulate_reference_campaign(1, str(path)).evidence)
     found = isolability(models, recordings, on_part=on_part)
-    return Plan(str(path), len(recordings), tuple(found))
+    offsets = any(model.run_offsets for model in models)
+    return Plan(str(path), len(recordings), tuple(found), offsets)
 
 
 def _listed(one: Isolable, least: float = 0.05) -> dict[str, float]:
@@ -97,9 +103,15 @@ def sentences(plan: Plan) -> list[str]:
     for one in vague:
         others = ", ".join(f"{name} {p:.2f}" for name, p in _listed(one).items())
         lines.append(f"  {one.equation}: {one.family} {one.share:.2f} or {others} ({one.place})")
-    if unseen:
-        lines.append("Not seen, because the declared terms or the run offsets take its place:")
-        lines += [f"  {one.equation}: {one.family} ({one.place})" for one in unseen]
+    instead = "the declared terms" + " or the run offsets" * plan.run_offsets
+    late = [one for one in unseen if one.family in READ_LATE]
+    for why, effects in (
+        (f"because {instead} take its place", [one for one in unseen if one not in late]),
+        ("because short delays of readings are part of every model; one above 2 ms can be", late),
+    ):
+        if effects:
+            lines.append(f"Not seen, {why}:")
+            lines += [f"  {one.equation}: {one.family} ({one.place})" for one in effects]
     advice = {
         effect.family: effect.told_apart_by
         for one in vague

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from estimation.causes.isolability import Isolable
+from estimation.causes.isolability import NOTHING, Isolable
 from estimation.causes.refit import Errors, that_falls
 from estimation.changes.difference import Change, Difference
 from estimation.diagnosis.result import Diagnosis, Finding, Value
@@ -235,6 +235,22 @@ def test_a_plan_states_what_its_numbers_are():
     said = plan.sentences(plan.Plan("quick", 12, (vague,)))
     assert "the probability that it would be named" in said[2]
     assert said[3] == "  motor: ripple.motor 0.40 or sensor.crosstalk 0.50 (motor)"
+
+
+@pytest.mark.parametrize("offsets", [True, False])
+def test_a_plan_states_why_an_effect_is_not_seen(offsets):
+    gone = {NOTHING: 1.0}
+    asymmetry = Isolable("axis", "friction.coulomb_asymmetry", "axis", 0.0, gone)
+    late = Isolable("sensor axis_position_m", "sensor.delay", "axis", 0.0, gone)
+    said = plan.sentences(plan.Plan("runs", 9, (asymmetry, late), run_offsets=offsets))
+    terms = "the declared terms or the run offsets" if offsets else "the declared terms"
+    assert said[2:] == [
+        f"Not seen, because {terms} take its place:",
+        "  axis: friction.coulomb_asymmetry (axis)",
+        "Not seen, because short delays of readings are part of every model; one above 2 ms can"
+        " be:",
+        "  axis: sensor.delay (sensor axis_position_m)",
+    ]
 
 
 def test_a_finding_whose_own_equation_gains_nothing_states_the_error_of_another():
