@@ -46,6 +46,9 @@ UNIT_BY_SUFFIX: dict[str, str] = {
 
 A word `per` is where it would be another unit without: `_n_m` is N m."""
 
+PLAIN_UNIT = {"N s^2/m": "kg", "N m s^2/rad": "kg m^2"}
+"""Unit as it follows from channels, to the one that people write for it."""
+
 ESTIMATED = "estimated_"
 """A column so prefixed holds an estimate, made live, of the channel its name goes on with. It may
 lack values in samples that are valid."""

@@ -30,7 +30,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, cast, get_args
 
-from estimation.channels import is_same
+from estimation.channels import PLAIN_UNIT, is_same
 from estimation.effects import effect
 from estimation.errors import EstimationError, UnknownNameError, nearest
 from estimation.file_kinds import UNKNOWN, kind_of
@@ -55,7 +55,7 @@ SEVERAL = "rig.models/1"
 OF_PARAMETER = ("value", "unit", "spread", "ci95")
 """Keys of a parameter."""
 
-SAME_UNIT = {"kg": "N s^2/m", "kg m^2": "N m s^2/rad", "1": "rad/m"}
+SAME_UNIT = {plain: unit for unit, plain in PLAIN_UNIT.items()} | {"1": "rad/m"}
 """Unit that a file may state for a parameter, to how it follows from the channels.
 
 Files of earlier versions state an order along a position without a unit."""

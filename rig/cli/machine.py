@@ -114,12 +114,14 @@ def check_lines(plant: "Plant", found: "CheckedPlant") -> list[str]:
 
 def _parameter_lines(equation: "CheckedEquation") -> list[str]:
     from estimation.model import AT_BOUND
+    from rig.reports.diagnosis_words import plain_unit
 
     lines = []
     for one in equation.parameters:
         value = "" if one.value is None else f" = {one.value:.5g}"
-        unit = "" if one.unit == "1" else f" {one.unit}"
-        text = f"{value}{unit}" if value else f" ({one.unit})"
+        plain = plain_unit(one.unit)
+        unit = "" if plain == "1" else f" {plain}"
+        text = f"{value}{unit}" if value else f" ({plain})"
         text += ", at its bound" if one.at_bound else ""
         lines.append(f"  {one.effect}, {one.name}{text}: {one.description}")
     if any(one.at_bound for one in equation.parameters):

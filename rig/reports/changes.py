@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from estimation.changes.difference import Change, Difference
 from rig.output.table import TextTable
-from rig.reports.diagnosis_words import confidence, in_unit, label, wave
+from rig.reports.diagnosis_words import confidence, in_unit, label, plain_unit, wave
 
 PLAIN = {"came": "new effect", "went": "effect that is gone", "moved": "changed parameter"}
 """How something changed, as in the JSON, to the words of a sentence."""
@@ -29,7 +29,7 @@ def _sentence(change: Change) -> str:
         how = f"most likely {how}"
     sizes = [_size(change, name) for name in change.parameters]
     for name, value in _shape(change).items():
-        shown = {name: in_unit(value, change.unit[name])}
+        shown = {name: in_unit(value, plain_unit(change.unit[name]))}
         repeats = wave(value, change.depends_on) if name == "order" else shown
         sizes += [f"{name} {text}".strip() for name, text in repeats.items()]
     form = f" ({change.form})" if change.form not in ("", change.family) else ""
@@ -44,7 +44,8 @@ def _shape(change: Change) -> Mapping[str, float]:
 
 
 def _size(change: Change, name: str) -> str:
-    value, unit, before = change.parameters[name], change.unit[name], change.before[name]
+    value, before = change.parameters[name], change.before[name]
+    unit = plain_unit(change.unit[name])
     low, high = change.ci95[name]
     named = label(change.form or change.family, name)
     text = f"{named} {value:+.4g} {unit} ({low:+.4g} to {high:+.4g})".replace(" 1 (", " (")
@@ -59,10 +60,11 @@ def change_table(found: Difference) -> TextTable:
             low, high = change.ci95[name]
             known, interval = change.before[name], f"{low:+.4g} to {high:+.4g}"
             before = "-" if known is None else f"{known:.4g}"
-            named, unit = label(change.form or change.family, name), change.unit[name]
+            named = label(change.form or change.family, name)
+            unit = plain_unit(change.unit[name])
             rows.append((change.name, named, before, f"{value:+.4g}", interval, unit))
         rows += [
-            (change.name, name, "-", f"{value:.4g}", "", change.unit[name])
+            (change.name, name, "-", f"{value:.4g}", "", plain_unit(change.unit[name]))
             for name, value in _shape(change).items()
         ]
     heads = ("change", "parameter", "in A", "A to B", "95 %", "unit")

@@ -119,7 +119,8 @@ def card(finding: Finding, diagnosis: Diagnosis) -> dict[str, Any]:
     after = words.in_unit(scale * finding.rmse_after, unit)
     fall = f"{scale * finding.rmse_before:.3g} to {after}"
     runs = f"lower in {finding.runs_improved} of {finding.runs_total} held-out test runs"
-    facts.append((f"Error{words.of_which(finding)}", f"{fall}, {runs}"))
+    which = words.of_which(finding) + words.MEANS * finding.with_means
+    facts.append((f"Error{which}", f"{fall}, {runs}"))
     if variables:
         facts.append(("Depends on", variables))
     facts.append(("Equation", " and ".join([finding.balance, *finding.also_in])))

@@ -5,6 +5,7 @@ import math
 import sys
 from collections.abc import Sequence
 
+from estimation.channels import PLAIN_UNIT
 from estimation.diagnosis.result import Diagnosis, Finding, Value, is_unexplained
 from estimation.effects import catalogue
 from estimation.plant_models import WORDS
@@ -13,6 +14,9 @@ from rig.output.table import counted
 NO_NEXT = "None is proposed: no named hypotheses compete."
 PART_OF_THE_NAME = "half the ", "share of a load of "
 """What the description of a parameter begins with whose number is misread without it."""
+
+MEANS = ", the mean of each run included"
+"""What errors are of, where the means of runs count."""
 
 QUICK = "None was searched for: --quick does not search for one. Diagnose without it."
 
@@ -64,6 +68,7 @@ def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:
     tested = counted(finding.runs_total, "test run" if exploratory else "held-out test run")
     fall = (
         f"error{of_which(finding)} on {tested}{' (exploratory)' * exploratory}"
+        f"{(MEANS + ':') * finding.with_means}"
         f" {scale * finding.rmse_before:.3g} -> {in_unit(scale * finding.rmse_after, shown)}"
         f" (lower in {finding.runs_improved} of {counted(finding.runs_total, 'run')})"
     )
@@ -72,9 +77,8 @@ def _sentence(finding: Finding, unit: str, exploratory: bool) -> str:
 
 
 def of_which(finding: Finding) -> str:
-    """Return the equation of the errors, if not the finding's, and whether means of runs count."""
-    other = f" of {finding.error_of}" if finding.error_of != finding.balance else ""
-    return other + " with the means of runs" * finding.with_means
+    """Return the equation of the errors, if not the finding's."""
+    return f" of {finding.error_of}" if finding.error_of != finding.balance else ""
 
 
 def _where(finding: Finding, runs: int) -> str:
@@ -250,7 +254,12 @@ def in_unit(value: float, unit: str) -> str:
 
 def display(unit: str, size: float) -> tuple[float, str]:
     """Return the factor and the symbol that a unit is shown with, for values of a size in it."""
-    return (1e3, "mN m") if unit == "N m" and abs(size) < 1.0 else (1.0, unit)
+    return (1e3, "mN m") if unit == "N m" and abs(size) < 1.0 else (1.0, plain_unit(unit))
+
+
+def plain_unit(unit: str) -> str:
+    """Return a unit as people write it: kg of a mass, which follows as N s^2/m from channels."""
+    return PLAIN_UNIT.get(unit, unit)
 
 
 def other_sentences(diagnosis: Diagnosis) -> list[str]:

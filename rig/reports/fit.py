@@ -6,7 +6,7 @@ from estimation.cross_validation import HeldOutError
 from estimation.effects import Parameter
 from estimation.model import Estimate, Model, parameter_keys
 from rig.output.table import TextTable, counted
-from rig.reports.diagnosis_words import display, in_unit, label
+from rig.reports.diagnosis_words import display, in_unit, label, plain_unit
 
 
 def parameter_table(model: Model) -> TextTable:
@@ -14,7 +14,7 @@ def parameter_table(model: Model) -> TextTable:
     rows = []
     for term, parameter, key in parameter_keys(model):
         known = term.values[parameter.name]
-        unit = term.unit(parameter, model.target)
+        unit = plain_unit(term.unit(parameter, model.target))
         sign = "+" if term.sign == 1 else "-"
         effect = key.removesuffix(f".{parameter.name}")
         name = f"{effect}, {label(term.effect.id, parameter.name)}"

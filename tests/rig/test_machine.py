@@ -143,7 +143,8 @@ def test_a_table_in_millimetres_and_volts_is_fitted_in_metres_and_newtons(
     assert found["damping"] == (pytest.approx(200.0, rel=0.05), "N s/m")
     assert found["friction"] == (pytest.approx(20.0, rel=0.1), "N")
     model = tmp_path / "slide.model.toml"
-    said("fit", table, "--machine", file, "--out", model)
+    assert re.search(r"inertia = 9\d\.\d+ kg: mass", said("machine check", file, table).out)
+    assert re.search(r"inertia .* kg ", said("fit", table, "--machine", file, "--out", model).out)
     words = ("replay", table, "--machine", file, "--model", model)
     assert "drive_force_n" in said(*words, "--speed 0 --json").out
     header = tmp_path / "slide.h"
