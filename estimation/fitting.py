@@ -22,7 +22,7 @@ from estimation.fit_problem import (
     problem_of,
     solve,
 )
-from estimation.model import Estimate, Evidence, Model, estimate, with_values
+from estimation.model import Estimate, Evidence, Model, estimate, parameter_keys, with_values
 from estimation.recording import FloatArray
 from estimation.shape_search import range_of, scaled, search_shape, unscaled
 from estimation.within_bounds import determined, solve_within
@@ -157,6 +157,20 @@ def _bootstrap(
         if not parameter.linear:
             values[:, k] = np.exp(values[:, k])
     return values
+
+
+def shapes_at_bound(fitted: Model, campaign: Campaign) -> set[str]:
+    """Return the keys of the shape parameters that are at an end of their range on some runs.
+
+    The range of a width follows from the speeds there: see `fit_problem.problem_of`.
+    """
+    shapes = problem_of(fitted, prepared(fitted, campaign)).shape_parameters
+    known = [(t, p, key) for t, p, key in parameter_keys(fitted) if p in t.effect.shape]
+    return {
+        key
+        for shape, (term, p, key) in zip(shapes, known, strict=True)
+        if not p.is_count and _is_at_bound(shape, term.values[p.name].value)
+    }
 
 
 def _is_at_bound(parameter: Parameter, value: float) -> bool:

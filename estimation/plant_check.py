@@ -14,7 +14,7 @@ from estimation.channels import unit_of
 from estimation.derived import measured_channels
 from estimation.errors import EstimationError, nearest
 from estimation.filters import LowPass
-from estimation.fitting import fit
+from estimation.fitting import fit, shapes_at_bound
 from estimation.model import Evidence, Model, balance_channels, parameter_keys, settled
 from estimation.noise import (
     noise_width,
@@ -56,6 +56,8 @@ class Identified:
         effect: Id of the effect, with its channels where several terms have it.
         value: Fitted on the recordings; None without them.
         at_bound: Whether that is the least or the largest value that makes sense.
+        is_shown: Whether the runs show it: a shape at an end of what their speeds show may be
+            further out.
     """
 
     effect: str
@@ -64,6 +66,7 @@ class Identified:
     description: str
     value: float | None = None
     at_bound: bool = False
+    is_shown: bool = True
 
 
 @dataclass(frozen=True)
@@ -155,15 +158,18 @@ def check(
     )
 
 
-def _described(model: Model, values: bool = False) -> CheckedEquation:
+def _described(model: Model, campaign: Campaign | None = None) -> CheckedEquation:
+    """Return an equation as declared, or as fitted on a campaign."""
+    ends = set() if campaign is None else shapes_at_bound(model, campaign)
     parameters = tuple(
         Identified(
             key.removesuffix(f".{parameter.name}"),
             parameter.name,
             term.unit(parameter, model.target),
             parameter.description,
-            term.values[parameter.name].value if values else None,
-            values and term.is_at_bound(parameter),
+            None if campaign is None else term.values[parameter.name].value,
+            campaign is not None and term.is_at_bound(parameter),
+            key not in ends,
         )
         for term, parameter, key in parameter_keys(model)
     )
@@ -184,7 +190,7 @@ def _fitted(
         return replace(plain, trouble=f"{error.what} {error.fix}".strip())
     shared = filter(None, [inseparable(fitted, campaign)])
     limits = (*plain.limits, *swamped(fitted, campaign), *shared)
-    found = replace(_described(fitted, values=True), limits=limits)
+    found = replace(_described(fitted, campaign), limits=limits)
     evidence = fitted.evidence
     assert evidence is not None  # noqa: S101  a fit sets its evidence
     size = size_of_target(fitted, campaign)

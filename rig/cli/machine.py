@@ -123,6 +123,7 @@ def _parameter_lines(equation: "CheckedEquation") -> list[str]:
         unit = "" if plain == "1" else f" {plain}"
         text = f"{value}{unit}" if value else f" ({plain})"
         text += ", at its bound" if one.at_bound else ""
+        text += "" if one.is_shown or one.at_bound else ", not identified by these runs"
         lines.append(f"  {one.effect}, {one.name}{text}: {one.description}")
     if any(one.at_bound for one in equation.parameters):
         lines.append(f"  {AT_BOUND}")

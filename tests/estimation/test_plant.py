@@ -30,6 +30,7 @@ from estimation.plant_file import PlantFileError, parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from estimation.recording import Recording
 from estimation.signals import Combination, Direction, Reading, Share
+from rig.reports.fit import parameter_table
 from tests.estimation.causes.synthetic import HOIST, hoisted
 
 REFERENCE = to_toml(shipped_plant("reference"))
@@ -222,14 +223,25 @@ def test_a_parameter_that_comes_out_at_its_bound_is_marked():
     assert [one.name for one in broken.equations[0].parameters if one.at_bound] == ["damping"]
 
 
-def slide(seed, mass=90.0, viscous=200.0, coulomb=20.0):
+@pytest.mark.parametrize(("width", "is_shown"), [(2e-3, False), (0.02, True)])
+def test_a_width_that_the_speeds_of_the_runs_do_not_show_is_marked(width, is_shown):
+    runs = Campaign.of([slide(k, width=width) for k in range(4)])
+    (equation,) = check(SLIDE, runs).equations
+    unknown = [one.name for one in equation.parameters if not one.is_shown]
+    assert unknown == ([] if is_shown else ["width"])
+    intervals = {row[0]: row[3] for row in parameter_table(fit(declared(SLIDE)[0], runs)).rows}
+    assert (intervals["friction.coulomb, width"] == "none") == (not is_shown)
+    assert " to " in intervals["friction.coulomb, friction"]
+
+
+def slide(seed, mass=90.0, viscous=200.0, coulomb=20.0, width=2e-3):
     """Return a run of a carriage in m, its drive in N."""
     random = np.random.default_rng(seed)
     time_s = np.arange(0.0, 6.0, 1e-3)
     turns = 2 * np.pi * time_s
     position = 0.1 * np.sin(0.4 * turns) + 0.02 * np.sin(1.1 * turns + seed)
     speed = np.gradient(position, time_s)
-    force = mass * np.gradient(speed, time_s) + viscous * speed + coulomb * np.tanh(speed / 2e-3)
+    force = mass * np.gradient(speed, time_s) + viscous * speed + coulomb * np.tanh(speed / width)
     force = force + random.normal(0.0, 0.5, force.size)
     return Recording(
         f"run-{seed}", time_s, {"carriage_position_m": position, "drive_force_n": force}
