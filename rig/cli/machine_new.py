@@ -3,13 +3,18 @@
 import sys
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import numpy as np
 import typer
 
 from estimation.channels import UnknownUnitError, unit_of
 from estimation.plant import Actuator, Axis, Plant, PlantError, Reads, Sensor, Transmission
 from estimation.toml_table import value_text
 from rig.errors import UsageError
+
+if TYPE_CHECKING:
+    from rig.importers.table.raw import Values
 
 MOST_REMARK = 100
 """Characters of a remark on a column."""
@@ -107,6 +112,7 @@ UNMAPPED = "COLUMN:UNIT"
 """Source of a channel that is yet to be stated."""
 
 FILE_NAME = r"# file_name = 'run_(?P<load>\d+)g'  # each named group is a condition's value"
+SIDE_FILE = '# side_file = "about.csv"  # columns: file, and one for each single value'
 CONDITIONS = ("# [data.conditions]  # constant in a run", '# load_mass_kg = "load:g"')
 
 
@@ -114,9 +120,11 @@ def data_text(table: Path, plant: Plant) -> str:
     """Return `[data]` for a table: a line for each channel, and the table's columns as remarks."""
     from rig.importers.table.data import Data
     from rig.importers.table.mapping import ColumnMapping
-    from rig.importers.table.open import read_largest
+    from rig.importers.table.open import read_largest, read_raw, side_file_of
 
     raw = read_largest(table, ColumnMapping(Data()))
+    if side := side_file_of(raw.path):
+        raw = read_raw(raw.path, ColumnMapping(Data(side_file=side)))
     channels = [*(a.name for a in plant.actuators), *(s.name for s in plant.sensors)]
     lines = ["", f"# Columns of {raw.path.name}, with the first sample:"]
     lines += [f"#   {_line(name, x[0])}" for name, x in raw.columns.items() if len(x)]
@@ -126,6 +134,7 @@ def data_text(table: Path, plant: Plant) -> str:
         "[data]",
         f'# files = "*{raw.path.suffix}"  # of a folder',
         FILE_NAME,
+        f"side_file = {value_text(side)}" if side else SIDE_FILE,
         "",
         "[data.columns]",
     ]
@@ -134,7 +143,20 @@ def data_text(table: Path, plant: Plant) -> str:
             lines.append(f"{channel} = {value_text(channel)}")
         else:
             lines.append(f'# {channel} = "{UNMAPPED}"')
-    return "\n".join([*lines, "", *CONDITIONS]) + "\n"
+    trials = next((name for name, x in raw.columns.items() if _is_of_trials(x)), "trial")
+    runs = (
+        "# [data.runs]  # where a file holds several runs",
+        f"# changes = [{value_text(trials)}]  # a new value begins a run; or gap_s, resets, lap_s",
+    )
+    return "\n".join([*lines, "", *CONDITIONS, "", *runs]) + "\n"
+
+
+def _is_of_trials(column: "Values", longest: int = 50) -> bool:
+    """Whether a column may number runs: each of its values stands in one long block."""
+    if not len(column) or (column.dtype.kind == "f" and (column != np.rint(column)).any()):
+        return False
+    starts = 1 + np.count_nonzero(column[1:] != column[:-1])
+    return bool(1 < starts == len(set(column.tolist())) <= len(column) / longest)
 
 
 def _line(name: str, value: object) -> str:

@@ -514,6 +514,31 @@ def test_the_columns_of_the_data_are_shown_and_not_those_of_a_side_table(tmp_pat
     assert "Weg [mm]" in printed
 
 
+def test_a_new_file_names_the_side_file_and_how_several_runs_in_a_file_are_cut(tmp_path, said):
+    folder, out, words = (
+        tmp_path / "runs",
+        tmp_path / "m.toml",
+        "--axis a:m --sensor a:a_position_m",
+    )
+    folder.mkdir()
+    rows = "".join(f"{k / 100},{k % 7},{k // 100}\n" for k in range(300))
+    for name in ("run_1", "run_2"):
+        (folder / f"{name}.csv").write_text(f"t,x,lap\n{rows}")
+    said("machine new", out, words, "--from", folder)
+    text = out.read_text()
+    assert '# side_file = "about.csv"  # columns: file, ' in text
+    assert '# [data.runs]  # where a file holds several runs\n# changes = ["lap"]  # ' in text
+    (folder / "loads.csv").write_text("file,load\nrun_1,0\nrun_2,8\n")
+    said("machine new", tmp_path / "m2.toml", words, "--from", folder)
+    text = (tmp_path / "m2.toml").read_text()
+    assert '\nside_file = "loads.csv"\n' in text
+    assert "# Single value load: 0" in text
+    text = text.replace('# time_s = "COLUMN:UNIT"', 'time_s = "t"')
+    text = text.replace('# a_position_m = "COLUMN:UNIT"', 'a_position_m = "x:mm"')
+    (tmp_path / "m2.toml").write_text(text)
+    assert "a_position_m" in said("import --preview --machine", tmp_path / "m2.toml", folder).out
+
+
 @pytest.mark.parametrize("both", [True, False])
 def test_a_transmission_bends_where_both_its_travels_are_read(tmp_path, said, both):
     words = "--axis motor:rad --axis slide:m --transmission motor:slide:200"

@@ -248,6 +248,21 @@ def _named_in(file: Path, mapping: ColumnMapping, decimal: str) -> dict[str, flo
     return {n: float(numbers[n]) if is_number(numbers[n]) else texts[n] for n in texts}
 
 
+def side_file_of(file: Path) -> str:
+    """Return the name of the table next to a file that has a line for it; empty without one."""
+    for side in sorted(file.parent.glob("*.csv")):
+        try:
+            with side.open(encoding="utf-8-sig") as lines:
+                if side == file or "file" not in next(lines, ""):
+                    continue
+            named = read_delimited(side, Layout()).columns.get("file", ())
+        except (OSError, UnicodeDecodeError, DataError):
+            continue
+        if {file.name, file.stem} & {str(cell) for cell in named}:
+            return side.name
+    return ""
+
+
 def _beside(file: Path, mapping: ColumnMapping) -> dict[str, float | str]:
     name = mapping.data.side_file
     if not name:
