@@ -127,6 +127,25 @@ parameters.inertia = { value = 180.0, unit = "kg" }
     assert 'unit = "N s^2/m"' in to_toml(parse(text))
 
 
+def test_an_order_along_a_position_that_was_written_without_a_unit_is_read():
+    text = """
+schema = "rig.model/1"
+name = "axis"
+balance = "axis"
+target = "drive_force_n"
+[processing]
+[[effects]]
+id = "ripple.motor"
+channels.motor_angle = "axis_position_m"
+parameters.order = { value = 1571.0, unit = "1" }
+"""
+    assert 'unit = "rad/m"' in to_toml(parse(text))
+    shaft = text.replace("axis_position_m", "axis_angle_rad")
+    assert 'unit = "1"' in to_toml(parse(shaft))
+    with pytest.raises(ModelFileError, match="order is stated in 'rad/m'"):
+        parse(shaft.replace('"1"', '"rad/m"'))
+
+
 def test_a_missing_file_names_the_shipped_ones_and_one_without_a_model_is_refused(tmp_path):
     with pytest.raises(ModelFileError, match="holds no model"):
         parse_all('schema = "rig.models/1"\nmodels = []\n')
