@@ -138,8 +138,7 @@ def answer(
         notes=tuple(dict.fromkeys(said)),  # two findings of one family may have the same note
         seconds=time.perf_counter() - began,
     )
-    kept = tuple(one for one, _ in judged)
-    return Answer(diagnosis, layout, found, kept, refits, tuple(written))
+    return Answer(diagnosis, layout, found, tuple(k for k, _ in judged), refits, tuple(written))
 
 
 def _of_one_sign(
