@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from estimation.effects.effect import Parameter, Parameters
 from estimation.effects.ripple_output import OutputHarmonics
-from estimation.effects.waves import Waves, harmonics_in
+from estimation.effects.waves import Waves, harmonics_in, order_of
 
 
 class EccentricLoad(Waves):
@@ -25,11 +25,7 @@ class EccentricLoad(Waves):
         Parameter("sine", "target / load", "eccentricity along one axis, of the lever arm"),
         Parameter("cosine", "target / load", "eccentricity along the other"),
     )
-    shape = (
-        Parameter(
-            "order", "rad / output_angle", "periods per turn", 0.5, 16.5, linear=True, points=33
-        ),
-    )
+    shape = order_of("output_angle", 0.5, 16.5, points=33)
     told_apart_by = "the same sweep against two loads"
 
 
@@ -70,9 +66,5 @@ class EccentricPulley(OutputHarmonics):
     family = "eccentric.load"
     balances: ClassVar = {"gearbox": 1, "stretch": 1}
     amplitudes = harmonics_in("target")
-    shape = (
-        Parameter(
-            "order", "rad / output_angle", "periods per turn", 0.5, 16.5, linear=True, points=33
-        ),
-    )
+    shape = order_of("output_angle", 0.5, 16.5, points=33)
     told_apart_by = "the same sweep against two loads"

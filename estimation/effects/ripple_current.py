@@ -2,8 +2,7 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import Parameter
-from estimation.effects.waves import Waves, waves_in
+from estimation.effects.waves import Waves, order_of, waves_in
 
 
 class CurrentRipple(Waves):
@@ -24,9 +23,5 @@ class CurrentRipple(Waves):
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"motor_angle": "motor_angle_rad", "current": "motor_current_a"}
     amplitudes = waves_in("target / current")
-    shape = (
-        Parameter(
-            "order", "rad / motor_angle", "periods per turn", 0.5, 20.5, linear=True, points=401
-        ),
-    )
+    shape = order_of("motor_angle", 0.5, 20.5, points=401)
     told_apart_by = "the same slow sweep at two currents"

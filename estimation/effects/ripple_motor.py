@@ -2,8 +2,7 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import Parameter
-from estimation.effects.waves import Waves
+from estimation.effects.waves import Waves, order_of
 
 
 class MotorRipple(Waves):
@@ -22,9 +21,5 @@ class MotorRipple(Waves):
     id = "ripple.motor"
     balances: ClassVar = {"motor": -1, "grasp": -1}
     roles: ClassVar = {"motor_angle": "motor_angle_rad"}
-    shape = (
-        Parameter(
-            "order", "rad / motor_angle", "periods per turn", 0.5, 20.5, linear=True, points=401
-        ),
-    )
+    shape = order_of("motor_angle", 0.5, 20.5, points=401)
     told_apart_by = "a sweep at a slow constant speed, and coasting without current"

@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import READING, Parameter
-from estimation.effects.waves import Waves, harmonics_in
+from estimation.effects.effect import READING
+from estimation.effects.waves import Waves, harmonics_in, order_of
 
 
 class OutputRipple(Waves):
@@ -24,11 +24,7 @@ class OutputRipple(Waves):
     balances: ClassVar = {**READING, "motor": -1, "grasp": -1}
     roles: ClassVar = {"output_angle": "spindle_angle_rad"}
     # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
-    shape = (
-        Parameter(
-            "order", "rad / output_angle", "periods per turn", 1.0, 32.0, linear=True, points=63
-        ),
-    )
+    shape = order_of("output_angle", 1.0, 32.0, points=63)
     told_apart_by = "a sweep at a slow constant speed over several turns, and under another load"
 
 
@@ -52,8 +48,4 @@ class OutputHarmonics(OutputRipple):
     )
     amplitudes = harmonics_in("target")
     # the spindle turns by a third of a turn: orders closer than 0.5 are indistinguishable
-    shape = (
-        Parameter(
-            "order", "rad / output_angle", "periods per turn", 1.0, 16.0, linear=True, points=31
-        ),
-    )
+    shape = order_of("output_angle", 1.0, 16.0, points=31)

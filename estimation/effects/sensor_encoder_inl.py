@@ -2,8 +2,7 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import Parameter
-from estimation.effects.waves import Waves, harmonics_in
+from estimation.effects.waves import Waves, harmonics_in, order_of
 
 
 class EncoderNonlinearity(Waves):
@@ -29,9 +28,7 @@ class EncoderNonlinearity(Waves):
     id = "sensor.encoder_inl"
     balances: ClassVar = {"gearbox": 1, "stretch": 1}
     roles: ClassVar = {"encoder": "motor_angle_rad"}
-    shape = (
-        Parameter("order", "rad / encoder", "periods per turn", 1.0, 32.0, linear=True, points=32),
-    )
+    shape = order_of("encoder", 1.0, 32.0, points=32)
     told_apart_by = (
         "a slow sweep without load, repeated with the other sensor turned by half a turn"
     )
@@ -52,6 +49,4 @@ class EncoderHarmonics(EncoderNonlinearity):
     id = "sensor.encoder_inl.harmonics"
     meaning = "an angle reading with an error periodic in the angle, not as a pure sine"
     amplitudes = harmonics_in("target")
-    shape = (
-        Parameter("order", "rad / encoder", "periods per turn", 1.0, 16.0, linear=True, points=16),
-    )
+    shape = order_of("encoder", 1.0, 16.0, points=16)

@@ -21,6 +21,12 @@ def harmonics_in(unit: str) -> Parameters:
     )
 
 
+def order_of(role: str, lower: float, upper: float, points: int) -> Parameters:
+    """Return the order of a wave over an angle or a position, with its range and its grid."""
+    of = "periods per turn"
+    return (Parameter("order", f"rad / {role}", of, lower, upper, linear=True, points=points),)
+
+
 class Waves(Pointwise):
     """A periodic effect: the first role is its angle; a second one multiplies the waves.
 
