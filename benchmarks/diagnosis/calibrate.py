@@ -131,7 +131,7 @@ def main() -> int:
         try:
             done.append(_searched(options.out, kind, options.seed + k, models))
             sys.stderr.write(f"{number} of {len(asked)}: {done[-1].name}\n")
-        except NoCaseError as error:  # about one seed in a thousand
+        except NoCaseError as error:  # no rig of this seed can be drawn
             sys.stderr.write(f"{number} of {len(asked)} left out: {error}\n")
     write_text_atomic(options.page, _page(done, options.seed))
     sys.stderr.write(f"{options.page} written\n")

@@ -8,7 +8,7 @@ standstill friction takes any value.
 """
 
 import itertools
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -82,7 +82,7 @@ class Solved:
 
 @dataclass(frozen=True)
 class Errors:
-    """Squared errors of test runs.
+    """Squared errors of runs.
 
     Attributes:
         centred: Run to the sum of squares, its mean removed.
@@ -194,7 +194,10 @@ class Refit:
 
     def errors(self, solved: Solved, without: Collection[str] = ()) -> Errors:
         """Return the errors on the test runs, or on some of them."""
-        names = [name for name in self.test_names if name not in without]
+        return self.errors_in(solved, [name for name in self.test_names if name not in without])
+
+    def errors_in(self, solved: Solved, names: Iterable[str]) -> Errors:
+        """Return the errors on some runs."""
         found = [(name, self.residuals(solved, name)) for name in names]
         left = {name: one[-1] for name, one in found if one is not None}
         return Errors(

@@ -95,11 +95,9 @@ class Refits:
 
         Root mean squares, in the target's unit, less the mean where runs have offsets of their own.
         """
-        solved, own = self.after(name), self.layout.equations[name].model.run_offsets
-        found = {r: self.of[name].residuals(solved, r) for r in self.of[name].recordings}
-        left = {run: one[-1] for run, one in found.items() if one is not None}
-        spread = np.std if own else lambda x: np.sqrt(np.mean(x**2))
-        return {run: float(spread(x)) for run, x in left.items() if len(x)}
+        found = self.of[name].errors_in(self.after(name), self.of[name].recordings)
+        own_offsets = self.layout.equations[name].model.run_offsets
+        return (found if own_offsets else found.with_means()).by_run
 
     def models(self) -> list[Model]:
         """Return the models with the causes that a file can hold; see `Refit.written`."""

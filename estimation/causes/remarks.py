@@ -93,12 +93,12 @@ def far(layout: Layout, sizes: Mapping[str, Mapping[str, float]]) -> Iterator[st
 
     `sizes` has the error of each equation in each run, in the unit of the target.
     """
-    noises = over_noise(layout, {name: max(found.values()) for name, found in sizes.items()})
-    for name, found in sizes.items():
-        *_, second, largest = ("", "", *sorted(found, key=found.__getitem__))
-        if not second or not is_unexplained(noises.get(name, math.inf)):
-            continue
-        if found[largest] > LARGER * found[second]:
+    several = {name: found for name, found in sizes.items() if len(found) > 1}
+    ratios = over_noise(layout, {name: max(found.values()) for name, found in several.items()})
+    for name, found in several.items():
+        *_, second, largest = sorted(found, key=found.__getitem__)
+        is_far = found[largest] > LARGER * found[second]
+        if is_far and is_unexplained(ratios.get(name, math.inf)):
             factor = f"{found[largest] / max(found[second], TINY):.2g}"
             yield (
                 f"{name}: the error in {largest} is {factor} times that in any other run. Check"
