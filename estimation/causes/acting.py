@@ -1,8 +1,9 @@
 """Causes of some of the runs: in which of them, and declared terms with another factor there."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +29,24 @@ TURNS = 4
 """Turns of fitting an effect to the runs that have it, and of choosing these runs."""
 
 
-def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, Products]]) -> list[Claim]:
-    """Return named effects that act in some of the runs, as promising as there are."""
+class Promise(NamedTuple):
+    """A choice of some of the runs in which a named effect may act.
+
+    Attributes:
+        removed: Weighted error that it removes there.
+        claim: The effect.
+        acts: Whether it acts in each run, shape (runs,).
+        amplitudes: Its amplitudes, in the scale of its columns, shape (k,).
+    """
+
+    removed: float
+    claim: Claim
+    acts: NDArray[np.bool_]
+    amplitudes: FloatArray
+
+
+def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, Products]]) -> list[Promise]:
+    """Return choices of some of the runs in which named effects may act."""
     count = len(joint.runs)
     if count < 6:
         return []
@@ -38,28 +55,34 @@ def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, Products]]) -> 
     for claim, by_run in everything:
         if not claim.is_function:
             named.setdefault(by_run.target.shape[1], []).append((claim, by_run))
-    promise: list[tuple[float, Claim, NDArray[np.bool_], FloatArray]] = []
+    promises: list[Promise] = []
     for group in named.values():
         products = Products(*map(np.stack, zip(*(by_run for _, by_run in group), strict=True)))
         for acts in _acting(inverse, products):
-            gains, amplitudes = _removed(inverse, *(_over(acts, x) for x in products))
+            removed, amplitudes = _removed(inverse, *(_over(acts, x) for x in products))
             acting = acts.sum(axis=1)
             some = np.flatnonzero((acting > 1) & (acting < count))
-            promise += [(float(gains[k]), group[k][0], acts[k], amplitudes[k]) for k in some]
-    promise.sort(key=lambda p: -p[0])
-    tried, seen = [], dict[object, set[tuple[bool, ...]]]()
-    for _, claim, runs, scaled in promise:
+            promises += [
+                Promise(float(removed[k]), group[k][0], acts[k], amplitudes[k]) for k in some
+            ]
+    return promises
+
+
+def most_promising(promises: Iterable[Promise]) -> list[Promise]:
+    """Return the choices of runs that remove most, a few of each of the first names."""
+    kept, seen = [], dict[object, set[tuple[bool, ...]]]()
+    for promise in sorted(promises, key=lambda p: -p.removed):
+        claim = promise.claim
         if claim.name not in seen and len(seen) == PARTIAL:
             continue
         size = claim.size if isinstance(claim, Candidate) else 1.0
-        if not is_possible(claim.cause, scaled / size):
+        if not is_possible(claim.cause, promise.amplitudes / size):
             continue
-        known = seen.setdefault(claim.name, set())
-        chosen = tuple(runs.tolist())
+        known, chosen = seen.setdefault(claim.name, set()), tuple(promise.acts.tolist())
         if len(known) < CHOICES and chosen not in known:
             known.add(chosen)
-            tried.append(Claim(claim.cause, chosen, claim.choices))
-    return tried
+            kept.append(promise)
+    return kept
 
 
 def in_other_runs(candidate: Candidate) -> Iterator[Claim]:

@@ -127,7 +127,9 @@ def candidates(joint: Joint) -> list[Group]:
 
 def pool_of(joint: Joint, claims: Iterable[Claim]) -> list[Group]:
     """Return claims laid out, each with the number of choices that it is one of."""
-    train, pool = joint.layout, groups_of(joint, claims)
+    train, pool = joint.layout, list[Group]()
+    for _, at_one in itertools.groupby(claims, lambda one: one.cause.place.name):
+        pool += groups_of(joint, at_one)
     for run in (*train.runs, *train.shaken):
         run.memo.clear()  # columns of the whole run, many times as large as those on the grid
     causes = [c.cause for group in pool for c in group.candidates]
@@ -171,23 +173,22 @@ def _choices(cause: Source | Function, count: Mapping[tuple[str, str], int]) -> 
 
 
 def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:
-    """Return causes laid out that come place by place; those that show nowhere are left out."""
+    """Return causes laid out; those that show nowhere are left out."""
     out: list[Group] = []
-    for _, at_one in itertools.groupby(wanted, lambda one: one.cause.place.name):
-        waiting: dict[object, list[Raw]] = {}
-        for one in at_one:
-            if (columns := _columns(one, joint.runs)) is None:
-                continue
-            noisy = _is_noisy(joint.layout, one)
-            shaken = _columns(one, joint.layout.shaken) if noisy else None
-            width = next(iter(columns[0].values())).shape[1]
-            key = (tuple(columns[0]), width, _unit(one.cause), one.has_means(joint), shaken is None)
-            held = waiting.setdefault(key, [])
-            held.append((one, columns, shaken))
-            if len(held) * width**2 >= AT_ONCE:
-                out += _laid(joint, waiting.pop(key))
-        for held in waiting.values():
-            out += _laid(joint, held)
+    waiting: dict[object, list[Raw]] = {}
+    for one in wanted:
+        if (columns := _columns(one, joint.runs)) is None:
+            continue
+        noisy = _is_noisy(joint.layout, one)
+        shaken = _columns(one, joint.layout.shaken) if noisy else None
+        width = next(iter(columns[0].values())).shape[1]
+        key = (tuple(columns[0]), width, _unit(one.cause), one.has_means(joint), shaken is None)
+        held = waiting.setdefault(key, [])
+        held.append((one, columns, shaken))
+        if len(held) * width**2 >= AT_ONCE:
+            out += _laid(joint, waiting.pop(key))
+    for held in waiting.values():
+        out += _laid(joint, held)
     return out
 
 

@@ -35,6 +35,9 @@ ROLE_OF_VARIABLE = {
 }
 """Variable to the role of an effect that its channel plays, where the names differ."""
 
+OVER_WIDTH = ("velocity_sign", "dwell")
+"""Variables that depend on the speed over which friction changes its sign."""
+
 TURN = 2.0 * math.pi
 LEAST_TURNS = 1.5
 """Turns of an angle in some run from which friction may repeat with every turn of it."""
@@ -94,7 +97,8 @@ class Function:
             if "turn" in self.variables:  # what repeats in both directions is a ripple
                 return values[:, None]
             return np.column_stack([np.ones(len(values)), values])
-        return run.once(("hats", variable, channel, knots), lambda: _hats(values, knots))
+        width = self.width if variable in OVER_WIDTH else 0.0
+        return run.once(("hats", variable, channel, knots, width), lambda: _hats(values, knots))
 
 
 def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
@@ -166,7 +170,7 @@ def variable_of(
 
 
 def _values_of(run: RunSignals, variable: str, name: str, width: float) -> FloatArray:
-    key = (variable, name, width if variable == "velocity_sign" else 0.0)
+    key = (variable, name, width if variable in OVER_WIDTH else 0.0)
     return run.once(key, lambda: _worked_out(run, variable, name, width))
 
 

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -206,7 +206,7 @@ def _turned(joint: Joint, group: Group, outcome: Outcome) -> NDArray[np.bool_]:
     return found
 
 
-def best_of_each(scored: Sequence[Scored]) -> list[Scored]:
+def best_of_each(scored: Iterable[Scored]) -> list[Scored]:
     """Return the best candidate of each name, best first."""
     best: dict[object, Scored] = {}
     for one in scored:

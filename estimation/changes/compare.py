@@ -24,8 +24,9 @@ from estimation.causes.layout import Layout, lay_out
 from estimation.causes.levels import with_levels
 from estimation.causes.nuisances import skews, with_skews
 from estimation.causes.numbers import Numbers
+from estimation.causes.ranking import Rank, Ranking
 from estimation.causes.scoring import Scored, assessed, best_of_each
-from estimation.causes.search import Rank, Ranking, hypothesis
+from estimation.causes.search import hypothesis
 from estimation.changes.candidates import claims
 from estimation.changes.difference import Difference, Predicted
 from estimation.changes.stated import likeliest_first, prior_of_moved, shares, stated

@@ -12,7 +12,7 @@ from estimation.causes.folds import folds_of, unvaried
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.layout import lay_out
-from estimation.causes.search import competing
+from estimation.causes.ranking import Ranking
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.result import Finding
 from estimation.diagnosis.split import split
@@ -292,7 +292,7 @@ def test_two_equations_may_read_the_same_current():
     layout = lay_out([one, replace(one, balance="again")], runs, [run.name for run in runs])
     add_instruments(layout, [run.name for run in runs])
     joint = Joint(layout)
-    ranked = competing(joint, candidates(joint), folds_of(layout))
+    ranked = Ranking(joint, candidates(joint), folds_of(layout)).next_to([])
     assert ranked
 
 
