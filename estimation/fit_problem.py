@@ -10,6 +10,7 @@ from estimation.campaign import Campaign
 from estimation.derived import CAMPAIGN_TIME, measured_channels
 from estimation.effects import Parameter
 from estimation.errors import EstimationError
+from estimation.filters import LowPass
 from estimation.model import Model, Term, balance_channels, settled
 from estimation.noise import white_noise
 from estimation.recording import FloatArray, Recording
@@ -40,12 +41,18 @@ class FitRun:
     whole: Recording
     places: NDArray[np.intp]
     thin: Recording
+    low_pass: LowPass
 
-    def columns(self, term: Term, shape: Sequence[float]) -> FloatArray:
-        """Return an effect's columns at the samples of the fit."""
+    def columns(
+        self, term: Term, shape: Sequence[float], places: NDArray[np.intp] | None = None
+    ) -> FloatArray:
+        """Return an effect's columns at samples of the run, by default at those of the fit."""
         if term.effect.start():  # it depends on the samples between
-            return np.asarray(term.columns(self.whole, shape)[self.places])
-        return term.columns(self.thin, shape)
+            return np.asarray(
+                term.columns(self.whole, shape)[self.places if places is None else places]
+            )
+        some = self.thin if places is None or places is self.places else self.whole.at(places)
+        return term.columns(some, shape, self.low_pass)
 
 
 @dataclass(frozen=True)
@@ -104,7 +111,7 @@ def prepared(model: Model, campaign: Campaign, every: int | None = None) -> list
         whole = balance_channels(model, recording)
         places = settled(model, whole, step)
         if places.size:
-            runs.append(FitRun(whole, places, whole.at(places)))
+            runs.append(FitRun(whole, places, whole.at(places), model.low_pass))
     if not runs:
         longest_s = max((recording.duration_s for recording in campaign.evidence), default=0.0)
         if 0.0 < longest_s < model.low_pass.reach_s:
@@ -146,7 +153,7 @@ def noisier(model: Model, campaign: Campaign, runs: Sequence[FitRun]) -> list[Fi
             noise = white_noise(recording, read, model.signals)
             doubled = recording.with_columns(**{c: recording[c] + noise[c] for c in read})
             whole, at = balance_channels(model, doubled), places[recording.name]
-            out.append(FitRun(whole, at, whole.at(at)))
+            out.append(FitRun(whole, at, whole.at(at), model.low_pass))
     return out
 
 

@@ -9,15 +9,17 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation import derived, live_channels
 from estimation.channels import evaluate, unit_of
-from estimation.effects import Effect, Parameter
+from estimation.effects import Effect, Parameter, Waves
 from estimation.errors import EstimationError, nearest
 from estimation.filters import PAPER, LowPass
+from estimation.passed import passed
 from estimation.recording import FloatArray, Recording
 from estimation.rest import SPINDLE_SPEED
 from estimation.signals import Samples, Signals, reference
@@ -127,12 +129,40 @@ class Term:
         """Signed amplitudes, one a column."""
         return [self.sign * value for value in self.numbers(self.effect.amplitudes)]
 
+    @property
+    def turning(self) -> str:
+        """The channel of the angle or the position that a wave repeats with; empty of others."""
+        return self.channels[self.effect.turning] if isinstance(self.effect, Waves) else ""
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The channels of its columns: a wave is passed by the filter as its speed allows."""
+        speeds = derived.rates_of(self.turning)[:1]
+        return tuple(dict.fromkeys((*self.channels.values(), *speeds)))
+
     def columns(
-        self, channels: Mapping[str, FloatArray] | Recording, shape: Sequence[float]
+        self,
+        channels: Mapping[str, FloatArray] | Recording,
+        shape: Sequence[float],
+        low_pass: LowPass | None = None,
     ) -> FloatArray:
-        """Return the effect's columns on a run's channels, without sign, shape (n, columns)."""
+        """Return the effect's columns on a run's channels, without sign, shape (n, columns).
+
+        With the filter that the channels went through, a wave is what the filter passes of it.
+        """
         inputs = {role: channels[channel] for role, channel in self.channels.items()}
-        return self.effect.columns(inputs, shape)
+        columns = self.effect.columns(inputs, shape)
+        gains = self.passed(channels, shape, low_pass) if low_pass is not None else []
+        return np.asarray(columns * np.column_stack(gains)) if gains else columns
+
+    def passed(
+        self, channels: Mapping[str, Any] | Recording, shape: Sequence[float], low_pass: LowPass
+    ) -> list[Any]:
+        """Return what the filter passes of each column of a wave; empty of another effect."""
+        if not isinstance(self.effect, Waves):
+            return []
+        speed = channels[self.reads[-1]]
+        return [passed(order, speed, low_pass) for order in self.effect.orders(shape)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +243,7 @@ class Model:
     @property
     def channels(self) -> tuple[str, ...]:
         """Channels the effects read, without the target."""
-        names = (name for term in self.terms for name in term.channels.values())
+        names = (name for term in self.terms for name in term.reads)
         return tuple(dict.fromkeys(names))
 
     @property
@@ -284,7 +314,8 @@ def estimate(model: Model, channels: Mapping[str, FloatArray] | Recording) -> Fl
         NotFittedError: A parameter has no value.
     """
     parts = [
-        term.columns(channels, term.numbers(term.effect.shape)) @ np.array(term.weights)
+        term.columns(channels, term.numbers(term.effect.shape), model.low_pass)
+        @ np.array(term.weights)
         for term in model.terms
     ]
     total: FloatArray = np.sum(parts, axis=0)

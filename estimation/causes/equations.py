@@ -76,17 +76,15 @@ class Equation:
 
     def columns(self, channels: Mapping[str, FloatArray]) -> FloatArray:
         """Return the declared columns, signed, and their derivatives by the shapes, (n, k)."""
-        parts = []
+        parts, low_pass = [], self.model.low_pass
         for term in self.terms:
             shape = term.numbers(term.effect.shape)
             weights = np.array(term.numbers(term.effect.amplitudes))
-            parts.append(term.sign * term.columns(channels, shape))
+            parts.append(term.sign * term.columns(channels, shape, low_pass))
             for k, value in enumerate(shape):
                 step = SHAPE_STEP * (abs(value) or 1.0)
-                ends = [
-                    term.columns(channels, [*shape[:k], value + s * step, *shape[k + 1 :]])
-                    for s in (1, -1)
-                ]
+                moved = [[*shape[:k], value + s * step, *shape[k + 1 :]] for s in (1, -1)]
+                ends = [term.columns(channels, own, low_pass) for own in moved]
                 scale = weights if np.any(weights) else np.ones(len(weights))
                 parts.append(term.sign * ((ends[0] - ends[1]) @ scale)[:, None])
         return np.hstack(parts)
@@ -141,7 +139,8 @@ class Equation:
         """Return the right-hand side without offsets, shape (n,)."""
         return np.asarray(
             sum(
-                term.columns(channels, term.numbers(term.effect.shape)) @ np.array(term.weights)
+                term.columns(channels, term.numbers(term.effect.shape), self.model.low_pass)
+                @ np.array(term.weights)
                 for term in self.terms
             )
         )

@@ -14,7 +14,7 @@ from estimation.causes.scoring import Scored, posterior
 from estimation.causes.sources import LATE, Source
 from estimation.causes.unsteady import Unsteady
 from estimation.diagnosis.result import Finding, Value
-from estimation.effects import Parameter, Proportional
+from estimation.effects import Proportional
 from estimation.model import Model, Term
 
 SURE = 0.9
@@ -179,11 +179,9 @@ def _amplitudes_and_shape(
         acting = [run for run in refits.layout.runs if run.name in finding.runs_affected]
         return {"change": Value(cause.change(amplitude, acting), unit, None)}
     if (term := written_term(kept, model)) is not None:
-        share = 1.0 if cause.place.kind == "angle sensor" else cause.passed(refits.layout.runs)
+        values = term.values
         return {
-            p.name: _unfiltered(
-                term, p, model.target, share if p in term.effect.amplitudes else 1.0
-            )
+            p.name: Value(values[p.name].value, term.unit(p, model.target), values[p.name].ci95)
             for p in term.parameters
         }
     units = Term(cause.effect, channels=dict(cause.channels))
@@ -194,15 +192,6 @@ def _amplitudes_and_shape(
     if elsewhere := _elsewhere(kept, finding, refits):
         return {**elsewhere, **shape}
     return {**_refitted(kept, home, refits), **shape}
-
-
-def _unfiltered(term: Term, parameter: Parameter, target: str, share: float) -> Value:
-    """Return a parameter as it was before the channels' filter passed a share of it."""
-    known, unit = term.values[parameter.name], term.unit(parameter, target)
-    if known.ci95 is None:
-        return Value(known.value / share, unit, None)
-    low, high = known.ci95
-    return Value(known.value / share, unit, (low / share, high / share))
 
 
 def _elsewhere(kept: Kept, finding: Finding, refits: Refits) -> Mapping[str, Value]:

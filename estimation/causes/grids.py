@@ -12,8 +12,7 @@ import numpy as np
 from estimation.causes.angles import signals_of, travel_of
 from estimation.causes.layout import Layout
 from estimation.causes.places import Place, direction_width
-from estimation.causes.sources import TURNING
-from estimation.effects import Effect, Parameter
+from estimation.effects import Effect, Parameter, Waves
 from estimation.rest import longest_rest_s
 
 NARROW = 0.02
@@ -34,9 +33,8 @@ def axis(
         return [0.0]  # play is crossed where the load changes its side
     if parameter.name == "harmonic":
         return _harmonics(layout, parameter, channels["position"])
-    if parameter.name == "order":
-        role = next(r for r in TURNING if r in channels)
-        return _orders(layout, effect, channels[role])
+    if isinstance(effect, Waves):
+        return _orders(layout, effect, channels[effect.turning])
     relative = RELATIVE.get((effect.id, parameter.name)) or RELATIVE.get(parameter.name)
     if effect.id == "friction.dwell" and relative is not None:
         return _rests(layout, parameter, channels, relative)

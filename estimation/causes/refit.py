@@ -339,7 +339,7 @@ class Refit:
     def _run(self, parts: Sequence[Addition], name: str) -> tuple[FitRun, NDArray[np.intp]] | None:
         """Return a run and the samples that its error counts; None without a sample to fit."""
         terms = [p.term for p in parts if p.term is not None]
-        key = frozenset(c for t in terms for c in t.channels.values()) - {*self.model.channels}
+        key = frozenset(c for t in terms for c in t.reads) - {*self.model.channels}
         held = self._runs.setdefault(key, {})
         if name not in held:
             model = replace(self.model, terms=(*self.model.terms, *terms))
@@ -410,8 +410,4 @@ def _table(
 
 def _columns(term: Term, run: FitRun, places: NDArray[np.intp] | None = None) -> FloatArray:
     """Return a term's signed columns at places of a run, by default at those that are fitted."""
-    places = run.places if places is None else places
-    shape = term.numbers(term.effect.shape)
-    if term.effect.start():
-        return term.sign * term.columns(run.whole, shape)[places]
-    return term.sign * term.columns(run.whole.at(places), shape)
+    return term.sign * run.columns(term, term.numbers(term.effect.shape), places)

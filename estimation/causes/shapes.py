@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.causes.sources import LATE, TURNING
+from estimation.causes.sources import LATE
 from estimation.effects import Parameter
 from estimation.model import Estimate, Term
 from estimation.recording import FloatArray
@@ -54,9 +54,8 @@ def _channel(term: Term, shape: Parameter) -> str:
     """
     if shape.name != "order":
         return term.channels.get(shape.unit, "")
-    turning = next(channel for role, channel in term.channels.items() if role in TURNING)
-    is_whole = turning.endswith("_angle_rad") and term.values[shape.name].value.is_integer()
-    return "" if is_whole else turning
+    is_whole = term.turning.endswith("_angle_rad") and term.values[shape.name].value.is_integer()
+    return "" if is_whole else term.turning
 
 
 def slopes(

@@ -10,15 +10,13 @@ import numpy as np
 from estimation.causes.instruments import signal
 from estimation.causes.places import CLOCKS, Place
 from estimation.causes.run_signals import ANGLES, RunSignals
-from estimation.effects import Effect, Pointwise
+from estimation.effects import Effect, Pointwise, Waves
 from estimation.filters import holoborodko_derivative
+from estimation.passed import passed
 from estimation.recording import FloatArray
 
 ANGLE_STEP_RAD = 1e-4
 """Step of a derivative by an angle."""
-
-TURNING = ("motor_angle", "output_angle", "encoder")
-"""Roles of an angle that a wave repeats with."""
 
 READ_LATE = ("sensor.delay", "sensor.lag")
 LATE = (*READ_LATE, "motor.electrical")
@@ -125,15 +123,15 @@ class Source:
         """Whether its columns need no other samples than those that are regressed on."""
         return isinstance(self.effect, Pointwise) and not any(e.order for e in self.place.enters)
 
-    @cached_property
+    @property
     def is_wave(self) -> bool:
         """Whether it repeats with an angle or a position."""
-        return any(parameter.name == "order" for parameter in self.effect.shape)
+        return isinstance(self.effect, Waves)
 
-    @cached_property
+    @property
     def turning(self) -> str:
         """The role of the angle or position that a wave repeats with."""
-        return next(role for role, _ in self.channels if role in TURNING)
+        return self.effect.turning if isinstance(self.effect, Waves) else ""
 
     def directed(self, amplitude: float) -> "Source":
         """Return a cause that was found by its odd part, with the direction that this shows.
@@ -152,22 +150,6 @@ class Source:
         """
         found = _worked_out(self, self._names(run, self.place.home), run, "")
         return None if found is None else found[:, list(self.parts)]
-
-    def passed(self, runs: Sequence[RunSignals]) -> float:
-        """Return the share of a wave that the channels' filter passes; 1 of another effect."""
-        if not self.is_wave:
-            return 1.0
-        order = dict(zip((p.name for p in self.effect.shape), self.shape, strict=True))["order"]
-        after = before = 0.0
-        for run in runs:
-            if (filtered := self.values(run)) is None:
-                return 1.0
-            gain = _passed(run, dict(self.channels)[self.turning], order)
-            gain = gain[run.grid] if self.on_grid else gain
-            power = np.sum(filtered**2, axis=1)
-            after += float(np.sum(power / gain))
-            before += float(np.sum(power / gain**2))
-        return after / before if before > 0.0 else 1.0
 
     def columns(self, run: RunSignals) -> Mapping[str, FloatArray] | None:
         """Return the source's columns in every equation it enters, at the samples each counts."""
@@ -229,10 +211,11 @@ def _worked_out(
         columns = 0.5 * (columns + earlier) if source.odd else earlier
     if not np.isfinite(columns).all():
         return None
-    if source.is_wave:
-        order = dict(zip((p.name for p in effect.shape), source.shape, strict=True))["order"]
-        passed = _passed(run, names[roles.index(source.turning)], order)
-        columns = columns * (passed[run.grid] if source.on_grid else passed)[:, None]
+    if isinstance(effect, Waves):
+        speed = _turning_speed(run, names[roles.index(source.turning)])
+        speed = speed[run.grid] if source.on_grid else speed
+        gains = [passed(order, speed, run.low_pass) for order in effect.orders(source.shape)]
+        columns = columns * np.column_stack(gains)
     return columns
 
 
@@ -243,16 +226,11 @@ def _bent(columns: FloatArray, bend: Bend) -> FloatArray:
     return np.column_stack([columns, columns * np.array(hats).T])
 
 
-def _passed(run: RunSignals, angle: str, order: float) -> FloatArray:
-    """Return the gain that the channels' filter, forwards and backwards, has on a wave."""
-
-    def turns_s() -> FloatArray:
-        speed = np.abs(np.gradient(run.channels[angle])) * run.rate_hz
-        return np.asarray(speed / (2.0 * math.pi))
-
-    low_pass = run.low_pass
-    relative = order * run.once(("turns", angle), turns_s) / low_pass.cutoff_hz
-    return np.asarray(1.0 / (1.0 + relative ** (2 * low_pass.order)))
+def _turning_speed(run: RunSignals, angle: str) -> FloatArray:
+    """Return the speed of an angle or a position over the run, without sign, shape (n,)."""
+    return run.once(
+        ("turning", angle), lambda: np.abs(np.gradient(run.channels[angle])) * run.rate_hz
+    )
 
 
 def _derived(columns: FloatArray, run: RunSignals, order: int, is_wave: bool) -> FloatArray:

@@ -10,6 +10,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 
 from estimation.effects.effect import Effect, Parameter, Pointwise, Proportional, Remembering
+from estimation.effects.waves import Waves
 from estimation.errors import UnknownNameError
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Proportional",
     "Remembering",
     "UnknownEffectError",
+    "Waves",
     "catalogue",
     "effect",
     "families",

@@ -35,6 +35,15 @@ class Waves(Pointwise):
 
     amplitudes: ClassVar[Parameters] = waves_in("target")
 
+    @property
+    def turning(self) -> str:
+        """The role of the angle or the position that it repeats with."""
+        return next(iter(self.roles))
+
+    def orders(self, shape: Shape) -> list[float]:
+        """Return the waves a turn of each column, in the order of the amplitudes."""
+        return [(1 + k // 2) * float(shape[0]) for k in range(len(self.amplitudes))]
+
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return sine and cosine of each harmonic, in the order of the amplitudes."""
         angle, *load = (inputs[role] for role in self.roles)

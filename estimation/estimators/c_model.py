@@ -68,11 +68,15 @@ def model_text(model: Model, place: Callable[[str], int]) -> str:
     """
     lines = []
     for term in model.terms:
-        inputs = {
-            role: Symbol(f"(double)row[{place(channel)}]" if channel != "time_s" else "NAN")
-            for role, channel in term.channels.items()
+        row = {
+            channel: Symbol(f"(double)row[{place(channel)}]" if channel != "time_s" else "NAN")
+            for channel in term.reads
         }
-        columns = _columns(term.effect, inputs, term.numbers(term.effect.shape))
+        inputs = {role: row[channel] for role, channel in term.channels.items()}
+        shape = term.numbers(term.effect.shape)
+        columns = _columns(term.effect, inputs, shape)
+        if gains := term.passed(row, shape, model.low_pass):
+            columns = [f"{x} * {text_of(g)}" for x, g in zip(columns, gains, strict=True)]
         for weight, column in zip(term.weights, columns, strict=True):
             lines.append(f"    total += {float(weight)!r} * {column}; /* {term.effect.id} */")
             if "NAN" in column:

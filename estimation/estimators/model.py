@@ -61,6 +61,8 @@ class Stream(Stepper):
         ):
             inputs = {role: sample[channel] for role, channel in term.channels.items()}
             values = term.effect.step(inputs, shape, state)
+            gains = term.passed(sample, shape, self.model.low_pass)
+            values = [v * gain for v, gain in zip(values, gains, strict=True)] if gains else values
             total += sum(w * v for w, v in zip(weights, values, strict=True))
         return float(total)
 

@@ -88,6 +88,28 @@ def test_the_compiled_state_estimator_gives_the_same(bank, runs, tmp_path, beyon
     assert np.mean(found[:, 2] == wanted.inside) > 0.999  # a sample may lie on a bound
 
 
+def test_a_fast_wave_is_the_same_in_c_and_live(tmp_path):
+    """The filter passes the less of it the faster the carriage is."""
+    (carriage,) = declared(SLIDE)
+    values = {"order": 2500.0, "sine": 6.0, "cosine": 1.0}
+    wave = Term(
+        effect("ripple.motor"),
+        channels={"motor_angle": "carriage_position_m"},
+        values={name: Estimate(x) for name, x in values.items()},
+    )
+    model, run = replace(carriage, terms=(wave,)), slide(0)
+    _, wanted = checked(model, run, tmp_path)
+    stream = ModelEstimator(model).stepper(run.sample_rate_hz)
+    found = stream.step(run.time_s, {c: run[c] for c in stream.channels})
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
+    phase = (
+        2500.0
+        * causal_channels(run, ["carriage_position_m"], model.low_pass)["carriage_position_m"]
+    )
+    whole = 6.0 * np.sin(phase) + np.cos(phase)
+    assert np.std(wanted) < 0.9 * np.std(whole)
+
+
 def test_a_compiled_model_of_any_machine_gives_the_same(tmp_path):
     (carriage,) = declared(SLIDE)
     runs = [slide(k) for k in range(3)]

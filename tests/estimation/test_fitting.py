@@ -11,6 +11,7 @@ from estimation.cross_validation import held_out_error, live_half_width
 from estimation.effects import effect
 from estimation.estimators.model import Stream
 from estimation.fit_problem import FitError
+from estimation.filters import LowPass
 from estimation.fitting import fit
 from estimation.model import Estimate, Model, NotFittedError, Term, counted_error, predict
 from estimation.model_file import read
@@ -227,6 +228,27 @@ def test_a_period_that_is_shorter_than_those_searched_is_fitted_from_its_value(s
     low, high = found.ci95
     assert found.value == pytest.approx(2 * np.pi / PERIOD_M, rel=2e-3)
     assert low < 2 * np.pi / PERIOD_M < high < 1.01 * low
+
+
+def test_a_wave_that_is_partly_beyond_the_cutoff_has_its_whole_size() -> None:
+    """The filter removes most of it from the target where the axis is fast, not where it is slow."""
+    random, recordings = np.random.default_rng(3), []
+    time_s = np.arange(4000) / 200
+    for k in range(6):
+        position_m = 0.012 * np.sin(2 * np.pi * (0.1 + 0.05 * k) * time_s)
+        force_n = 6 * np.sin(2 * np.pi * position_m / PERIOD_M) + random.normal(0.0, 0.5, 4000)
+        columns = {"carriage_position_m": position_m, "drive_force_n": force_n}
+        recordings.append(Recording(f"{k}", time_s, columns))
+    (model,) = declared(SLIDE)
+    wave = Term(
+        effect("ripple.motor"),
+        channels={"motor_angle": "carriage_position_m"},
+        values={"order": Estimate(2 * np.pi / PERIOD_M)},
+    )
+    model = replace(model, terms=(wave,), low_pass=LowPass(4.0), run_offsets=False)
+    found = fit(model, Campaign.of(recordings), bootstrap=0, shapes="keep")
+    assert numbers(found)["sine"] == pytest.approx(6.0, rel=0.03)
+    assert found.evidence.rmse < 0.3  # 1.0 with the wave as the axis is, unfiltered
 
 
 def test_friction_has_the_form_of_its_change_of_sign_where_no_viscous_friction_is_declared():

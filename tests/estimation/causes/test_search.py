@@ -606,7 +606,7 @@ def test_a_wave_has_its_size_before_the_filter() -> None:
     """Twelve waves a turn pass the cutoff of the channels in the fast parts of a run."""
     finding = _only(recordings(lambda angle, *_: 0.02 * np.sin(12.0 * angle)), motor())
     assert finding.family == "ripple.motor"
-    assert finding.parameters["sine"].value == pytest.approx(0.02, rel=0.2)
+    assert finding.parameters["sine"].value == pytest.approx(0.02, rel=0.03)
 
 
 def test_crosstalk_has_the_size_of_the_equation_that_identifies_it() -> None:
