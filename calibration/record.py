@@ -23,12 +23,7 @@ Rows = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class RawFile:
-    """A file the calibration was made from.
-
-    Attributes:
-        path: Its path, as given.
-        sha256: SHA-256 of its bytes, hexadecimal.
-    """
+    """A file the calibration was made from."""
 
     path: str
     sha256: str
@@ -58,7 +53,6 @@ class Fit:
             shape (p, p); kept as rows in the order of the names. Empty where nothing is known, as
             for numbers copied from a certificate.
         residual_rms: Root mean square of the residual, the channel's unit; None if not measured.
-        points: Number of samples fitted on.
     """
 
     form: str
@@ -132,13 +126,10 @@ class CalibrationRecord:
         channel: SI channel it gives.
         input: Raw counts field or channel it reads.
         made_at: When, ISO 8601 with the offset from UTC.
-        operator: Who did it.
         instrument: Serial number of the instrument it holds for; empty if it holds for any.
         serials: Device to serial number.
         firmware_hash: CRC-32 of the sources of the firmware behind the raw log; empty if none was,
             0 where the board was not built from any.
-        raw: Files it was made from.
-        code_version: Version of the code that fitted it.
         tared: Whether the zero is measured again before each run.
         figure_svg: Residual figure as SVG text; empty if there is none.
     """

@@ -34,7 +34,6 @@ class Choice:
     """One choice of an active record.
 
     Attributes:
-        record: Hash of the record.
         at: When it was chosen, ISO 8601.
     """
 

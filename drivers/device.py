@@ -44,10 +44,8 @@ class Channel:
     Attributes:
         name: Column in a batch.
         unit: Unit of its values; `count` where a calibration has yet to be applied, `1` for none.
-        rate_hz: Nominal sample rate.
         lower: Lowest value the device can give; minus infinity where it is not known.
         upper: Highest.
-        description: A few words.
     """
 
     name: str
@@ -88,7 +86,6 @@ class Batch:
         columns: Values by channel name, each float64 of shape (n,), in the channel's unit.
         time_s: When each sample was taken (`device` clock) or had arrived (`host` clock), s,
             shape (n,). The zero is arbitrary.
-        clock: The clock of `time_s`.
         sequence: Number of each sample since `start`, int64, shape (n,); lost samples are a gap
             where the device numbers its samples.
         flags: `SampleFlag` bits, uint8, shape (n,).

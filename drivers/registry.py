@@ -55,7 +55,6 @@ class Driver:
 
     Attributes:
         name: Short name, as written in a configuration.
-        description: One line on the device.
         open: Opens the device by URL; its keyword arguments, all with defaults, are its options.
             A configuration is validated with their annotations, including pydantic's ranges. It
             raises `LinkError` where the way cannot be opened, or the options are no device's.

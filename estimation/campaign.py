@@ -33,7 +33,6 @@ class Run:
     """A handle on one run: what is known without reading its samples, and how to read them.
 
     Attributes:
-        name: Name of the run.
         load: Reads the recording. Called again each time; nothing is cached.
         source: File the run is read from, or None for a run in memory.
         excluded: Reason for excluding the run, or None.

@@ -24,7 +24,6 @@ class HeldOutError:
         rmse: Root mean square over all samples, each run's mean error removed.
         rmse_with_means: The same with the means left in.
         rmse_by_run: Run to its own error, mean removed.
-        runs: Number of runs.
         folds: Number of folds; every run is in just one of them.
         half_width: Half the 95 % interval of the estimate live; see `live_half_width`.
     """

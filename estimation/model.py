@@ -170,7 +170,6 @@ class Evidence:
     """Data and errors of a model's fit.
 
     Attributes:
-        runs: Names of the runs.
         samples: Samples that entered the fit.
         rmse: Root mean square error with each run's mean error removed, in the target's unit.
         rmse_with_means: The same with the means left in.
@@ -184,7 +183,6 @@ class Evidence:
         sample_rate_hz: Median rate of the runs, Hz; None where the file does not contain it.
         made_at: When it was fitted, ISO 8601 with offset from UTC; empty if unknown.
         rig: Names of the rigs of the runs, with commas between; empty if unknown.
-        is_simulated: Whether a run was recorded on a simulated rig.
     """
 
     runs: tuple[str, ...]
@@ -208,9 +206,6 @@ class Model:
     Attributes:
         balance: Id of the equation: as the machine's file calls it, `joint.N` of an arm, or
             `calibration.KIND`.
-        target: Channel that is estimated.
-        description: Description and origin.
-        low_pass: Filter of every channel.
         run_offsets: Whether an offset of each run is a nuisance of a fit, as for a sensor whose
             zero drifts. Not where the runs differ by what is to be estimated, such as a load that
             is held within a run.

@@ -59,7 +59,6 @@ class Transmission:
     Attributes:
         name: Its name, also of the equation of what it loses.
         input: Axis on the side of the drive.
-        output: Axis it drives.
         ratio: Travel of the input per travel of the output, negative where it reverses the
             direction; None where it is fitted.
         compliant: Whether it bends measurably.
@@ -95,7 +94,6 @@ class Sensor:
     """What is measured.
 
     Attributes:
-        name: Channel.
         axis: Axis it reads; empty where it is of none.
         reads: What it reads. An effort is what the axis passes on.
         counts: Counts in one unit of the channel, such as a radian; None where it is not known.
@@ -151,8 +149,6 @@ class Written:
     """An equation as it is written down: a target and its effects.
 
     Attributes:
-        target: Channel on the left-hand side.
-        parts: Effects on the right-hand side.
         samples: Which samples count; None for what suits the effects.
     """
 

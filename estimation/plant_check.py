@@ -104,7 +104,6 @@ class CheckedPlant:
         missing: What they do not identify.
         unused: Channels that no equation reads.
         contradictions: Where the recordings contradict the file, sentences.
-        runs: Number of runs checked.
     """
 
     equations: tuple[CheckedEquation, ...]

@@ -39,7 +39,6 @@ class Stretch:
     Attributes:
         start_s: Time of the first flagged sample, s.
         stop_s: Time of the last flagged sample, s.
-        flag: The fault.
         reason: Reason, in words that a person can act on.
         channel: The channel concerned, or None for all of them.
     """
@@ -110,10 +109,6 @@ class Recording:
         flags: Per-sample `Flag` bits, shape (n,), uint8.
         conditions: Constant conditions, numbers in SI with the unit in the name
             (`load_command_a`, `frequency_hz`) or words.
-        rig: Name of the rig.
-        instrument: Identity of the instrument.
-        notes: Operator's notes.
-        marks: Operator's marks.
         stretches: Flagged segments with their reasons.
         started_at_ns: Start of the run, ns since the Unix epoch, or below `UNDATED_NS` since the
             zero of a clock that all runs share and that has no date; None when not recorded.

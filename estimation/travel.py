@@ -24,7 +24,6 @@ class Slope(NamedTuple):
     """The change of y per change of x besides other channels.
 
     Attributes:
-        value: That change.
         own: Share of the square of x that the other channels do not explain.
         moved: Root mean square of x over that of what nothing explains, in units of y.
     """

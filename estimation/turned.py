@@ -89,6 +89,5 @@ def _laid_out(model: Model, campaign: Campaign) -> _Runs:
 
 
 def _error(gram: FloatArray, weights: FloatArray) -> float:
-    """Return the squared error of runs."""
     vector = np.append(weights, -1.0)
     return float(vector @ gram @ vector)

@@ -25,7 +25,6 @@ class MovedZero:
 
     Attributes:
         condition: Name of the zero.
-        runs: Names of the runs.
         lowest: Lowest zero of these runs, in the unit of the condition.
         highest: Highest zero of these runs.
         usual: Lowest and highest zero of the others.

@@ -167,7 +167,6 @@ class TripReport:
     """What a board tripped over first since it was cleared.
 
     Attributes:
-        code: What it was.
         channel: Name of the count that crossed; empty where it was none.
         value: That count; for the host's silence its length, us; for heat, counts^2 s.
         tick_us: Board clock at the trip.

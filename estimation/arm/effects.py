@@ -140,8 +140,6 @@ Columns = Callable[[Motion], list[FloatArray]]
 
 
 def _effect(arm: Arm, k: int, kind: str, what: str, values: Columns, **more: Any) -> ArmEffect:
-    """Return an effect on one joint."""
-
     def on(motion: Motion) -> FloatArray:
         return on_joint(np.column_stack(values(motion)), k, row_count(arm))
 

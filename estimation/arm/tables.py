@@ -33,9 +33,6 @@ class Joint:
 
     Attributes:
         row: Where it sits.
-        lower: Lower end of its range.
-        upper: Upper end of its range.
-        speed: Largest speed.
         link: Which of its link's ten parameters count, see `Link`.
         spring: Whether an elastic torque proportional to its position acts on it.
     """

@@ -14,8 +14,6 @@ class Change:
         verdict: `moved` for a parameter, `came` or `went` for an effect, `one_of` where the runs do
             not distinguish some of them.
         how: `moved`, `came` or `went`, of the likeliest where the verdict is `one_of`.
-        name: What changed.
-        equation: Equation it is reported under.
         family: The effect.
         alternatives: Other names that explain it about as well.
         confidence: Probability of this name next to the other changes, that of no change included.
@@ -70,7 +68,6 @@ class Difference:
         changes: The changes, largest first; empty where nothing changed beyond chance.
         runs: Campaign to the names of its runs.
         predicted: Equation to its errors on a third campaign; empty without one.
-        notes: Limits of the answer, in words.
     """
 
     changes: tuple[Change, ...]

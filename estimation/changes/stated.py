@@ -177,5 +177,4 @@ def _source(one: Scored) -> Source:
 
 
 def _name(source: Source) -> str:
-    """Return the name of a change in a report."""
     return source.key if isinstance(source, Changed) else f"{source.family} at {source.place.name}"

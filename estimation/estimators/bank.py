@@ -58,14 +58,11 @@ class BankEstimator:
     """A fitted sum of products of physical states.
 
     Attributes:
-        target: Channel that is estimated.
         weights: Weight of each product, shape (size,).
         interval: The error's interval; None where too few runs were fitted.
         ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
         scale: Spread of each product over the samples fitted on, shape (size,).
         instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
-        low_pass: Filter of every channel.
-        origin: Where it comes from; None where nobody stated it.
         only: Level of each condition that all runs fitted on had alike.
         of_any: Whether it is used on instruments it was not fitted on: nothing is in its range.
     """
@@ -258,7 +255,6 @@ class BankRecipe:
 
     Attributes:
         causal: Fit on channels filtered as live, for use as live; the target has no lag anyway.
-        low_pass: Filter of every channel.
     """
 
     target: str

@@ -103,7 +103,6 @@ def model_text(model: Model, place: Callable[[str], int]) -> str:
 
 
 def _columns(effect: Effect, inputs: Mapping[str, Symbol], shape: Sequence[float]) -> list[str]:
-    """Return an effect's columns as C."""
     if effect.start():
         raise NotInCError(
             f"{effect.id} remembers the samples before.",

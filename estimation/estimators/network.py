@@ -37,9 +37,7 @@ class NetworkEstimator:
 
     Attributes:
         network: The network; its inputs are channel names, its one output the target.
-        low_pass: Filter of every channel.
         instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
-        origin: Where it comes from; None where nobody stated it.
     """
 
     SCHEMA: ClassVar[str] = "rig.estimator/1"

@@ -22,7 +22,6 @@ class Origin:
         data: Hash of each run fitted on, by the run's name.
         figures: Errors it was reported with, in SI units, by name.
         adapted_from: Hash of the file of the estimator it was adapted from; empty of a fit.
-        is_simulated: Whether a run was recorded on a simulated rig.
     """
 
     made_at: str

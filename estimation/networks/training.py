@@ -37,7 +37,6 @@ class Settings:
         iterations: Accepted steps at the most.
         patience: Converged when the error fell by less than `tolerance` over so many steps.
         tolerance: Relative fall of the root mean square error.
-        seed: Seed of the first weights.
     """
 
     nodes: int = 30
@@ -151,7 +150,6 @@ def _rows(inputs: FloatArray, targets: FloatArray) -> tuple["Tensor", "Tensor"]:
 
 
 def _blocks(x: "Tensor", y: "Tensor") -> Iterator[tuple["Tensor", "Tensor"]]:
-    """Cut rows into blocks of at most `BLOCK`."""
     for first in range(0, len(x), BLOCK):
         yield x[first : first + BLOCK], y[first : first + BLOCK]
 

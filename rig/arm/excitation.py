@@ -34,7 +34,6 @@ class Outcome:
     Attributes:
         condition: Condition number of the base regressor, columns of unit length.
         limits_share: Largest share of any limit that is used, by a bound for every instant.
-        seconds: Time of a core it took.
     """
 
     condition: float

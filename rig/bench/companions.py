@@ -57,8 +57,6 @@ class Companion:
     """One device in addition to the logger.
 
     Args:
-        name: Its name in the configuration.
-        device: The device, open.
         in_step: It is a fake with a clock of its own, which is to keep step with the logger's.
         limits: Limit of each limited channel, as `[limits]` names it: `NAME.channel`.
     """

@@ -26,7 +26,6 @@ class Board:
 
     Attributes:
         serial: Its USB serial number, the chip's own.
-        port: Its device path.
         state: What is known of its state, in words.
     """
 
@@ -83,7 +82,6 @@ def _the_one(ports: Sequence[tuple[str, str]]) -> tuple[str, str]:
 
 
 def _state(port: str, profile: Profile) -> str:
-    """Return the state reported by the board."""
     try:
         link = open_transport(port)
     except PortBusyError as error:

@@ -39,7 +39,6 @@ class Ending:
     """How the program that held a rig let go.
 
     Attributes:
-        pid: Its process number.
         was_killed: Whether it did not end when it was asked to.
     """
 

@@ -32,7 +32,6 @@ class SensorWay:
     Bytes cannot be sent through it: what arms, stops or tests a rig is refused.
 
     Args:
-        device: The device, open.
         url: Where it is, for messages.
         is_simulated: Whether its time passes only while it is read.
         pace: Simulated seconds a real second; None for as fast as possible.

@@ -233,8 +233,6 @@ def _encoder(result: Result, measurements: Sequence[Measurement]) -> Declared:
 
 @dataclass(frozen=True)
 class _Kind:
-    """One kind of calibration."""
-
     # its simplest session, from the conditions of its runs
     plain: Callable[[Mapping[str, float | str]], Procedure]
     # makes the declaration of a result and the measurements

@@ -31,7 +31,6 @@ class IndexedRun:
     """What the index holds of one run.
 
     Attributes:
-        file: Name of the log.
         instrument: Identity of the instrument in words.
         date: When it was started, ISO 8601, UTC; empty if not recorded.
         protocol: Name of the protocol, or the calibration whose raw log it is.

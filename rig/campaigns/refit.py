@@ -28,9 +28,7 @@ class Refit:
     Attributes:
         key: Digest of the logs' names, sizes and dates and of the model.
         values: Parameter, as `effect.parameter`, to its value in SI units.
-        units: Parameter to its unit.
         rmse: Error of the fit, in the unit of the target; None where it failed.
-        runs: Runs fitted.
         failed: Why it could not be fitted; empty otherwise.
     """
 

@@ -33,7 +33,6 @@ class Coupling:
     All methods take and give arrays of shape (..., n), the last axis in the order of the names.
 
     Attributes:
-        joints: Names of the joints, n of them.
         jacobian: A, joint velocity over actuator velocity, shape (n, n).
     """
 

@@ -37,9 +37,6 @@ class CablePath:
     """Pulleys and centre distances that a jaw's cable passes; see the paper's Figure 3.
 
     Attributes:
-        d1_m: Diameter of pulley 1.
-        d2_m: Diameter of pulley 2.
-        d3_m: Diameter of pulley 3, the jaw's.
         l2_m: Distance of the centres of pulleys 1 and 2.
         l3_m: Distance of the centres of pulleys 2 and 3.
     """
@@ -137,7 +134,6 @@ class Design:
 
     Attributes:
         planetary: Gear ratio and constraint.
-        drive: Driving component.
         pulley_ratio: The d2/d1 that decouples it.
         area: Length times width of gears and pulleys, in squares of the least diameter.
         extra_stages: Mechanisms it needs besides the planetary stage.

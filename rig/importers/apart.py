@@ -164,7 +164,6 @@ def _unit(name: str, ratio: float, ratios: FloatArray) -> str:
 
 
 def _is_of_ten(ratio: float) -> bool:
-    """Return whether a ratio is about a power of ten."""
     return ratio > 0.0 and bool(_within(ratio, 10.0 ** round(np.log10(ratio)), SURE))
 
 

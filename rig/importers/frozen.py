@@ -65,7 +65,6 @@ def frozen(recordings: Sequence[Recording]) -> Iterator[str]:
 
 
 def _range(recordings: Sequence[Recording], name: str) -> FloatArray:
-    """Return the least and the greatest value of a channel."""
     values = np.concatenate([run[name][run.valid] for run in recordings])
     values = values[np.isfinite(values)]
     return np.array([values.min(), values.max()]) if values.size else np.zeros(2)

@@ -43,7 +43,6 @@ class JawStep:
     """A step of the jaw's zero.
 
     Attributes:
-        run: The first run after it.
         step_rad: Change of the zero, rad, closing positive.
     """
 

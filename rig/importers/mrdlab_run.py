@@ -48,14 +48,7 @@ THINNING = 10
 
 @dataclass(frozen=True, slots=True)
 class Sine:
-    """A fitted trajectory centre + amplitude sin(2 pi f t + phase).
-
-    Attributes:
-        frequency_hz: Frequency f, Hz.
-        centre_rad: Mean of the sine, rad.
-        amplitude_rad: Amplitude, rad, not negative.
-        phase_rad: Phase at time zero, rad.
-    """
+    """A fitted trajectory centre + amplitude sin(2 pi f t + phase)."""
 
     frequency_hz: float
     centre_rad: float

@@ -19,8 +19,6 @@ class ShowOptions:
         plain: Lines for people, also in a terminal that could draw.
         json: One JSON object a line on stdout, nothing for people.
         half_widths: Returns half of the 95 % interval of each channel's newest estimate, SI.
-        footer: Available keys.
-        help: What the keys do, a line each.
 
     Raises:
         UsageError: The lever arm is not a positive length.

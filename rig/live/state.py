@@ -48,7 +48,6 @@ class Reading:
     """One quantity: estimate and sensor reading, means of the last 0.1 s.
 
     Attributes:
-        unit: SI unit.
         has_estimator: Whether the stream carries estimates of it.
         error_rms: Root mean square of estimate minus sensor over the last 5 s, or None.
         estimate_trace: Least and greatest estimate in each 20 ms of the last 10 s, shape (2, 500),
@@ -106,7 +105,6 @@ class Summary:
         ended: `finished` when the stream ended, `interrupted` when a person left.
         duration_s: Device time covered.
         flagged: Name of each flag seen and on how many samples.
-        channel: The main quantity.
         error_rms: Root mean square of its estimate minus its sensor value, SI, or None.
         error_samples: Samples in that number: those not flagged and with both values.
         inside_rms: The same within the fitted range of the estimator, or None.

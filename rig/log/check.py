@@ -42,9 +42,6 @@ class Gap:
     """Samples that are missing between two that are there.
 
     Attributes:
-        first_sequence: Sequence number of the first missing sample.
-        last_sequence: Sequence number of the last missing sample.
-        samples: Number of missing samples.
         start_s: Time of the last sample before the gap, s, in the stream's own time.
         length_s: Time from that sample to the first one after the gap, s.
     """

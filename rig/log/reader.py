@@ -66,7 +66,6 @@ class LogFile:
         run: Metadata of the start, or None when that record is missing.
         end: Metadata of the end, or None when the log was not closed.
         topics: Topic name to messages; streams without messages are there too.
-        attachments: Files carried in the log.
         metadata: Metadata records of other names.
         unread: Topics whose messages are not of fixed size, and were not read.
         damage: Damaged parts; empty unless the log was read tolerantly.

@@ -66,7 +66,6 @@ class Comparison:
     """Result for the channel that both sides estimate.
 
     Attributes:
-        runs: Errors by run.
         left_out: Runs without a valid closing sample.
         rmse: Root mean square errors over all samples.
         p: Chance of runs' errors at least this different if neither were better (Wilcoxon's

@@ -32,7 +32,6 @@ class Chart:
 
     Attributes:
         name: Id in the page and name of exported files.
-        title: Title, also of an exported file.
         judgement: Conclusion that the chart supports, in a sentence.
         layout: Axes, as Plotly has them.
         lines: What is drawn.

@@ -27,7 +27,6 @@ class Motion:
     Attributes:
         setpoints: One array of shape (n,) for each field of a setpoint, closing-positive, SI units.
         first: Index of the run's first setpoint.
-        last: Index behind the run's last.
     """
 
     setpoints: tuple[FloatArray, ...]

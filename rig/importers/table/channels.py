@@ -22,11 +22,7 @@ DAY_S, NO_DATE = 86_400.0, date(1970, 1, 1)
 
 
 class NotMappedError(DataError):
-    """Nothing states which column of a table is which channel.
-
-    Attributes:
-        raw: The file.
-    """
+    """Nothing states which column of a table is which channel."""
 
     def __init__(self, raw: Raw) -> None:
         self.raw = raw
@@ -43,15 +39,12 @@ class Samples:
     """One file in SI units.
 
     Attributes:
-        raw: The file.
-        mapping: What its columns were mapped by.
         time_s: Shape (n,), as it is there.
         edges: First sample of each run, and the end of the last one.
         channels: Name to values, shape (n,) each; not finite where a cell is empty.
         conditions: Name to one value, or to values that must be constant in each run.
         zero_ns: Date at which `time_s` is 0, ns since 1970; 0 where its clock has no date, and
             None where no column holds the time.
-        doubts: What is doubtful about the file, questions in words.
         remarks: What was assumed about its clock, in words.
     """
 

@@ -30,9 +30,6 @@ class ColumnMapping:
     """A mapping, and where each of its entries is written.
 
     Attributes:
-        data: The mapping.
-        file: The machine's file; None without one.
-        text: Its text.
         flags: Path of an entry to the words of the command line that state it.
     """
 

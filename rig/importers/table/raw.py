@@ -29,14 +29,12 @@ class Raw:
     """One file.
 
     Attributes:
-        path: The file.
         columns: Name to column, shape (n,) each. Columns of a file without a head are named by
             their number, from 1.
         fields: Name to a value that holds for the whole file.
         remarks: What was found out about the layout, in words.
         first_line: Line of the file that holds the first sample; 0 where it has no lines.
         units: Column to what a line of units below the head states of it; nothing where none does.
-        units_line: That line.
         decimal: Decimal sign of a text table; empty for any other file.
         repeated: Name that several columns have to how many; the second one is called `NAME.2`.
     """
@@ -75,11 +73,7 @@ class Raw:
 
 
 class NoColumnError(DataError):
-    """A file has no such column or single value.
-
-    Attributes:
-        raw: The file.
-    """
+    """A file has no such column or single value."""
 
     def __init__(self, raw: Raw, what: str, why: str, fix: str) -> None:
         self.raw = raw

@@ -95,7 +95,6 @@ class Named:
 
     Attributes:
         family: Its name in the catalogue; `unknown` where it is not named.
-        alternatives: Names that it could have as well.
         before_n_m: RMS error on the runs set aside before it, after what was found earlier, N m.
         after_n_m: The same with it, N m.
     """

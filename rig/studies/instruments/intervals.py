@@ -46,7 +46,6 @@ class Held:
         median: Median over runs of that share.
         worst_run: Smallest share of a run.
         worst_level: Smallest mean share of one fit.
-        half_width: Mean half width.
         no_width: Share of the samples for which none is stated.
         spread: Standard error of `covered` over runs.
         rmse_ratio: Adapted: the error over the median of every other choice of as many runs.

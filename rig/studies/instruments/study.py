@@ -45,7 +45,6 @@ class DrawnRow:
     Attributes:
         usual: Whether runs at another zero than most are left out, of those adapted with and of
             those reported on.
-        runs: Runs adapted with at a time.
         rmse_n_m: Error on the runs not used, by choice, rising.
         covered: Mean over the choices of the share of samples inside their interval; None without.
     """
@@ -62,7 +61,6 @@ class InstrumentStudy:
     """Results.
 
     Attributes:
-        source: Instrument the estimators were fitted on.
         drawn: What the choice of the runs makes of them.
     """
 

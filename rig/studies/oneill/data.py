@@ -118,7 +118,6 @@ class ClosingTable:
         values: Shape (n, columns).
         run: Index of each sample's run, shape (n,).
         conditions: Condition to the value of each run, shape (runs,); NaN where it is not stated.
-        excluded: Runs that are excluded, with the reason.
         flagged: Other runs of which a closing sample is flagged, with the reason.
     """
 

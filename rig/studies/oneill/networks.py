@@ -47,7 +47,6 @@ class NetworkStudy:
 
     Attributes:
         not_run: Jobs that were not, or not wholly, trained.
-        samples: Closing samples by pose.
         peak_torque_n_m: Largest distal torque of the neutral pose.
         every: Every n-th closing sample of a pose was trained on, by pose.
     """
@@ -90,7 +89,6 @@ class Training:
     """How long, on what and where networks are trained.
 
     Attributes:
-        state: Folder of the trained networks.
         settings: Settings of the training; nodes and seed are the study's.
         every: Train on every n-th closing sample of the neutral pose, and on as many of others.
         seed: Seed of splits and of first weights.

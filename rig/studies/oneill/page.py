@@ -28,7 +28,6 @@ class OneillPage(Page):
 
     Attributes:
         lead: How many of the paragraphs are the result.
-        captions: Caption of each figure.
     """
 
     lead: int = 1

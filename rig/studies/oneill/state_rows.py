@@ -51,7 +51,6 @@ class Level:
     """One frequency or power level that was left out.
 
     Attributes:
-        samples: Closing samples held out.
         covered: Share of them inside their interval.
     """
 

@@ -37,7 +37,6 @@ class Row:
     """One linear fit and its error.
 
     Attributes:
-        surrogate: Short name of the torque surrogate.
         protocol: Short name of the protocol, see `PROTOCOLS`.
         gain: Fitted gain; None where several fits were made.
         offset_n_m: Fitted offset; None where several fits were made.

@@ -82,7 +82,6 @@ class Study:
     Attributes:
         paths: The two paths; the search fits the first and tests on the second.
         rows: The models, each in both directions, then on further runs.
-        thesis: The thesis' own errors, %.
         parameters: Identified parameters of the thesis' model on the first path, SI units.
     """
 

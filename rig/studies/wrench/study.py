@@ -87,7 +87,6 @@ class Arm:
 
     Attributes:
         errors: NRMSD, %, by table and, in it, by method.
-        effects: Names of the effects found within its excitation.
     """
 
     family: str

@@ -69,7 +69,6 @@ class ZhangStudy:
         outcomes: Of each arm, in the order of their numbers, its errors by
             `experiment | condition | method`.
         traces: Forces over time of the first arm, by `experiment | what`.
-        effects: Of each effect found, on how many arms.
     """
 
     schema: str

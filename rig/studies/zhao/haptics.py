@@ -43,7 +43,6 @@ class Stiffness:
 
     Attributes:
         true_n_rad: What it is, force at the tip over joint angle.
-        grasps_n_rad: What each grasp gave.
     """
 
     name: str

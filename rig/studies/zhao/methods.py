@@ -63,7 +63,6 @@ class Lacking:
     """The effects that the diagnosis finds missing in a degree of freedom's model.
 
     Attributes:
-        findings: Family and verdict of each finding.
         model: The declared model with the effects it named, and the signals they read, as TOML.
     """
 
