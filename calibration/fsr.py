@@ -167,11 +167,9 @@ def hysteresis_ratio(runs: Sequence[FsrRun]) -> float | None:
 
 
 def measure_creep(hold: FsrRun, start_s: float) -> Creep:
-    """Measure creep in a run at constant force.
+    """Measure creep in a run at constant force, from a time after the force has settled.
 
-    Args:
-        hold: The run; `time_s` counts from when the force was put on.
-        start_s: When to begin, after the force has settled.
+    The run's `time_s` counts from when the force was put on.
 
     Raises:
         BadDataError: The force is not constant to 2 %, or the time is less than a decade.

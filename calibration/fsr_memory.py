@@ -42,10 +42,8 @@ class FsrMemory:
     def force_n(self, curve: FsrCurve, time_s: FloatArray, fsr_v: FloatArray) -> FloatArray:
         """Return the force of one press, shape (n,).
 
-        Args:
-            curve: The curve.
-            time_s: Time, s, rising; the press begins where the voltage exceeds the lowest tenth.
-            fsr_v: Voltage, shape (n,), smooth enough for the sign of its slope.
+        It begins where the voltage exceeds the lowest tenth. Time, s, rises; the voltage is smooth
+        enough for the sign of its slope.
 
         Raises:
             FsrRangeError: A voltage lies outside the curve's range.
@@ -73,12 +71,9 @@ class FsrMemory:
 
 
 def fit_memory(curve: FsrCurve, runs: Sequence[FsrRun], creep: Creep | None) -> FsrMemory:
-    """Measure what a curve's runs remember, and keep what predicts runs left out.
+    """Measure what a curve's runs of whole presses remember, and keep what predicts runs left out.
 
-    Args:
-        curve: The curve of the runs.
-        runs: The runs, each one or more whole presses.
-        creep: Creep under a constant load; None where it was not measured.
+    The creep is that under a constant load; None where it was not measured.
     """
     pairs = []
     for run in runs:

@@ -173,14 +173,10 @@ def carry_out(
 ) -> list[Measurement]:
     """Go through the steps and return their measurements.
 
-    Args:
-        procedure: What is calibrated.
-        operator: Sets up the steps.
-        bench: Measures them.
-        on_step: Called before each step with it, its number from 0, and how many there are.
-        on_measured: Called after each step with all measurements so far, its own last.
-        measured: Measurements of the first steps, where a session goes on; it grows step by step,
-            so that a caller has what was measured before an error.
+    `on_step` is called before each step with it, its number from 0, and how many there are;
+    `on_measured` after each step with all measurements so far, its own last. `measured` holds those
+    of the first steps, where a session goes on; it grows step by step, so that a caller has what
+    was measured before an error.
 
     Raises:
         AbortedError: The operator ended the session.

@@ -66,9 +66,7 @@ class Fit:
     ) -> "Fit":
         """Return the fit with further parameters, which its own are not correlated with.
 
-        Args:
-            values: Name to value.
-            deviations: Standard deviation of each; 0 if None.
+        Their standard deviations are 0 where none are given.
         """
         variances = np.square(np.zeros(len(values)) if deviations is None else deviations)
         covariance = block_diag(self.covariance, np.diag(variances))

@@ -101,9 +101,7 @@ def refuse_drift(
 def is_better(more: FloatArray, fewer: FloatArray) -> bool:
     """Return whether the larger of two fits predicts runs left out better, by a standard error.
 
-    Args:
-        more: Its mean square errors on runs left out, shape (runs,).
-        fewer: Those of the smaller fit, or of none.
+    Both are mean square errors on runs left out, shape (runs,).
     """
     gain = fewer - more
     return bool(gain.mean() > gain.std(ddof=1) / np.sqrt(gain.size))

@@ -157,9 +157,7 @@ def active_lines(
 def compose(base: CalibrationSet, records: Iterable[CalibrationRecord]) -> CalibrationSet:
     """Return a set in which records replace the base's lines; the same set where there are none.
 
-    Args:
-        base: A set that covers every channel of the rig.
-        records: Records that are lines, one per channel; see `active_lines`.
+    The base covers every channel of the rig; the records are lines, one per channel.
 
     Raises:
         CalibrationError: A record reads another raw field than the base's line of that channel.

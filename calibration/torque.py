@@ -38,12 +38,9 @@ def check_shunt(
 ) -> float:
     """Return the change a shunt makes over the one its certificate states, less one.
 
-    Args:
-        unloaded: Readings without the shunt, counts, shape (n,).
-        shunted: Readings with it, counts, shape (m,).
-        certificate_v_v: Change by the certificate, V/V. A shunt of Rs across one arm of an
-            equal-arm bridge of R gives R / (4 Rs + 2 R) (Yokogawa DL850E manual; Vishay TN-514).
-        counts_per_v_v: Gain of amplifier and converter.
+    The readings, shape (n,), are counts without the shunt and with it; the change by the
+    certificate is in V/V. A shunt of Rs across one arm of an equal-arm bridge of R gives
+    R / (4 Rs + 2 R) (Yokogawa DL850E manual; Vishay TN-514).
 
     Raises:
         BadDataError: Too few readings, at a rail, drifting, no change beyond the noise, or another
@@ -118,8 +115,7 @@ class TorqueResult:
 def fit_torque(steps: Sequence[Step]) -> TorqueResult:
     """Fit the line through the steps' mean readings, each step one piece of evidence.
 
-    Args:
-        steps: In the order they were made: up through the levels and down again.
+    The steps are in the order they were made: up through the levels and down again.
 
     Raises:
         BadDataError: The data are not sufficient for a calibration; its `rule` is the reason.

@@ -203,12 +203,8 @@ def arrival_fit(
 
     Samples that came in one burst all carry the burst's time: only the newest of each arrival time
     is used, and of those the earlier half relative to the line. The host time is late by the
-    shortest delay of the link, which is not observable from arrivals alone.
-
-    Args:
-        sequence: Numbers of samples, rising, shape (n,).
-        arrived_s: When each had arrived, s, not falling, shape (n,).
-        rate_hz: Nominal rate.
+    shortest delay of the link, which is not observable from arrivals alone. Numbers of samples rise
+    and arrival times, s, do not fall; both have shape (n,).
 
     Raises:
         ClockError: Fewer than two arrivals.

@@ -148,14 +148,10 @@ class Campaign:
         )
 
     def folds(self, count: int, seed: int = 0) -> list[Split]:
-        """Split by run into folds: each run is tested exactly once.
-
-        Args:
-            count: Number of folds, 2 to the number of runs that are not excluded.
-            seed: Seed of the shuffle.
+        """Split by run, shuffled by the seed, into folds: each run is tested exactly once.
 
         Raises:
-            CampaignError: More folds than runs, or fewer than two.
+            CampaignError: More folds than runs that are not excluded, or fewer than two.
         """
         evidence = self.evidence
         if not 2 <= count <= len(evidence):

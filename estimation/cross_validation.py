@@ -65,8 +65,7 @@ def held_out_error(declared: Model, campaign: Campaign, folds: int, seed: int = 
 def live_half_width(errors: Sequence[FloatArray]) -> float | None:
     """Return half the 95 % interval of a live estimate in a new run; None without two runs.
 
-    Args:
-        errors: Errors of each run with causal filters, of a model that was not fitted on it.
+    The errors are those of each run with causal filters, of a model that was not fitted on it.
     """
     known = [error[np.isfinite(error)] for error in errors]
     squares = [float(np.mean(error**2)) for error in known if error.size]

@@ -144,13 +144,7 @@ def derive(
 ) -> dict[str, FloatArray]:
     """Return the named channels, from filtered measured ones without gaps.
 
-    Args:
-        filtered: Measured channels.
-        names: Channels wanted.
-        sample_rate_hz: Their rate.
-        derivative: How they are differentiated.
-        signals: The machine's derived channels.
-        tracked: Angle to itself and its two derivatives, shape (n, 3), where they are known.
+    `tracked` is an angle to itself and its two derivatives, shape (n, 3), where they are known.
     """
     window = window_samples(sample_rate_hz)
 

@@ -127,11 +127,8 @@ def check(
 ) -> CheckedPlant:
     """Check which parameters of a machine can be identified, and fitted on recordings of it.
 
-    Args:
-        plant: The machine.
-        campaign: Recordings of it, or None.
-        file: Its file, which sentences on what to change name.
-        recorded: Without recordings, the channels that these will have; none where unknown.
+    The file is the machine's, which sentences on what to change name. Without recordings,
+    `recorded` are the channels that these will have; none where unknown.
 
     Raises:
         PlantError: An equation of its owner's has an unknown effect, role or channel.

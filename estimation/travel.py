@@ -74,17 +74,10 @@ def other_ratio(
 ) -> float | None:
     """Return the ratio of a flexible transmission's ends where it is not the stated one, else None.
 
-    What is between the ends bends with the effort on the driven end. Where the sensor of effort is
-    beyond a mass, or there is none, it bends with that mass and its damping too: with the
-    acceleration and the speed of the driven end.
-
-    Args:
-        recordings: The runs.
-        ends: The positions of the driving and of the driven end.
-        stated: Change of the first per change of the second, as the machine's file states it.
-        efforts: Channels of effort on the driven end.
-        low_pass: Filter of the speed and the acceleration.
-        signals: Signals of the machine.
+    The ends are the positions of the driving and of the driven one, the ratio the change of the
+    first per change of the second. What is between them bends with the effort on the driven end.
+    Where the sensor of effort is beyond a mass, or there is none, it bends with that mass and its
+    damping too: with the acceleration and the speed of the driven end.
     """
     driving, driven = ends
     besides = [*efforts, *rates_of(driven)]

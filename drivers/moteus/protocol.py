@@ -84,12 +84,10 @@ def stop_command() -> bytes:
 
 
 def torque_command(torque_n_m: float, most_n_m: float, watchdog_s: float) -> bytes:
-    """Return the subframes of position mode with no control but a torque.
+    """Return the subframes of position mode with no control but a torque at the output.
 
-    Args:
-        torque_n_m: Torque at the output.
-        most_n_m: The most the controller may apply.
-        watchdog_s: How long it is valid; then the controller enters its timeout mode.
+    `most_n_m` is what the controller may apply; after the watchdog's time it enters its timeout
+    mode.
     """
     values = [math.nan, 0.0, torque_n_m, 0.0, 0.0, most_n_m, math.nan, watchdog_s]
     return write(INT8, MODE, [POSITION_MODE]) + write(FLOAT, COMMAND, values)

@@ -39,11 +39,8 @@ def open_logger(
 ) -> Transport:
     """Return an open transport to the configured logger.
 
-    Args:
-        config: The configuration.
-        pace: Simulated seconds a real second, None for as fast as possible; a real logger has its
-            own pace.
-        step_s: Longest simulated time between looks at the logger's output; its own choice if None.
+    A simulated logger runs at a pace of simulated seconds a real second, None for as fast as
+    possible, and its output is looked at every `step_s` or sooner, None for its own choice.
 
     Raises:
         DriverError: The logger cannot be reached.

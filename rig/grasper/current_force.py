@@ -37,11 +37,9 @@ class CurrentForce:
     torque_constant_n_m_a: float = 14.6e-3
 
     def force_n(self, motor_current_a: FloatArray, sample_rate_hz: float) -> FloatArray:
-        """Return the force, causal as live, shape (n,).
+        """Return the force of a motor's current, or of the mean of both jaws', causal, shape (n,).
 
-        Args:
-            motor_current_a: Current of the motor, or the mean of both jaws' motors, shape (n,).
-            sample_rate_hz: 2000 in the paper.
+        The paper samples at 2000 Hz.
 
         Raises:
             FilterError: The rate is too low for the filter.
@@ -54,17 +52,11 @@ class CurrentForce:
 def angle_led(
     force_n: FloatArray, angle_rad: FloatArray, sample_rate_hz: float, low_pass: LowPass
 ) -> FloatArray:
-    """Return the force without the lag of its filter, causal, shape (n,).
+    """Return the force without the lag of its low-pass filter, causal, shape (n,).
 
     While something is held the force follows the angle. Its stiffness is the slope of the force
     over the equally late angle in the last half second; what the filter has not yet let through of
-    the angle, times that stiffness, is what it has not yet let through of the force.
-
-    Args:
-        force_n: Estimate, low-passed, shape (n,).
-        angle_rad: Joint angle as it was measured, shape (n,).
-        sample_rate_hz: Rate of both.
-        low_pass: The filter that the force went through.
+    the angle, shape (n,), times that stiffness, is what it has not yet let through of the force.
 
     Raises:
         FilterError: The rate is too low for the filter.

@@ -64,10 +64,8 @@ WHOLE = 0.75
 def questions(recordings: Sequence[Recording], plant: Plant | None = None) -> list[str]:
     """Return the doubts about the channels and zeros of runs: questions, each with its channel.
 
-    Args:
-        recordings: The runs.
-        plant: The machine, which states what is in front of a gear, and which channels were not
-            read but follow from others; nothing is asked about those.
+    The machine states what is in front of a gear, and which channels were not read but follow from
+    others; nothing is asked about those.
     """
     derived = {} if plant is None else plant.integrals
     names = dict.fromkeys(name for r in recordings for name in r.columns if name not in derived)

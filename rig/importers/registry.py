@@ -86,10 +86,8 @@ def _loaded(entry: EntryPoint) -> Importer:
 def open_campaign(path: Path, format_name: str | None = None, skip_bad: bool = False) -> Campaign:
     """Open a file, folder or archive of any known format; a run that is there twice counts once.
 
-    Args:
-        path: File, folder or archive.
-        format_name: Importer to use; guessed from the path when None.
-        skip_bad: Read every run once, and exclude those that cannot be read, with the reason.
+    The importer is guessed from the path where none is named. With `skip_bad` every run is read
+    once, and those that cannot be read are excluded, with the reason.
 
     Raises:
         UsageError: The path does not exist, or the format is not known.

@@ -37,12 +37,7 @@ class LiveEstimator:
         sample_rate_hz: float,
         conditions: Mapping[str, float | str] = NOT_STATED,
     ) -> None:
-        """Begin before the first sample.
-
-        Args:
-            estimator: The estimator.
-            sample_rate_hz: Nominal rate of the device's clock, Hz.
-            conditions: Conditions of the run, as far as they are known.
+        """Begin before the first sample of a run of these conditions, at a nominal rate.
 
         Raises:
             EstimationError: The model is not fitted, or it cannot run at this rate.

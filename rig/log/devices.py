@@ -33,12 +33,9 @@ def device_topics(log: LogFile) -> list[str]:
 
 
 def device_columns(log: LogFile) -> tuple[dict[str, FloatArray], NDArray[np.uint8]]:
-    """Return the channels of further devices at the samples of a log.
+    """Return the channels of further devices at the samples of a log with the topic `/rig/sample`.
 
     Channels in raw counts are left out: they have no unit.
-
-    Args:
-        log: A log with the topic `/rig/sample`.
 
     Returns:
         Values by channel, shape (n,) each, NaN where a device sent nothing; and the flags of the

@@ -95,14 +95,11 @@ def _refuse_unflagged(stream: Stream, payload: NDArray[np.void]) -> None:
 def message_records(
     stream: Stream, payload: NDArray[np.void], log_time_ns: ArrayLike, channel: int, already: int
 ) -> NDArray[np.void]:
-    """Return MCAP message records of the stream's `record_dtype`, shape (n,).
+    """Return MCAP message records of the stream's `record_dtype`, shape (n,), n >= 1.
 
-    Args:
-        stream: The stream.
-        payload: Rows of the stream's dtype, shape (n,), n >= 1.
-        log_time_ns: When each was taken, ns since the Unix epoch, shape (n,).
-        channel: Channel number.
-        already: Messages of the stream so far; numbers those of a stream without `sequence`.
+    The payload are rows of the stream's dtype, the log times ns since the Unix epoch, shape (n,).
+    `already` is how many messages of the stream there were; it numbers those of a stream without
+    `sequence`.
 
     Raises:
         DataError: The log times do not fit.

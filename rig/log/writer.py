@@ -141,12 +141,9 @@ class LogWriter:
     def write(self, topic: str, rows: Rows, log_time_ns: ArrayLike) -> None:
         """Take a block of messages; it is in the operating system within `MAX_LOSS_S`.
 
-        A message with a value that is not finite must have the reason in its field `flags`.
-
-        Args:
-            topic: Topic of a stream of this log.
-            rows: Messages, a structured array of shape (n,) or one array for each field.
-            log_time_ns: When each was taken, ns since the Unix epoch, shape (n,).
+        The rows are a structured array of shape (n,) or one array for each field. A message with a
+        value that is not finite must have the reason in its field `flags`. The log times are ns
+        since the Unix epoch, shape (n,).
 
         Raises:
             UnflaggedSampleError: A value is not finite and the message's flags are 0.

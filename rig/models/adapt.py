@@ -116,16 +116,10 @@ def run_adaptation(
     seed: int = 0,
     on_run: Callable[[str], None] = lambda run: None,
 ) -> tuple[Adaptation, Adaptable]:
-    """Adapt the source's estimator, and report the errors on the runs not used.
+    """Adapt the source's estimator with some runs, and report the errors on the others.
 
-    Args:
-        source: The source's estimator.
-        name: Its file, for the report.
-        campaign: Runs of the new instrument.
-        used: Names of the runs to adapt with; the end of a name will do where it is one run's.
-        from_scratch: Whether to fit on the target's runs too.
-        seed: Seed of the folds.
-        on_run: Called with each run's name when it has been processed.
+    For a run used the end of its name will do where it is one run's. `from_scratch` fits on the
+    target's runs too. `on_run` is called with each run's name when it has been processed.
 
     Raises:
         UsageError: A run is not there, or none is left to report on.

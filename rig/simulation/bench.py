@@ -183,10 +183,8 @@ class SimulatedBench:
     def advance(self, setpoints: NDArray[np.int32], controllers: Controllers) -> NDArray[np.int32]:
         """Run closed-loop ticks of 1 ms with the plain board's controller, without guards.
 
-        Args:
-            setpoints: Target of the spindle, encoder counts, and current of the load motor, mA;
-                shape (ticks, 2).
-            controllers: The spindle's controller, changed in place.
+        The setpoints are the spindle's target, encoder counts, and the load motor's current, mA,
+        shape (ticks, 2). The controller is changed in place.
 
         Returns:
             Counts with raw signs, shape (ticks, 8): seven inputs and the command.

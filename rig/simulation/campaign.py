@@ -58,11 +58,8 @@ def simulate_reference_campaign(
 ) -> Campaign:
     """Return a campaign of the simulated rig; each run is simulated when it is read.
 
-    Args:
-        seed: Seed of the sensors' noise; each run has its own, made of this and its number.
-        protocol: Protocol file or the name of a shipped one.
-        effects: Hidden effects switched on in every run.
-        parameters: Of the simulated rig; the reference rig's by default.
+    The sensors' noise of each run has a seed of its own, made of this one and its number. The
+    protocol is a file or the name of a shipped one; the hidden effects are on in every run.
 
     Raises:
         UsageError: The protocol does not exist, or no such effect.

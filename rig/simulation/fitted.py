@@ -28,11 +28,8 @@ gear is wound up. Here all of it is plain friction of the spindle that changes s
 def plant_of(models: Iterable[Model]) -> PlantParameters:
     """Return the plant that corresponds to the fitted models; the rest is `DECLARED_PLANT`'s.
 
-    All losses of the cable's equation are at the spindle.
-
-    Args:
-        models: Fitted models of the equations `motor`, `gearbox`, `cable` and `stretch`; any of
-            them may be missing, others are ignored.
+    All losses of the cable's equation are at the spindle. Of the equations `motor`, `gearbox`,
+    `cable` and `stretch` any may be missing; others are ignored.
 
     Raises:
         NotFittedError: A parameter has no value.

@@ -19,14 +19,10 @@ UNPACED_STEP_S = 0.2
 def open_simulated_logger(
     config: Config, pace: float | None = None, step_s: float | None = None
 ) -> SimulatedTransport:
-    """Return the transport of a simulated rig.
+    """Return the transport of a simulated rig: the board of the configuration's profile.
 
-    Args:
-        config: The configuration; its profile names a board in the entry point group
-            `rig.simulated_boards`.
-        pace: Virtual seconds a real second, None for as fast as possible.
-        step_s: Longest virtual time between looks at the board; a choice of its own if None.
-            It is always shorter than the board waits for its host.
+    The pace is virtual seconds a real second, None for as fast as possible; `step_s` the longest
+    virtual time between looks at the board, always shorter than the board waits for its host.
 
     Raises:
         UnknownHiddenEffectError: A hidden effect has no such name.

@@ -60,15 +60,11 @@ def clip(value: float, limit: float) -> float:
 
 @numba.njit()
 def braking(speed: float, most: float, creep_speed: float) -> float:
-    """Return the speed that friction takes in a step: all of it at most, or in proportion to it.
+    """Return the speed that friction takes in a step, of the speed that other torques would give.
 
-    With a creep speed the friction is its level times tanh(speed after the step / creep speed),
-    solved by Newton steps, which come from below and settle.
-
-    Args:
-        speed: Speed the other torques would give.
-        most: What full friction takes in the step.
-        creep_speed: Speed at which three quarters of the friction are there; 0 for dry friction.
+    It is all of it, but at most what full friction takes. With a creep speed, at which three
+    quarters of the friction are there, the friction is its level times tanh(speed after the step /
+    creep speed), solved by Newton steps, which come from below and settle.
     """
     if creep_speed <= 0.0:
         return clip(speed, most)

@@ -97,16 +97,12 @@ def candidates(
     instead: Mapping[str, str] | None = None,
     at_rest: bool = False,
 ) -> list[Term]:
-    """Return the terms that may be added to an equation, without values.
+    """Return the terms that may be added to an equation of `CHANNELS`, without values.
 
-    An effect appears once for each assignment of channels to its roles, such as a delay of either
-    of two sensors.
-
-    Args:
-        equation: One of `CHANNELS`.
-        available: Measured channels of the recordings.
-        instead: Channel to its replacement here, such as a commanded current for the measured one.
-        at_rest: Whether static samples count, so that effects of standstill are candidates.
+    An effect appears once for each assignment of available channels to its roles, such as a delay
+    of either of two sensors. `instead` gives channels their replacement here, such as a commanded
+    current for the measured one. Effects of standstill are candidates where `at_rest` samples
+    count.
     """
     played, known, terms = instead or {}, CHANNELS[equation], []
     for effect in catalogue().values():

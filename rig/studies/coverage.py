@@ -21,11 +21,9 @@ def rows(paper: str) -> tuple[tuple[str, str, str, str], ...]:
 
 
 def coverage(paper: str, part: str = "") -> TextTable:
-    """Return a paper's rows as a table.
+    """Return a paper's rows as a table; the paper is a key of `coverage.toml`.
 
-    Args:
-        paper: Key of `coverage.toml`.
-        part: Of a paper with two pages, only rows whose last column names this command.
+    Of a paper with two pages, `part` is the command that the last column of a row must name.
     """
     shown = [list(row) for row in rows(paper) if not part or f"rig study {part}" in row[3]]
     counts = ", ".join(f"{sum(row[2] == state for row in shown)} {state}" for state in STATES)

@@ -44,11 +44,8 @@ def ratios(
 ) -> TextTable:
     """Return a table of two methods' errors by family.
 
-    Args:
-        title: Title of the table.
-        columns: What the errors are of.
-        found: Family to ours over the paper's method, shape (arms, columns).
-        outside: Families that the catalogue does not have.
+    `found` is ours over the paper's method, shape (arms, columns), by family; `outside` are the
+    families that the catalogue does not have.
     """
     rows = []
     for family, each in found.items():

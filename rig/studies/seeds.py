@@ -47,13 +47,8 @@ def kept_outcomes(
 ) -> list[T]:
     """Do seeds from 0 that are not kept yet, and return the outcomes of all in order.
 
-    Args:
-        kind: Type of an outcome: what JSON can hold, in tuples, dictionaries and dataclasses.
-        one_seed: Does one seed.
-        seeds: Number of seeds.
-        schema: Name of the study's layout.
-        keeper: Where outcomes are kept, and in how many processes they are made.
-        start: Called first in each process; None with one worker works in this one.
+    An outcome is what JSON can hold, in tuples, dictionaries and dataclasses; the schema names the
+    study's layout. `start` is called first in each process; None with one worker works in this one.
 
     Raises:
         OSError: The folder cannot be written.

@@ -86,11 +86,8 @@ def run_intervals(
 ) -> IntervalStudy:
     """Hold the intervals against runs that were not fitted.
 
-    Args:
-        campaigns: Runs of each instrument; those with flagged closing samples are left out.
-        sources: Instruments whose estimators are adapted to every other one.
-        seed: Seed of the folds.
-        on_step: Called with what is done next.
+    Runs with flagged closing samples are left out. The estimators of each source are adapted to
+    every other instrument. `on_step` is called with what is done next.
 
     Raises:
         MissingChannelError: A run lacks a channel.

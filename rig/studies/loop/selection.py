@@ -49,12 +49,8 @@ def selected(
 ) -> list[Chosen]:
     """Return the declared model and, one after another, the models with one more effect.
 
-    Args:
-        declared: The model to begin with.
-        campaign: The training runs.
-        tried: The effects that may be added, each any number of times.
-        parameters: Named parameters of the whole model at most.
-        on_found: Called with each model.
+    Each of the effects tried may be added any number of times, up to so many named parameters of
+    the whole model. `on_found` is called with each model.
     """
     chosen = [Chosen(fit(declared, campaign, bootstrap=0), 0.0)]
     runs = prepared(replace(declared, terms=(*declared.terms, *tried)), campaign)

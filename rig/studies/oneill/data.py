@@ -230,10 +230,7 @@ def held_out_runs(
 ) -> list[NDArray[np.intp]]:
     """Return the places of the runs that each split holds out; empty when it cannot be made.
 
-    Args:
-        conditions: Condition to the value of each run, shape (runs,).
-        protocol: `run-wise`, `lofo` or `lopo`.
-        seed: Seed of `run-wise`, as of `Campaign.folds`.
+    The protocol is `run-wise`, by a seed as of `Campaign.folds`, `lofo` or `lopo`.
     """
     if protocol == "run-wise":
         runs = len(next(iter(conditions.values())))

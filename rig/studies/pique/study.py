@@ -103,14 +103,10 @@ def run_study(
     tried: Sequence[ArmEffect] | None = None,
     on_step: Callable[[str], None] = lambda step: None,
 ) -> Study:
-    """Do the study on two paths of the same arm.
+    """Do the study on two paths of the same arm: the search fits the first and tests on the second.
 
-    Args:
-        first: The path the search fits.
-        second: The path it tests on.
-        also: Further runs to test models on that were fitted on the second path.
-        tried: Effects to search; None takes all that are worth trying.
-        on_step: Called with what is being done.
+    Models that were fitted on the second path are tested on further runs, too. `tried` are the
+    effects to search; None takes all that are worth trying.
 
     Raises:
         ArmError: The thesis' parameters are not identifiable from a path, or it contains no arm.

@@ -194,15 +194,11 @@ def simulate(
     grip_n_m: FloatArray | None = None,
     lead: int = 0,
 ) -> PsmRun:
-    """Return the readings of the sensors in a motion.
+    """Return the readings of the sensors in a motion, shape (n, 7).
 
-    Args:
-        psm: The arm.
-        motion: Its motion, shape (n, 7).
-        rng: For the noise.
-        wrench: Spatial wrench of the tip on its surroundings, shape (n, 6); None in free space.
-        grip_n_m: Torque of the gripper on the object, shape (n,); None without an object.
-        lead: Samples at the start that are discarded: they bring the cables to their initial state.
+    The wrench is that of the tip on its surroundings, spatial, shape (n, 6); None in free space.
+    `grip_n_m` is the torque of the gripper on an object, shape (n,). The first `lead` samples are
+    discarded: they bring the cables to their initial state.
     """
     joints = np.zeros((len(motion), JOINTS))
     joints[:, :GRIPPER] = _declared(psm.arm.values, motion)
