@@ -11,27 +11,16 @@ TRIES = 3
 
 @dataclass(slots=True)
 class LinkCounters:
-    """Counters of a link since it was opened.
+    """Counters of a link since it was opened."""
 
-    Attributes:
-        frames: Good frames received.
-        crc_errors: Frames dropped: wrong CRC, not COBS, or too long.
-        discarded_bytes: Bytes in dropped frames, and those before the first whole frame.
-        unknown_frames: Good frames of an unexpected kind or version.
-        gaps: Places where samples are missing.
-        lost: Samples missing in those places.
-        duplicates: Samples dropped because they had come before.
-        retries: Commands sent again because no answer came.
-    """
-
-    frames: int = 0
-    crc_errors: int = 0
-    discarded_bytes: int = 0
-    unknown_frames: int = 0
-    gaps: int = 0
-    lost: int = 0
-    duplicates: int = 0
-    retries: int = 0
+    frames: int = 0  # good frames received
+    crc_errors: int = 0  # frames dropped: wrong CRC, not COBS, or too long
+    discarded_bytes: int = 0  # bytes in dropped frames, and those before the first whole frame
+    unknown_frames: int = 0  # good frames of an unexpected kind or version
+    gaps: int = 0  # places where samples are missing
+    lost: int = 0  # samples missing in those places
+    duplicates: int = 0  # samples dropped because they had come before
+    retries: int = 0  # commands sent again because no answer came
 
     def as_dict(self) -> dict[str, int]:
         """Return the counters by name."""
@@ -43,20 +32,13 @@ class DeviceCounters(LinkCounters):
     """Counters of a link since it was opened; see also `LinkCounters`.
 
     `crc_errors` counts checksums that do not fit, whatever their kind.
-
-    Attributes:
-        timeouts: Answers that did not come in time, after the retries.
-        stalls: Silences of a stream longer than it should ever be silent.
-        late: Packets dropped because later ones had come before them.
-        device_errors: Samples in which the device itself reports a fault.
-        restarts: Number of restarts of the device's own numbering.
     """
 
-    timeouts: int = 0
-    stalls: int = 0
-    late: int = 0
-    device_errors: int = 0
-    restarts: int = 0
+    timeouts: int = 0  # answers that did not come in time, after the retries
+    stalls: int = 0  # silences of a stream longer than it should ever be silent
+    late: int = 0  # packets dropped because later ones had come before them
+    device_errors: int = 0  # samples in which the device itself reports a fault
+    restarts: int = 0  # number of restarts of the device's own numbering
 
     def attempts(self) -> Iterator[int]:
         """Yield the numbers of the attempts at a question, from 0.

@@ -83,21 +83,14 @@ def decode_frame(encoded: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class DecodedFrames:
-    """What a stretch of a byte stream held.
+    """What a stretch of a byte stream held."""
 
-    Attributes:
-        payloads: Good frames of the expected size, shape (n, payload_size), uint8, in order.
-        others: Payloads of good frames of any other size, in order.
-        bad: Frames dropped: not COBS, wrong CRC, or too long.
-        bad_bytes: Bytes in those frames, delimiters included.
-        tail: Bytes behind the last delimiter: the start of the next frame.
-    """
-
+    # good frames of the expected size, shape (n, payload_size), uint8, in order
     payloads: NDArray[np.uint8]
-    others: list[bytes]
-    bad: int
-    bad_bytes: int
-    tail: bytes
+    others: list[bytes]  # payloads of good frames of any other size, in order
+    bad: int  # frames dropped: not COBS, wrong CRC, or too long
+    bad_bytes: int  # bytes in those frames, delimiters included
+    tail: bytes  # bytes behind the last delimiter: the start of the next frame
 
 
 def decode_frames(data: bytes, payload_size: int) -> DecodedFrames:

@@ -50,65 +50,47 @@ EXPLAINED = 0.5
 
 @dataclass(frozen=True)
 class Identified:
-    """A parameter of an equation, by its effect.
+    """A parameter of an equation, by its effect."""
 
-    Attributes:
-        effect: Id of the effect, with its channels where several terms have it.
-        value: Fitted on the recordings; None without them.
-        at_bound: Whether that is the least or the largest value that makes sense.
-        is_shown: Whether the runs show it: a shape at an end of what their speeds show may be
-            further out.
-    """
-
-    effect: str
+    effect: str  # id of the effect, with its channels where several terms have it
     name: str
     unit: str
     description: str
-    value: float | None = None
-    at_bound: bool = False
+    value: float | None = None  # fitted on the recordings; None without them
+    at_bound: bool = False  # whether that is the least or the largest value that makes sense
+    # whether the runs show it: a shape at an end of what their speeds show may be further out
     is_shown: bool = True
 
 
 @dataclass(frozen=True)
 class CheckedEquation:
-    """One equation of a machine.
-
-    Attributes:
-        sentence: The equation in words.
-        parameters: What it identifies.
-        relative_error: Root mean square of what the fit does not explain over that of the target;
-            None without recordings.
-        between_runs: The same of the runs' means, where the fit ignores them (`run_offsets`); None
-            where it does not.
-        trouble: Why the recordings do not fit it, or contradict it; empty where they do neither.
-        limits: What the recordings do not separate, or show in noise only, sentences.
-    """
+    """One equation of a machine."""
 
     name: str
-    sentence: str
-    parameters: tuple[Identified, ...]
+    sentence: str  # the equation in words
+    parameters: tuple[Identified, ...]  # what it identifies
     target: str
     unit: str
+    # root mean square of what the fit does not explain over that of the target; None without
+    # recordings
     relative_error: float | None = None
+    # the same of the runs' means, where the fit ignores them (`run_offsets`); None where it does
+    # not
     between_runs: float | None = None
+    # why the recordings do not fit it, or contradict it; empty where they do neither
     trouble: str = ""
+    # what the recordings do not separate, or show in noise only, sentences
     limits: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class CheckedPlant:
-    """What can be identified of a machine.
+    """What can be identified of a machine."""
 
-    Attributes:
-        equations: The equations that its sensors allow.
-        missing: What they do not identify.
-        unused: Channels that no equation reads.
-        contradictions: Where the recordings contradict the file, sentences.
-    """
-
-    equations: tuple[CheckedEquation, ...]
-    missing: tuple[Missing, ...]
-    unused: tuple[str, ...]
+    equations: tuple[CheckedEquation, ...]  # the equations that its sensors allow
+    missing: tuple[Missing, ...]  # what they do not identify
+    unused: tuple[str, ...]  # channels that no equation reads
+    # where the recordings contradict the file, sentences
     contradictions: tuple[str, ...] = field(default=())
     runs: int = 0
 

@@ -49,15 +49,12 @@ class Missing:
 
 @dataclass(frozen=True)
 class Chain:
-    """The axes that an actuator drives, one after the other, and the transmissions between them.
-
-    Attributes:
-        also: Further actuators of the first axis, such as the second motor of a gantry.
-    """
+    """The axes that an actuator drives, one after the other, and the transmissions between them."""
 
     actuator: Actuator
     axes: tuple[str, ...]
     joints: tuple[Transmission, ...]
+    # further actuators of the first axis, such as the second motor of a gantry
     also: tuple[Actuator, ...] = ()
 
 

@@ -15,22 +15,15 @@ class ScoreError(EstimationError):
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Error of an estimate over n samples.
-
-    Attributes:
-        mae: Mean absolute error.
-        p95: 95th percentile of the absolute error.
-        rmse: Root mean square error.
-        pearson_r: Pearson's correlation of estimate and truth; NaN when one of them is constant.
-        spearman_rho: Spearman's rank correlation; NaN when one of them is constant.
-    """
+    """Error of an estimate over n samples."""
 
     samples: int
-    mae: float
-    p95: float
-    rmse: float
+    mae: float  # mean absolute error
+    p95: float  # 95th percentile of the absolute error
+    rmse: float  # root mean square error
+    # Pearson's correlation of estimate and truth; NaN when one of them is constant
     pearson_r: float
-    spearman_rho: float
+    spearman_rho: float  # Spearman's rank correlation; NaN when one of them is constant
 
 
 def rmse(estimate: ArrayLike, truth: ArrayLike) -> float:

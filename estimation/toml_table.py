@@ -73,23 +73,15 @@ class Lines:
 
 @dataclass
 class Table:
-    """A TOML table that records which of its keys were read.
+    """A TOML table that records which of its keys were read."""
 
-    Attributes:
-        content: The table as `tomllib` reads it.
-        where: File and table, for messages.
-        error: What is raised.
-        lines: Lines of the file's tables and keys, for messages that name the line.
-        place: The table's name in `lines`, and which one of that name.
-        file: The file, for messages that name a line.
-    """
-
-    content: Mapping[str, Any]
-    where: str
-    error: type[EstimationError] = TableError
+    content: Mapping[str, Any]  # the table as `tomllib` reads it
+    where: str  # file and table, for messages
+    error: type[EstimationError] = TableError  # what is raised
+    # lines of the file's tables and keys, for messages that name the line
     lines: Lines | None = None
-    place: tuple[str, int] = ("", 1)
-    file: str = ""
+    place: tuple[str, int] = ("", 1)  # the table's name in `lines`, and which one of that name
+    file: str = ""  # the file, for messages that name a line
     _read: list[str] = field(default_factory=list)
 
     def at(self, key: str = "") -> str:

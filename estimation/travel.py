@@ -21,16 +21,11 @@ travel; and the travel that a stated ratio is wrong by over what nothing explain
 
 
 class Slope(NamedTuple):
-    """The change of y per change of x besides other channels.
-
-    Attributes:
-        own: Share of the square of x that the other channels do not explain.
-        moved: Root mean square of x over that of what nothing explains, in units of y.
-    """
+    """The change of y per change of x besides other channels."""
 
     value: float
-    own: float
-    moved: float
+    own: float  # share of the square of x that the other channels do not explain
+    moved: float  # root mean square of x over that of what nothing explains, in units of y
 
 
 def slope(

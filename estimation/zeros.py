@@ -21,20 +21,13 @@ LEAST_USUAL = 6
 
 @dataclass(frozen=True)
 class MovedZero:
-    """Runs of one instrument whose zero is farther from the others than these scatter.
+    """Runs of one instrument whose zero is farther from the others than these scatter."""
 
-    Attributes:
-        condition: Name of the zero.
-        lowest: Lowest zero of these runs, in the unit of the condition.
-        highest: Highest zero of these runs.
-        usual: Lowest and highest zero of the others.
-    """
-
-    condition: str
+    condition: str  # name of the zero
     runs: tuple[str, ...]
-    lowest: float
-    highest: float
-    usual: tuple[float, float]
+    lowest: float  # lowest zero of these runs, in the unit of the condition
+    highest: float  # highest zero of these runs
+    usual: tuple[float, float]  # lowest and highest zero of the others
 
     @property
     def sentence(self) -> str:

@@ -37,19 +37,14 @@ _CALIBRATION = struct.Struct(">8s32s4s20s144sBB24sII6H6H")
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Calibration(ati_net.Calibration):
-    """Conversion of gauges to forces and torques.
-
-    Attributes:
-        matrix: Counts of force and torque a gauge count, shape (6, 6); rows Fx to Tz.
-        gains: To be copied to the active gains, shape (6,).
-        offsets: To be copied to the active offsets, shape (6,).
-    """
+    """Conversion of gauges to forces and torques."""
 
     serial: str
     part_number: str
+    # counts of force and torque a gauge count, shape (6, 6); rows Fx to Tz
     matrix: NDArray[np.float64]
-    gains: tuple[int, ...]
-    offsets: tuple[int, ...]
+    gains: tuple[int, ...]  # to be copied to the active gains, shape (6,)
+    offsets: tuple[int, ...]  # to be copied to the active offsets, shape (6,)
 
 
 encode = partial(modbus.encode, SLAVE)

@@ -68,21 +68,13 @@ _PING_ANSWER = struct.Struct("<HB")
 
 @dataclass(frozen=True, slots=True)
 class Present:
-    """What the device measures.
+    """What the device measures."""
 
-    Attributes:
-        current: Motor current, the model's units.
-        velocity: Speed of the horn, counts of 0.229 turns a minute.
-        position: Angle of the horn over all turns, 4096 counts a turn.
-        voltage: Supply, 0.1 V.
-        temperature: Degrees Celsius.
-    """
-
-    current: int
-    velocity: int
-    position: int
-    voltage: int
-    temperature: int
+    current: int  # motor current, the model's units
+    velocity: int  # speed of the horn, counts of 0.229 turns a minute
+    position: int  # angle of the horn over all turns, 4096 counts a turn
+    voltage: int  # supply, 0.1 V
+    temperature: int  # degrees Celsius
 
 
 def crc16(data: bytes) -> int:

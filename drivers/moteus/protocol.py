@@ -52,24 +52,15 @@ FAULTS = {
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What a controller answers in every cycle.
-
-    Attributes:
-        position_rev: Angle of the output, turns.
-        velocity_rev_s: Speed of the output, turns a second.
-        torque_n_m: Torque at the output.
-        current_a: Motor current in quadrature.
-        voltage: Supply, 0.5 V.
-        temperature: Board, degrees Celsius.
-    """
+    """What a controller answers in every cycle."""
 
     mode: int
-    position_rev: float
-    velocity_rev_s: float
-    torque_n_m: float
-    current_a: float
-    voltage: int
-    temperature: int
+    position_rev: float  # angle of the output, turns
+    velocity_rev_s: float  # speed of the output, turns a second
+    torque_n_m: float  # torque at the output
+    current_a: float  # motor current in quadrature
+    voltage: int  # supply, 0.5 V
+    temperature: int  # board, degrees Celsius
     fault: int
 
 

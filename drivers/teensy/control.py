@@ -49,15 +49,10 @@ def control_tick(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Controllers:
-    """The position controllers of a board's motors.
+    """The position controllers of a board's motors."""
 
-    Attributes:
-        state: State of each, shape (motors, 4); changed in place.
-        gains: Gains of each, shape (motors, 5).
-    """
-
-    state: NDArray[np.float64]
-    gains: NDArray[np.float64]
+    state: NDArray[np.float64]  # state of each, shape (motors, 4); changed in place
+    gains: NDArray[np.float64]  # gains of each, shape (motors, 5)
 
     @classmethod
     def fresh(cls, gains: Any) -> "Controllers":

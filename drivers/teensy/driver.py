@@ -19,16 +19,12 @@ from drivers.transport.transport import Transport
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampleBatch:
-    """Samples in device order.
+    """Samples in device order."""
 
-    Attributes:
-        samples: `SAMPLE_DTYPE`, shape (n,); raw counts.
-        tick_us: Device clock without its wrap, microseconds since its last zero, shape (n,), int64.
-        lost: Samples lost since `start`, up to the end of this batch. None is made up for.
-    """
-
-    samples: NDArray[np.void]
+    samples: NDArray[np.void]  # `SAMPLE_DTYPE`, shape (n,); raw counts
+    # device clock without its wrap, microseconds since its last zero, shape (n,), int64
     tick_us: NDArray[np.int64]
+    # Samples lost since `start`, up to the end of this batch. None is made up for.
     lost: int
 
 

@@ -27,19 +27,13 @@ INPUT_NAMES = tuple(f"{what}_{k}" for what in ("motor", "current", "force") for 
 
 @dataclass(frozen=True, kw_only=True)
 class AxisLimits(LoopLimits):
-    """Limits that the board checks on one motor's counts while armed.
+    """Limits that the board checks on one motor's counts while armed."""
 
-    Attributes:
-        max_current: Largest size of the measured current, counts of 1 mA.
-        max_force: Largest force, counts.
-        min_motor: Lowest count of the motor's encoder, for the sample and for a setpoint.
-        max_motor: Highest.
-    """
-
-    max_current: int = TOP
-    max_force: int = TOP
+    max_current: int = TOP  # largest size of the measured current, counts of 1 mA
+    max_force: int = TOP  # largest force, counts
+    # lowest count of the motor's encoder, for the sample and for a setpoint
     min_motor: int = -TOP - 1
-    max_motor: int = TOP
+    max_motor: int = TOP  # highest
 
 
 AXIS_LIMIT_NAMES = (*AxisLimits.__annotations__, *MOTOR_LIMIT_NAMES, *LOOP_LIMIT_NAMES)
@@ -73,12 +67,9 @@ GRASPER = Profile(
 
 @dataclass(frozen=True)
 class GrasperLimits(Choices):
-    """Limits that the board checks on every sample while armed; a missing limit is not checked.
+    """Limits that the board checks on every sample while armed; a missing limit is not checked."""
 
-    Attributes:
-        axes: Limits of each motor; what is held, holds all three.
-    """
-
+    # limits of each motor; what is held, holds all three
     axes: tuple[AxisLimits, AxisLimits, AxisLimits] = (AxisLimits(), AxisLimits(), AxisLimits())
 
     def as_array(self) -> NDArray[np.int64]:

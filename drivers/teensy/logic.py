@@ -20,17 +20,14 @@ TWELVE_BITS = (-(2**32), FORCE_MAX)
 
 @dataclass(frozen=True, eq=False)
 class BoardLogic:
-    """How the samples of one profile are made.
-
-    Attributes:
-        counted: Fields of a sample in the order of a bench's columns: inputs, then commands.
-        converted: Field of each converter to the counts from which down and up it is saturated.
-        stands: Setpoint that follows a count to that count, which it is while nothing is asked.
-    """
+    """How the samples of one profile are made."""
 
     profile: Profile
+    # fields of a sample in the order of a bench's columns: inputs, then commands
     counted: tuple[str, ...]
+    # field of each converter to the counts from which down and up it is saturated
     converted: Mapping[str, tuple[int, int]]
+    # setpoint that follows a count to that count, which it is while nothing is asked
     stands: Mapping[str, str]
 
     def samples(

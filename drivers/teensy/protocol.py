@@ -164,21 +164,14 @@ TOP = 2**31 - 1
 
 @dataclass(frozen=True, slots=True)
 class TripReport:
-    """What a board tripped over first since it was cleared.
-
-    Attributes:
-        channel: Name of the count that crossed; empty where it was none.
-        value: That count; for the host's silence its length, us; for heat, counts^2 s.
-        tick_us: Board clock at the trip.
-        late_us: How long the crossing had lasted by then.
-    """
+    """What a board tripped over first since it was cleared."""
 
     code: Trip
-    channel: str
-    value: int
+    channel: str  # name of the count that crossed; empty where it was none
+    value: int  # that count; for the host's silence its length, us; for heat, counts^2 s
     limit: int
-    tick_us: int
-    late_us: int
+    tick_us: int  # board clock at the trip
+    late_us: int  # how long the crossing had lasted by then
 
 
 @dataclass(frozen=True, slots=True)

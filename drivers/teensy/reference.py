@@ -38,72 +38,48 @@ class Limits(LoopLimits, Choices):
     """Limits that the board checks on every sample while armed, in counts.
 
     One that is not given is not held.
-
-    Attributes:
-        max_current: Largest size of the measured current, counts of 1 mA.
-        max_load_ma: Largest size of a load setpoint, mA; a larger one is refused.
-        max_proximal: Largest size of the proximal torque, counts.
-        max_distal: Largest size of the distal torque, counts.
-        min_spindle: Lowest spindle count, for the sample and for a setpoint.
-        max_spindle: Highest spindle count.
-        min_jaw: Lowest jaw count.
-        max_jaw: Highest jaw count.
-        continuous_load_ma: Load setpoint that warms the load motor no further, mA.
-        load_i2t: Heat above it that the load motor can take, mA^2 s.
-        motor_per_turn: Counts of the motor, signed, for a turn of the spindle; motor and spindle
-            are not compared where this is 0, jaw and spindle where `jaw_per_turn` is.
-        spindle_per_turn: Counts of the spindle, signed, for the same turn.
-        jaw_per_turn: Counts of the jaw, signed, for the same turn.
-        twist_e6: Counts the motor is ahead for 1e6 counts of proximal torque, signed.
-        stretch_e6: Counts the jaw is ahead for 1e6 counts of distal torque, signed.
-        max_twist: Largest span of what motor and spindle differ by otherwise and besides half of
-            that twist, motor counts.
-        max_stretch: The same of jaw and spindle, jaw counts; the jaw's may be 30 ms old.
-        max_spindle_jump: Farthest the spindle's count may go in one tick.
-        max_jaw_jump: Farthest the jaw's count may go in one tick.
-        torque_e3: Proximal counts, signed, that 1000 counts of current make at rest; 0 where they
-            are not compared.
-        max_still_torque: Largest difference of both, besides half of what the current makes, while
-            no encoder counts, proximal counts.
-        max_still_change: Farthest the proximal torque may change meanwhile.
-        max_still_rise: Farthest that difference may rise meanwhile the way the motor turned last.
-        jaw_zero: Jaw count at spindle count 0 with no distal torque.
-        max_beyond: Farthest beyond its travel the spindle may be as the jaw shows it, spindle
-            counts.
-        probe_within: Distance to the end of the travel towards which the spindle is to turn,
-            counts, within which encoders may not count for 30 ticks, or ten times so long at the
-            target. Then the motor pulls away from that end; 10 ticks without a count are then a
-            dead encoder.
-        probe_patience: Ticks more for each 1000 counts farther from that end; `TOP` for no such
-            pull anywhere.
     """
 
-    max_current: int = TOP
-    max_load_ma: int = TOP
-    max_proximal: int = TOP
-    max_distal: int = TOP
-    min_spindle: int = -TOP - 1
-    max_spindle: int = TOP
-    min_jaw: int = -TOP - 1
-    max_jaw: int = TOP
-    continuous_load_ma: int = TOP
-    load_i2t: int = TOP
+    max_current: int = TOP  # largest size of the measured current, counts of 1 mA
+    max_load_ma: int = TOP  # largest size of a load setpoint, mA; a larger one is refused
+    max_proximal: int = TOP  # largest size of the proximal torque, counts
+    max_distal: int = TOP  # largest size of the distal torque, counts
+    min_spindle: int = -TOP - 1  # lowest spindle count, for the sample and for a setpoint
+    max_spindle: int = TOP  # highest spindle count
+    min_jaw: int = -TOP - 1  # lowest jaw count
+    max_jaw: int = TOP  # highest jaw count
+    continuous_load_ma: int = TOP  # load setpoint that warms the load motor no further, mA
+    load_i2t: int = TOP  # heat above it that the load motor can take, mA^2 s
+    # counts of the motor, signed, for a turn of the spindle; motor and spindle are not compared
+    # where this is 0, jaw and spindle where `jaw_per_turn` is
     motor_per_turn: int = 0
-    spindle_per_turn: int = 0
-    jaw_per_turn: int = 0
-    twist_e6: int = 0
-    stretch_e6: int = 0
+    spindle_per_turn: int = 0  # counts of the spindle, signed, for the same turn
+    jaw_per_turn: int = 0  # counts of the jaw, signed, for the same turn
+    twist_e6: int = 0  # counts the motor is ahead for 1e6 counts of proximal torque, signed
+    stretch_e6: int = 0  # counts the jaw is ahead for 1e6 counts of distal torque, signed
+    # largest span of what motor and spindle differ by otherwise and besides half of that twist,
+    # motor counts
     max_twist: int = TOP
-    max_stretch: int = TOP
-    max_spindle_jump: int = TOP
-    max_jaw_jump: int = TOP
+    max_stretch: int = TOP  # the same of jaw and spindle, jaw counts; the jaw's may be 30 ms old
+    max_spindle_jump: int = TOP  # farthest the spindle's count may go in one tick
+    max_jaw_jump: int = TOP  # farthest the jaw's count may go in one tick
+    # proximal counts, signed, that 1000 counts of current make at rest; 0 where they are not
+    # compared
     torque_e3: int = 0
+    # largest difference of both, besides half of what the current makes, while no encoder counts,
+    # proximal counts
     max_still_torque: int = TOP
-    max_still_change: int = TOP
+    max_still_change: int = TOP  # farthest the proximal torque may change meanwhile
+    # farthest that difference may rise meanwhile the way the motor turned last
     max_still_rise: int = TOP
-    jaw_zero: int = 0
+    jaw_zero: int = 0  # jaw count at spindle count 0 with no distal torque
+    # farthest beyond its travel the spindle may be as the jaw shows it, spindle counts
     max_beyond: int = TOP
+    # Distance to the end of the travel towards which the spindle is to turn, counts, within which
+    # encoders may not count for 30 ticks, or ten times so long at the target. Then the motor pulls
+    # away from that end; 10 ticks without a count are then a dead encoder.
     probe_within: int = 0
+    # ticks more for each 1000 counts farther from that end; `TOP` for no such pull anywhere
     probe_patience: int = TOP
 
     def as_array(self) -> NDArray[np.int64]:

@@ -48,20 +48,13 @@ TRACK_DAMPING = 100.0
 
 @dataclass(frozen=True)
 class ArmEffect:
-    """One effect on a joint, as further columns of the torque regressor.
-
-    Attributes:
-        what: Description in one line.
-        columns: Columns along a motion, shape (n, rows, parameters).
-        dissipative: Whether physics forbids negative parameters.
-        damping: How many times the common damping its fit gets.
-    """
+    """One effect on a joint, as further columns of the torque regressor."""
 
     name: str
-    what: str
-    columns: Callable[[Motion], FloatArray]
-    dissipative: bool = False
-    damping: float = 1.0
+    what: str  # description in one line
+    columns: Callable[[Motion], FloatArray]  # columns along a motion, shape (n, rows, parameters)
+    dissipative: bool = False  # whether physics forbids negative parameters
+    damping: float = 1.0  # how many times the common damping its fit gets
 
 
 def row_count(arm: Arm) -> int:

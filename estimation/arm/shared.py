@@ -27,16 +27,12 @@ EDGE_S = 0.5
 
 @dataclass(frozen=True)
 class SharedFit:
-    """Declared parameters that fit all joints together.
+    """Declared parameters that fit all joints together."""
 
-    Attributes:
-        values: Shape (parameters,).
-        corrections: For each joint, the least determined corrections of the links' parameters, by
-            their torque at that joint: the directions that a missing effect may have biased. Shape
-            (joints, parameters, CORRECTIONS), one standard error each.
-    """
-
-    values: FloatArray
+    values: FloatArray  # shape (parameters,)
+    # For each joint, the least determined corrections of the links' parameters, by their torque at
+    # that joint: the directions that a missing effect may have biased. Shape (joints, parameters,
+    # CORRECTIONS), one standard error each.
     corrections: FloatArray
 
 

@@ -29,44 +29,29 @@ class DhRow:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One joint of an arm. Limits are in rad and rad/s, or in m and m/s where prismatic.
-
-    Attributes:
-        row: Where it sits.
-        link: Which of its link's ten parameters count, see `Link`.
-        spring: Whether an elastic torque proportional to its position acts on it.
-    """
+    """One joint of an arm. Limits are in rad and rad/s, or in m and m/s where prismatic."""
 
     name: str
     kind: Literal["revolute", "prismatic"]
-    row: DhRow
+    row: DhRow  # where it sits
     lower: float
     upper: float
     speed: float
-    link: Link = "full"
-    spring: bool = False
+    link: Link = "full"  # which of its link's ten parameters count, see `Link`
+    spring: bool = False  # whether an elastic torque proportional to its position acts on it
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """One body of an arm's spanning tree, on a joint along or about its z axis.
-
-    Attributes:
-        parent: Number of the parent body, from 1; 0 is the base.
-        row: Position of its joint on that body.
-        closure: How far its joint moves with each actuated joint: its row of G.
-        prismatic: Whether its joint slides.
-        link: As `Joint.link`.
-        label: What the names of its parameters end in; its number if empty.
-    """
+    """One body of an arm's spanning tree, on a joint along or about its z axis."""
 
     name: str
-    parent: int
-    row: DhRow
-    closure: tuple[float, ...]
-    prismatic: bool = False
-    link: Link = "full"
-    label: str = ""
+    parent: int  # number of the parent body, from 1; 0 is the base
+    row: DhRow  # position of its joint on that body
+    closure: tuple[float, ...]  # how far its joint moves with each actuated joint: its row of G
+    prismatic: bool = False  # whether its joint slides
+    link: Link = "full"  # as `Joint.link`
+    label: str = ""  # what the names of its parameters end in; its number if empty
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,38 +78,29 @@ class Tool:
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """An arm: its joints in a row, and the bodies of its loops where it has any.
-
-    Attributes:
-        joints: From the base to the tip.
-        tip: The fixed row from the last joint's frame to the tip's.
-        viscous_pairs: Pairs of joints (from 0) whose viscous friction is coupled: the torque of
-            the first by the speed of the second.
-        gravity_m_s2: Gravity in the base frame.
-        source: Source of the numbers.
-        wrist: First joint (from 0) that cables drive from coupled motors, or None.
-        wrist_coupling: M of q = M q_motor for the joints from `wrist` on, the gripper's last.
-        loops: Spanning tree of all bodies, parents first, where loops make more bodies than joints;
-            see `bodies`. The torque of the joints is then the closure's transpose times the tree's
-            (E. del Sol et al. 2014, equations 8 to 13).
-        tip_body: Number of the body that the tip's row is on; 0 is the last joint's.
-        hydraulic: Whether cylinders drive it: every body of the loops rubs on its joint, and the
-            torque, from pressures, has a true zero.
-        carried: Payloads and the masses of a tool; `estimation.arm.payload.carried_torque` returns
-            their joint torque.
-    """
+    """An arm: its joints in a row, and the bodies of its loops where it has any."""
 
     name: str
-    joints: tuple[Joint, ...]
-    tip: DhRow
+    joints: tuple[Joint, ...]  # from the base to the tip
+    tip: DhRow  # the fixed row from the last joint's frame to the tip's
+    # pairs of joints (from 0) whose viscous friction is coupled: the torque of the first by the
+    # speed of the second
     viscous_pairs: tuple[tuple[int, int], ...]
-    gravity_m_s2: tuple[float, float, float]
-    source: str
-    wrist: int | None = None
+    gravity_m_s2: tuple[float, float, float]  # gravity in the base frame
+    source: str  # source of the numbers
+    wrist: int | None = None  # first joint (from 0) that cables drive from coupled motors, or None
+    # M of q = M q_motor for the joints from `wrist` on, the gripper's last
     wrist_coupling: tuple[tuple[float, ...], ...] = ()
+    # Spanning tree of all bodies, parents first, where loops make more bodies than joints; see
+    # `bodies`. The torque of the joints is then the closure's transpose times the tree's (E. del
+    # Sol et al. 2014, equations 8 to 13).
     loops: tuple[Body, ...] = ()
-    tip_body: int = 0
+    tip_body: int = 0  # number of the body that the tip's row is on; 0 is the last joint's
+    # whether cylinders drive it: every body of the loops rubs on its joint, and the torque, from
+    # pressures, has a true zero
     hydraulic: bool = False
+    # payloads and the masses of a tool; `estimation.arm.payload.carried_torque` returns their joint
+    # torque
     carried: tuple[PointMass, ...] = ()
 
     def with_payload(self, *masses: PointMass) -> "Arm":

@@ -31,14 +31,10 @@ wide, so that they barely bias the observable directions."""
 
 @dataclass(frozen=True)
 class Wrench:
-    """Wrenches with their covariance.
+    """Wrenches with their covariance."""
 
-    Attributes:
-        value: Force and moment, shape (n, 6).
-        covariance: Shape (n, 6, 6). In unobservable directions it is that of the prior, not zero.
-    """
-
-    value: FloatArray
+    value: FloatArray  # force and moment, shape (n, 6)
+    # Shape (n, 6, 6). In unobservable directions it is that of the prior, not zero.
     covariance: FloatArray
 
 

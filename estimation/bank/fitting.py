@@ -23,15 +23,10 @@ from estimation.recording import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings of the fit of the weights.
+    """Settings of the fit of the weights."""
 
-    Attributes:
-        ridge: Penalty on a squared weight in units of its column's variance, a sample.
-        offset_share: Share of each run's means that the fit removes, 0 to below 1.
-    """
-
-    ridge: float = 1e-4
-    offset_share: float = 0.5
+    ridge: float = 1e-4  # penalty on a squared weight in units of its column's variance, a sample
+    offset_share: float = 0.5  # share of each run's means that the fit removes, 0 to below 1
 
 
 CHOICES = tuple(Settings(ridge, share) for share in (0.8, 0.5, 0.0) for ridge in (1e-4, 1e-5))

@@ -142,17 +142,12 @@ EFFECTS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Bank:
-    """Which channels are read and which products are made of them.
+    """Which channels are read and which products are made of them."""
 
-    Attributes:
-        surrogate: Channel that represents the load; a key of `LOAD_SCALES`.
-        pose: Channel of the wrist's pose in rad, or empty.
-        without: Effects left out, keys of `EFFECTS`.
-    """
-
+    # channel that represents the load; a key of `LOAD_SCALES`
     surrogate: str = "motor_command_ratio"
-    pose: str = ""
-    without: tuple[str, ...] = ()
+    pose: str = ""  # channel of the wrist's pose in rad, or empty
+    without: tuple[str, ...] = ()  # effects left out, keys of `EFFECTS`
 
     @property
     def channels(self) -> tuple[str, ...]:

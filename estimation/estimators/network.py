@@ -33,17 +33,13 @@ STATE_INPUTS = (
 
 @dataclass(frozen=True)
 class NetworkEstimator:
-    """A trained network as an estimator.
-
-    Attributes:
-        network: The network; its inputs are channel names, its one output the target.
-        instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
-    """
+    """A trained network as an estimator."""
 
     SCHEMA: ClassVar[str] = "rig.estimator/1"
 
-    network: Network
+    network: Network  # the network; its inputs are channel names, its one output the target
     low_pass: LowPass = PAPER
+    # instrument it was fitted on; empty where it is not known, or does not matter
     instrument: str = ""
     origin: Origin | None = None
 

@@ -14,21 +14,14 @@ HASH_DIGITS = 16
 
 @dataclass(frozen=True)
 class Origin:
-    """What is needed to make an estimator again, and to see what changed since.
+    """What is needed to make an estimator again, and to see what changed since."""
 
-    Attributes:
-        made_at: When it was fitted, ISO 8601 with offset from UTC.
-        code: Version and commit of the code that fitted it.
-        data: Hash of each run fitted on, by the run's name.
-        figures: Errors it was reported with, in SI units, by name.
-        adapted_from: Hash of the file of the estimator it was adapted from; empty of a fit.
-    """
-
-    made_at: str
-    code: str
-    data: Mapping[str, str]
+    made_at: str  # when it was fitted, ISO 8601 with offset from UTC
+    code: str  # version and commit of the code that fitted it
+    data: Mapping[str, str]  # hash of each run fitted on, by the run's name
+    # errors it was reported with, in SI units, by name
     figures: Mapping[str, float] = field(default_factory=dict)
-    adapted_from: str = ""
+    adapted_from: str = ""  # hash of the file of the estimator it was adapted from; empty of a fit
     is_simulated: bool = False
 
     def arrays(self) -> dict[str, np.ndarray]:

@@ -31,32 +31,22 @@ BLOCK = 1024
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings of the training.
-
-    Attributes:
-        iterations: Accepted steps at the most.
-        patience: Converged when the error fell by less than `tolerance` over so many steps.
-        tolerance: Relative fall of the root mean square error.
-    """
+    """Settings of the training."""
 
     nodes: int = 30
-    iterations: int = 1000
-    patience: int = 50
-    tolerance: float = 5e-3
+    iterations: int = 1000  # accepted steps at the most
+    patience: int = 50  # converged when the error fell by less than `tolerance` over so many steps
+    tolerance: float = 5e-3  # relative fall of the root mean square error
     seed: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """Result of a training.
-
-    Attributes:
-        converged: Whether it stopped because nothing changed any more.
-        effective_parameters: gamma, the number of weights the data determines, of all parameters.
-    """
+    """Result of a training."""
 
     network: Network
-    converged: bool
+    converged: bool  # whether it stopped because nothing changed any more
+    # gamma, the number of weights the data determines, of all parameters
     effective_parameters: float
     parameters: int
 
