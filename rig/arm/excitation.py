@@ -29,34 +29,22 @@ RATE_HZ = 200.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one search made of one start.
+    """What one search made of one start."""
 
-    Attributes:
-        condition: Condition number of the base regressor, columns of unit length.
-        limits_share: Largest share of any limit that is used, by a bound for every instant.
-    """
-
-    condition: float
-    limits_share: float
+    condition: float  # condition number of the base regressor, columns of unit length
+    limits_share: float  # largest share of any limit that is used, by a bound for every instant
     seconds: float
 
 
 @dataclass(frozen=True)
 class Start:
-    """One start and the results of the searches.
-
-    Attributes:
-        condition: Condition number there.
-        thesis: By the thesis' search.
-        shrunk: Condition number of the thesis' result once it is scaled into the limits.
-        ours: By our search, which goes on from the thesis' result; the time of both.
-    """
+    """One start and the results of the searches."""
 
     seed: int
-    condition: float
-    thesis: Outcome
-    shrunk: float
-    ours: Outcome
+    condition: float  # condition number there
+    thesis: Outcome  # by the thesis' search
+    shrunk: float  # condition number of the thesis' result once it is scaled into the limits
+    ours: Outcome  # by our search, which goes on from the thesis' result; the time of both
 
 
 @dataclass(frozen=True)

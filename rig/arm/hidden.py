@@ -159,15 +159,10 @@ def names_of(family: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class HiddenTorque:
-    """A drawn hidden torque of every joint.
+    """A drawn hidden torque of every joint."""
 
-    Attributes:
-        parts: Of each joint, the drawn torque.
-        amplitude: Of each joint, N m or N: what makes it as large as asked on the motion it was
-            drawn on.
-    """
-
-    parts: tuple[Torque, ...]
+    parts: tuple[Torque, ...]  # of each joint, the drawn torque
+    # of each joint, N m or N: what makes it as large as asked on the motion it was drawn on
     amplitude: FloatArray
 
     def __call__(self, motion: Motion) -> FloatArray:

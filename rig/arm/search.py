@@ -72,20 +72,15 @@ def open_paths(data: Path, names: Sequence[str]) -> list[Recording]:
 
 @dataclass(frozen=True)
 class Trial:
-    """One effect that the search tried.
-
-    Attributes:
-        kept_in_round: Round of the search that kept it, from 1; None if dropped.
-        gain_percent: Mean relative gain over the joints, on the test path of the search: in the
-            round that kept it, else in the last round.
-        other_way_percent: The same in the direction that was not chosen on.
-    """
+    """One effect that the search tried."""
 
     effect: str
     what: str
-    kept_in_round: int | None
+    kept_in_round: int | None  # round of the search that kept it, from 1; None if dropped
+    # mean relative gain over the joints, on the test path of the search: in the round that kept it,
+    # else in the last round
     gain_percent: float
-    other_way_percent: float
+    other_way_percent: float  # the same in the direction that was not chosen on
 
 
 @dataclass(frozen=True)

@@ -22,17 +22,11 @@ from rig.machines.choose import machine_of
 
 @dataclass(frozen=True, slots=True)
 class Latch:
-    """What was latched, and what is left to do.
+    """What was latched, and what is left to do."""
 
-    Attributes:
-        what: The fault or trip in words; empty when nothing was latched.
-        code: Its code, 0 for none.
-        then: What is left to do; may be empty.
-    """
-
-    what: str
-    code: int
-    then: str
+    what: str  # the fault or trip in words; empty when nothing was latched
+    code: int  # its code, 0 for none
+    then: str  # what is left to do; may be empty
 
 
 def clear_latch(config: Config) -> Latch:

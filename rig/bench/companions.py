@@ -38,19 +38,12 @@ SILENCE_S, SILENT_PERIODS = 1.0, 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Beside:
-    """Samples of one device since it was last asked.
+    """Samples of one device since it was last asked."""
 
-    Attributes:
-        host_s: When each was taken, by the host's clock, shape (n,).
-        columns: Values by channel, each of shape (n,).
-        sequence: Number of each sample since the stream began, shape (n,).
-        flags: `SampleFlag` bits, shape (n,).
-    """
-
-    host_s: NDArray[np.float64]
-    columns: Mapping[str, NDArray[np.float64]]
-    sequence: NDArray[np.int64]
-    flags: NDArray[np.uint8]
+    host_s: NDArray[np.float64]  # when each was taken, by the host's clock, shape (n,)
+    columns: Mapping[str, NDArray[np.float64]]  # values by channel, each of shape (n,)
+    sequence: NDArray[np.int64]  # number of each sample since the stream began, shape (n,)
+    flags: NDArray[np.uint8]  # `SampleFlag` bits, shape (n,)
 
 
 class Companion:

@@ -30,21 +30,13 @@ class FirmwareToolError(RigError):
 
 @dataclass(frozen=True, slots=True)
 class Versions:
-    """Which firmware is where.
+    """Which firmware is where."""
 
-    Attributes:
-        program: Protocol of this program.
-        sources: The build of the source tree, or a note that there is none.
-        board: The board's identity, or the reason why it is unknown.
-        fits: Whether program and board have the same protocol.
-        remarks: Remarks, with the next command.
-    """
-
-    program: str
-    sources: str
-    board: str
-    fits: bool
-    remarks: tuple[str, ...]
+    program: str  # protocol of this program
+    sources: str  # the build of the source tree, or a note that there is none
+    board: str  # the board's identity, or the reason why it is unknown
+    fits: bool  # whether program and board have the same protocol
+    remarks: tuple[str, ...]  # remarks, with the next command
 
 
 def source_hash() -> int | None:

@@ -22,16 +22,11 @@ LOOK_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A board that may be flashed.
+    """A board that may be flashed."""
 
-    Attributes:
-        serial: Its USB serial number, the chip's own.
-        state: What is known of its state, in words.
-    """
-
-    serial: str
+    serial: str  # its USB serial number, the chip's own
     port: str
-    state: str
+    state: str  # what is known of its state, in words
 
 
 def board_to_flash(serial: str, profile: Profile) -> Board:

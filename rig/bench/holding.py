@@ -36,14 +36,10 @@ SIMULATED = "sim:"
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """How the program that held a rig let go.
-
-    Attributes:
-        was_killed: Whether it did not end when it was asked to.
-    """
+    """How the program that held a rig let go."""
 
     pid: int
-    was_killed: bool
+    was_killed: bool  # whether it did not end when it was asked to
 
 
 @contextmanager

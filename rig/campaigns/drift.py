@@ -34,19 +34,12 @@ MEDIAN_DIFFERENCE = 0.954
 
 @dataclass(frozen=True)
 class Change:
-    """A change of a parameter.
+    """A change of a parameter."""
 
-    Attributes:
-        first: Place of the first value after it.
-        alarm: Place of the value at which the sum passed its limit.
-        before: Median of the values before it, back to the change before.
-        after: Median of the values from it on, up to the next change.
-    """
-
-    first: int
-    alarm: int
-    before: float
-    after: float
+    first: int  # place of the first value after it
+    alarm: int  # place of the value at which the sum passed its limit
+    before: float  # median of the values before it, back to the change before
+    after: float  # median of the values from it on, up to the next change
 
 
 def changes(values: Sequence[float]) -> list[Change]:

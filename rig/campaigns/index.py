@@ -28,45 +28,30 @@ CALIBRATION = "calibration of"
 
 @dataclass(frozen=True)
 class IndexedRun:
-    """What the index holds of one run.
-
-    Attributes:
-        instrument: Identity of the instrument in words.
-        date: When it was started, ISO 8601, UTC; empty if not recorded.
-        protocol: Name of the protocol, or the calibration whose raw log it is.
-        conditions: Name with unit to value.
-        state: `complete`, or what is wrong with the log.
-        lost: Samples expected and not in the log.
-        duration_s: Planned duration, s, or None.
-        excluded: Why the run does not count as evidence; empty if it does.
-    """
+    """What the index holds of one run."""
 
     file: str
     name: str
     rig: str
-    instrument: str
-    date: str
-    protocol: str
-    conditions: Mapping[str, float | str]
+    instrument: str  # identity of the instrument in words
+    date: str  # when it was started, ISO 8601, UTC; empty if not recorded
+    protocol: str  # name of the protocol, or the calibration whose raw log it is
+    conditions: Mapping[str, float | str]  # name with unit to value
     notes: str
-    state: str
+    state: str  # `complete`, or what is wrong with the log
     samples: int
-    lost: int
-    duration_s: float | None
-    excluded: str
+    lost: int  # samples expected and not in the log
+    duration_s: float | None  # planned duration, s, or None
+    excluded: str  # why the run does not count as evidence; empty if it does
 
 
 @dataclass(frozen=True)
 class IndexedCampaign:
-    """A folder of logs.
-
-    Attributes:
-        runs: Its runs; of several attempts at a run the one that counts.
-        diagnosis: Its latest diagnosis, an object of `rig.diagnosis/1`, or None.
-    """
+    """A folder of logs."""
 
     folder: Path
-    runs: tuple[IndexedRun, ...]
+    runs: tuple[IndexedRun, ...]  # its runs; of several attempts at a run the one that counts
+    # its latest diagnosis, an object of `rig.diagnosis/1`, or None
     diagnosis: Mapping[str, Any] | None
 
     @property

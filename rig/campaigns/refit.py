@@ -23,21 +23,14 @@ from rig.importers.registry import open_campaign
 
 @dataclass(frozen=True)
 class Refit:
-    """A model fitted on a campaign.
+    """A model fitted on a campaign."""
 
-    Attributes:
-        key: Digest of the logs' names, sizes and dates and of the model.
-        values: Parameter, as `effect.parameter`, to its value in SI units.
-        rmse: Error of the fit, in the unit of the target; None where it failed.
-        failed: Why it could not be fitted; empty otherwise.
-    """
-
-    key: str
-    values: Mapping[str, float]
+    key: str  # digest of the logs' names, sizes and dates and of the model
+    values: Mapping[str, float]  # parameter, as `effect.parameter`, to its value in SI units
     units: Mapping[str, str]
-    rmse: float | None
+    rmse: float | None  # error of the fit, in the unit of the target; None where it failed
     runs: int
-    failed: str = ""
+    failed: str = ""  # why it could not be fitted; empty otherwise
 
 
 def refit_all(

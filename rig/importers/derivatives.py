@@ -59,19 +59,12 @@ SHIFT_GAIN = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """How a channel's slope compares with its stated derivative.
+    """How a channel's slope compares with its stated derivative."""
 
-    Attributes:
-        ratio: Slope over derivative, negative where the signs differ; 1 is right.
-        lag_s: Time by which the derivative is late, s; negative where it is early.
-        lag_is_shift: Whether the lag is too large for a filter.
-        correlation: Correlation of the two after the lag, 0 to 1.
-    """
-
-    ratio: float
-    lag_s: float
-    lag_is_shift: bool
-    correlation: float
+    ratio: float  # slope over derivative, negative where the signs differ; 1 is right
+    lag_s: float  # time by which the derivative is late, s; negative where it is early
+    lag_is_shift: bool  # whether the lag is too large for a filter
+    correlation: float  # correlation of the two after the lag, 0 to 1
 
     def allows(self, ratio: float) -> bool:
         """Return whether the true ratio's size may be this one, by the noise in either channel."""

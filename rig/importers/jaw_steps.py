@@ -40,14 +40,10 @@ ALIKE = {
 
 @dataclass(frozen=True, slots=True)
 class JawStep:
-    """A step of the jaw's zero.
-
-    Attributes:
-        step_rad: Change of the zero, rad, closing positive.
-    """
+    """A step of the jaw's zero."""
 
     run: str
-    step_rad: float
+    step_rad: float  # change of the zero, rad, closing positive
 
 
 def with_one_zero(campaign: Campaign, target: str) -> tuple[Campaign, tuple[JawStep, ...]]:

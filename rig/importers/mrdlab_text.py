@@ -43,15 +43,10 @@ STEP_TOLERANCE_RATIO = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """One log as it was written.
+    """One log as it was written."""
 
-    Attributes:
-        header: The `%` lines, without the signs.
-        columns: Raw values in the file's column order, shape (10, n); time in seconds.
-    """
-
-    header: str
-    columns: FloatArray
+    header: str  # the `%` lines, without the signs
+    columns: FloatArray  # raw values in the file's column order, shape (10, n); time in seconds
     header_lines: int
 
 

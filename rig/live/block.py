@@ -40,26 +40,21 @@ class LimitStatus:
 class SampleBlock:
     """Consecutive samples, usually 50 ms of them; none when nothing arrived during its time.
 
-    Attributes:
-        time_s: Device clock, shape (n,), increasing.
-        columns: Channel name to values, shape (n,) each, SI units, closing positive.
-        flags: `estimation.recording.Flag` bits, shape (n,), uint8.
-        estimates: Channel name to its estimate, shape (n,) each; may be empty.
-        lost: Samples lost since the start.
-        inside: Channel name to whether its estimate is within the fitted range of its
-            estimator, shape (n,) each; channels of estimators without a range are missing.
-
     Raises:
         BlockError: The parts are not of one length, or time does not increase.
     """
 
-    time_s: FloatArray
+    time_s: FloatArray  # device clock, shape (n,), increasing
+    # channel name to values, shape (n,) each, SI units, closing positive
     columns: Mapping[str, FloatArray]
-    flags: NDArray[np.uint8]
+    flags: NDArray[np.uint8]  # `estimation.recording.Flag` bits, shape (n,), uint8
+    # channel name to its estimate, shape (n,) each; may be empty
     estimates: Mapping[str, FloatArray]
-    lost: int
+    lost: int  # samples lost since the start
     devices: tuple[DeviceStatus, ...]
     limits: tuple[LimitStatus, ...] = ()
+    # channel name to whether its estimate is within the fitted range of its estimator, shape (n,)
+    # each; channels of estimators without a range are missing
     inside: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

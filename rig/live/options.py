@@ -12,24 +12,17 @@ from rig.live.keys import DisplayKeys
 class ShowOptions:
     """Options of a display.
 
-    Attributes:
-        channels: Quantities to watch, the main one first.
-        devices: Further devices whose channels are shown too.
-        lever_m: Lever arm from the jaw's axis to its tip; 12 mm in O'Neill et al. 2018.
-        plain: Lines for people, also in a terminal that could draw.
-        json: One JSON object a line on stdout, nothing for people.
-        half_widths: Returns half of the 95 % interval of each channel's newest estimate, SI.
-
     Raises:
         UsageError: The lever arm is not a positive length.
     """
 
     title: str
-    channels: tuple[str, ...] = ("distal_torque_n_m",)
-    devices: tuple[str, ...] = ()
-    lever_m: float = 0.012
-    plain: bool = False
-    json: bool = False
+    channels: tuple[str, ...] = ("distal_torque_n_m",)  # quantities to watch, the main one first
+    devices: tuple[str, ...] = ()  # further devices whose channels are shown too
+    lever_m: float = 0.012  # lever arm from the jaw's axis to its tip; 12 mm in O'Neill et al. 2018
+    plain: bool = False  # lines for people, also in a terminal that could draw
+    json: bool = False  # one JSON object a line on stdout, nothing for people
+    # returns half of the 95 % interval of each channel's newest estimate, SI
     half_widths: Callable[[], Mapping[str, float]] = dict
     footer: str = "Ctrl-C quits"
     help: str = ""

@@ -45,24 +45,18 @@ class Value:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One quantity: estimate and sensor reading, means of the last 0.1 s.
-
-    Attributes:
-        has_estimator: Whether the stream carries estimates of it.
-        error_rms: Root mean square of estimate minus sensor over the last 5 s, or None.
-        estimate_trace: Least and greatest estimate in each 20 ms of the last 10 s, shape (2, 500),
-            oldest first, NaN where there is none.
-        sensor_trace: The same of the sensor.
-    """
+    """One quantity: estimate and sensor reading, means of the last 0.1 s."""
 
     channel: str
     unit: str
-    has_estimator: bool
+    has_estimator: bool  # whether the stream carries estimates of it
     estimate: Value
     sensor: Value
-    error_rms: float | None
+    error_rms: float | None  # root mean square of estimate minus sensor over the last 5 s, or None
+    # least and greatest estimate in each 20 ms of the last 10 s, shape (2, 500), oldest first, NaN
+    # where there is none
     estimate_trace: FloatArray
-    sensor_trace: FloatArray
+    sensor_trace: FloatArray  # the same of the sensor
 
     @property
     def source(self) -> str:
@@ -77,50 +71,32 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """One picture of the stream.
+    """One picture of the stream."""
 
-    Attributes:
-        time_s: Device time of the newest sample, or None before the first.
-        samples: Samples received since the start, as `lost`.
-        sample_rate_hz: Samples received over device time in the last 2 s, or None.
-        flagged: Name of each flag seen in the last 10 s and on how many samples.
-        readings: The watched quantities, the main one first.
-    """
-
-    time_s: float | None
-    samples: int
+    time_s: float | None  # device time of the newest sample, or None before the first
+    samples: int  # samples received since the start, as `lost`
     lost: int
-    sample_rate_hz: float | None
-    flagged: Mapping[str, int]
-    readings: tuple[Reading, ...]
+    sample_rate_hz: float | None  # samples received over device time in the last 2 s, or None
+    flagged: Mapping[str, int]  # name of each flag seen in the last 10 s and on how many samples
+    readings: tuple[Reading, ...]  # the watched quantities, the main one first
     devices: tuple[DeviceStatus, ...]
     limits: tuple[LimitStatus, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """Summary of a whole stream.
+    """Summary of a whole stream."""
 
-    Attributes:
-        ended: `finished` when the stream ended, `interrupted` when a person left.
-        duration_s: Device time covered.
-        flagged: Name of each flag seen and on how many samples.
-        error_rms: Root mean square of its estimate minus its sensor value, SI, or None.
-        error_samples: Samples in that number: those not flagged and with both values.
-        inside_rms: The same within the fitted range of the estimator, or None.
-        inside_samples: Samples in that number.
-    """
-
-    ended: str
-    duration_s: float
+    ended: str  # `finished` when the stream ended, `interrupted` when a person left
+    duration_s: float  # device time covered
     samples: int
     lost: int
-    flagged: Mapping[str, int]
+    flagged: Mapping[str, int]  # name of each flag seen and on how many samples
     channel: str
-    error_rms: float | None
-    error_samples: int
-    inside_rms: float | None = None
-    inside_samples: int = 0
+    error_rms: float | None  # root mean square of its estimate minus its sensor value, SI, or None
+    error_samples: int  # samples in that number: those not flagged and with both values
+    inside_rms: float | None = None  # the same within the fitted range of the estimator, or None
+    inside_samples: int = 0  # samples in that number
 
     @property
     def exit_code(self) -> ExitCode:

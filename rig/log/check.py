@@ -39,49 +39,33 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Samples that are missing between two that are there.
-
-    Attributes:
-        start_s: Time of the last sample before the gap, s, in the stream's own time.
-        length_s: Time from that sample to the first one after the gap, s.
-    """
+    """Samples that are missing between two that are there."""
 
     first_sequence: int
     last_sequence: int
     samples: int
-    start_s: float
-    length_s: float
+    start_s: float  # time of the last sample before the gap, s, in the stream's own time
+    length_s: float  # time from that sample to the first one after the gap, s
 
 
 @dataclass(frozen=True)
 class TopicReport:
-    """Result of a check of one stream.
-
-    Attributes:
-        received: Samples in the file.
-        expected: Samples that should be there: the largest of the three below and of `received`.
-        expected_by_sequence: From the first sequence number to the last; None without them.
-        expected_by_plan: From the planned duration and rate; None without a plan.
-        expected_by_recorder: What the recorder had counted at the end; None if not recorded.
-        repeats: Samples whose sequence number does not come after the one before.
-        time_steps_back: Samples whose time does not come after the one before.
-        not_finite: Samples with a measurement that is not finite, all of them.
-        not_finite_unflagged: Those of them that no flag explains.
-        salvaged: Samples from the torn end of the file, which no checksum vouches for.
-    """
+    """Result of a check of one stream."""
 
     topic: str
-    received: int
-    expected: int
+    received: int  # samples in the file
+    expected: int  # samples that should be there: the largest of the three below and of `received`
+    # from the first sequence number to the last; None without them
     expected_by_sequence: int | None
-    expected_by_plan: int | None
+    expected_by_plan: int | None  # from the planned duration and rate; None without a plan
+    # what the recorder had counted at the end; None if not recorded
     expected_by_recorder: int | None
     gaps: tuple[Gap, ...]
-    repeats: int
-    time_steps_back: int
-    not_finite: int
-    not_finite_unflagged: int
-    salvaged: int
+    repeats: int  # samples whose sequence number does not come after the one before
+    time_steps_back: int  # samples whose time does not come after the one before
+    not_finite: int  # samples with a measurement that is not finite, all of them
+    not_finite_unflagged: int  # those of them that no flag explains
+    salvaged: int  # samples from the torn end of the file, which no checksum vouches for
 
     @property
     def sound(self) -> bool:
@@ -94,23 +78,16 @@ class TopicReport:
 
 @dataclass(frozen=True)
 class LogReport:
-    """Result of a check.
-
-    Attributes:
-        run: Name of the run; None when that is lost.
-        closed: Whether the recorder closed the log.
-        problems: Faults in words; empty when the log is complete.
-        unchecked_chunks: Chunks that carry no checksum.
-    """
+    """Result of a check."""
 
     path: Path
-    run: str | None
+    run: str | None  # name of the run; None when that is lost
     verdict: Verdict
-    closed: bool
-    problems: tuple[str, ...]
+    closed: bool  # whether the recorder closed the log
+    problems: tuple[str, ...]  # faults in words; empty when the log is complete
     topics: tuple[TopicReport, ...]
     damage: tuple[Damage, ...]
-    unchecked_chunks: int
+    unchecked_chunks: int  # chunks that carry no checksum
 
 
 def check_log(path: Path) -> LogReport:

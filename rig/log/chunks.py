@@ -41,16 +41,12 @@ Bytes = NDArray[np.uint8]
 
 @dataclass
 class Found:
-    """Messages of the wanted channels, and what is damaged.
+    """Messages of the wanted channels, and what is damaged."""
 
-    Attributes:
-        data: Channel to the bytes of its message records, in file order.
-        damage: Chunks that could not be read.
-        salvaged: Channel to the number of its messages that come from a torn chunk.
-    """
-
+    # channel to the bytes of its message records, in file order
     data: dict[int, Bytes] = field(default_factory=dict)
-    damage: list[Damage] = field(default_factory=list)
+    damage: list[Damage] = field(default_factory=list)  # chunks that could not be read
+    # channel to the number of its messages that come from a torn chunk
     salvaged: dict[int, int] = field(default_factory=dict)
 
 

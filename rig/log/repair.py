@@ -21,23 +21,16 @@ class RepairError(DataError):
 
 @dataclass(frozen=True)
 class RepairReport:
-    """Result of a repair.
-
-    Attributes:
-        repaired: The new log, read back and equal to what was recovered; None when there was
-            nothing to repair.
-        recovered: Topic to the samples recovered.
-        lost: Topic to the samples known to be lost, from sequence numbers, plan and recorder.
-        salvaged: Topic to those of the recovered samples that no checksum vouches for.
-        problems: Faults of the original, in words.
-    """
+    """Result of a repair."""
 
     original: Path
+    # the new log, read back and equal to what was recovered; None when there was nothing to repair
     repaired: Path | None
-    recovered: dict[str, int]
+    recovered: dict[str, int]  # topic to the samples recovered
+    # topic to the samples known to be lost, from sequence numbers, plan and recorder
     lost: dict[str, int]
-    salvaged: dict[str, int]
-    problems: tuple[str, ...]
+    salvaged: dict[str, int]  # topic to those of the recovered samples that no checksum vouches for
+    problems: tuple[str, ...]  # faults of the original, in words
 
 
 def repaired_path(path: Path) -> Path:

@@ -24,59 +24,45 @@ SIMULATED = "simulated"
 
 @dataclass(frozen=True)
 class RunInfo:
-    """Metadata at the start of a recording.
+    """Metadata at the start of a recording."""
 
-    Attributes:
-        name: Name of the run, unique in its campaign.
-        conditions: Constant conditions, SI numbers with the unit in the name, or words.
-        started_at_ns: Start of the run, ns since the Unix epoch, or None when not known.
-        duration_s: Planned duration, s, or None when open-ended.
-        calibrations: Calibration name to content hash.
-        zeros_before: Sensor zeros taken before the run, name with unit to value.
-        source: Source of the data, when it was not recorded here.
-        excluded: Why the run is left out of evidence, or None.
-        details: Anything else that JSON can hold, such as the protocol and software versions.
-    """
-
-    name: str
+    name: str  # name of the run, unique in its campaign
     rig: str = ""
     instrument: Instrument = field(default_factory=Instrument)
+    # constant conditions, SI numbers with the unit in the name, or words
     conditions: Mapping[str, float | str] = field(default_factory=dict)
     notes: str = ""
+    # start of the run, ns since the Unix epoch, or None when not known
     started_at_ns: int | None = None
-    duration_s: float | None = None
+    duration_s: float | None = None  # planned duration, s, or None when open-ended
+    # calibration name to content hash
     calibrations: Mapping[str, str] = field(default_factory=dict)
+    # sensor zeros taken before the run, name with unit to value
     zeros_before: Mapping[str, float] = field(default_factory=dict)
-    source: str = ""
-    excluded: str | None = None
+    source: str = ""  # source of the data, when it was not recorded here
+    excluded: str | None = None  # why the run is left out of evidence, or None
+    # anything else that JSON can hold, such as the protocol and software versions
     details: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class RunEnd:
-    """Metadata at the end of a recording.
+    """Metadata at the end of a recording."""
 
-    Attributes:
-        clean: Whether the run went as planned to its end.
-        reason: Why it did not, in words; empty when it did.
-        expected_samples: Topic to the number of samples the recorder should have received.
-        counters: Counters of the link, such as `crc_errors` and `lost_frames`.
-        zeros_after: Sensor zeros taken after the run, name with unit to value.
-        drift: Zero after minus zero before, name with unit to value.
-        drift_verdict: Verdict on the drift, in words; empty when not judged.
-        excluded: Why the run is left out of evidence, when that was found at its end.
-        details: Anything else that JSON can hold.
-    """
-
-    clean: bool = True
-    reason: str = ""
+    clean: bool = True  # whether the run went as planned to its end
+    reason: str = ""  # why it did not, in words; empty when it did
+    # topic to the number of samples the recorder should have received
     expected_samples: Mapping[str, int] = field(default_factory=dict)
+    # counters of the link, such as `crc_errors` and `lost_frames`
     counters: Mapping[str, int] = field(default_factory=dict)
+    # sensor zeros taken after the run, name with unit to value
     zeros_after: Mapping[str, float] = field(default_factory=dict)
+    # zero after minus zero before, name with unit to value
     drift: Mapping[str, float] = field(default_factory=dict)
-    drift_verdict: str = ""
+    drift_verdict: str = ""  # verdict on the drift, in words; empty when not judged
+    # why the run is left out of evidence, when that was found at its end
     excluded: str | None = None
-    details: Mapping[str, Any] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)  # anything else that JSON can hold
 
 
 Record = RunInfo | RunEnd | Mark | Stretch

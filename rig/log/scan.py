@@ -50,38 +50,24 @@ class NotALogError(DataError):
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """A damaged place of a file.
+    """A damaged place of a file."""
 
-    Attributes:
-        offset: Byte it starts at.
-        length: Bytes affected; 0 where something is missing.
-    """
-
-    offset: int
-    length: int
+    offset: int  # byte it starts at
+    length: int  # bytes affected; 0 where something is missing
     what: str
 
 
 @dataclass(slots=True)
 class ChunkRef:
-    """Where a chunk is and what it states about itself.
+    """Where a chunk is and what it states about itself."""
 
-    Attributes:
-        offset: Byte of the file its record starts at.
-        data: Range of its packed bytes in the file.
-        compression: "zstd" or "".
-        unpacked_bytes: Size once unpacked.
-        crc: CRC-32 of the unpacked bytes; 0 for none.
-        torn: Whether the file ends inside it.
-        indexed: Channel to the number of its messages, as the index records behind it state.
-    """
-
-    offset: int
-    data: range
-    compression: str
-    unpacked_bytes: int
-    crc: int
-    torn: bool = False
+    offset: int  # byte of the file its record starts at
+    data: range  # range of its packed bytes in the file
+    compression: str  # "zstd" or ""
+    unpacked_bytes: int  # size once unpacked
+    crc: int  # CRC-32 of the unpacked bytes; 0 for none
+    torn: bool = False  # whether the file ends inside it
+    # channel to the number of its messages, as the index records behind it state
     indexed: dict[int, int] = field(default_factory=dict)
 
 

@@ -49,27 +49,17 @@ class LayoutError(UsageError):
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field of a message.
+    """One field of a message."""
 
-    Attributes:
-        name: Name, ending in its unit where it has one: lower case letters, digits, single `_`.
-        dtype: ROS 2 type, a key of `NUMPY_TYPES`.
-        unit: SI unit symbol; "1" for a ratio, "" for counts and identifiers.
-    """
-
-    name: str
-    dtype: str
-    unit: str = ""
+    name: str  # name, ending in its unit where it has one: lower case letters, digits, single `_`
+    dtype: str  # ROS 2 type, a key of `NUMPY_TYPES`
+    unit: str = ""  # SI unit symbol; "1" for a ratio, "" for counts and identifiers
     description: str = ""
 
 
 @dataclass(frozen=True)
 class Stream:
     """One stream of messages of a log, such as `rig_msgs/msg/Sample` at `/rig/sample`.
-
-    Attributes:
-        fields: Fields in the order they are stored, large to small.
-        rate_hz: Expected rate, Hz, or None when it has none.
 
     Raises:
         LayoutError: A type is not of fixed size, the order would need padding, or a name or unit
@@ -78,8 +68,8 @@ class Stream:
 
     topic: str
     message_type: str
-    fields: tuple[Field, ...]
-    rate_hz: float | None = None
+    fields: tuple[Field, ...]  # fields in the order they are stored, large to small
+    rate_hz: float | None = None  # expected rate, Hz, or None when it has none
 
     def __post_init__(self) -> None:
         if not _TYPE.fullmatch(self.message_type):

@@ -20,25 +20,16 @@ from estimation.recording import Flag
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """A stretch of samples, as counts and in SI.
+    """A stretch of samples, as counts and in SI."""
 
-    Attributes:
-        counts: Raw samples, structured, shape (n,).
-        tick_us: Device clock without its wrap, us, shape (n,).
-        time_s: Device clock since the session's first sample, s, shape (n,).
-        columns: SI channels, closing-positive, each of shape (n,).
-        flags: `Flag` bits, shape (n,).
-        setpoint: Index of the setpoint played in each sample, -1 where none was, shape (n,).
-        lost: Samples lost since the session began.
-    """
-
-    counts: NDArray[np.void]
-    tick_us: NDArray[np.int64]
-    time_s: NDArray[np.float64]
-    columns: Mapping[str, NDArray[np.float64]]
-    flags: NDArray[np.uint8]
+    counts: NDArray[np.void]  # raw samples, structured, shape (n,)
+    tick_us: NDArray[np.int64]  # device clock without its wrap, us, shape (n,)
+    time_s: NDArray[np.float64]  # device clock since the session's first sample, s, shape (n,)
+    columns: Mapping[str, NDArray[np.float64]]  # SI channels, closing-positive, each of shape (n,)
+    flags: NDArray[np.uint8]  # `Flag` bits, shape (n,)
+    # index of the setpoint played in each sample, -1 where none was, shape (n,)
     setpoint: NDArray[np.int64]
-    lost: int
+    lost: int  # samples lost since the session began
 
     @property
     def armed(self) -> bool:

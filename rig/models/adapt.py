@@ -30,35 +30,23 @@ FOLDS = 5
 
 @dataclass(frozen=True)
 class Adaptation:
-    """Errors on the closing samples of the runs not used, in the target's SI unit.
-
-    Attributes:
-        source: File of the source's estimator.
-        kind: `states` or `network`.
-        used: Runs adapted with.
-        unused: Runs reported on.
-        left_out: Runs with flagged closing samples or without any, not reported on.
-        as_it_is: The source's estimator as it is.
-        adapted: The source's estimator adapted with the runs used.
-        scratch: The same kind fitted on the target's other runs, in folds; None where not done.
-        covered: Share of the samples inside the adapted estimator's interval; None without one.
-        rmse_by_run: Error of the adapted estimator by run.
-        moved_zeros: Runs at another zero than the others.
-    """
+    """Errors on the closing samples of the runs not used, in the target's SI unit."""
 
     schema: str
-    source: str
-    kind: str
+    source: str  # file of the source's estimator
+    kind: str  # `states` or `network`
     target: str
-    used: tuple[str, ...]
-    unused: tuple[str, ...]
-    left_out: tuple[str, ...]
-    as_it_is: Score
-    adapted: Score
+    used: tuple[str, ...]  # runs adapted with
+    unused: tuple[str, ...]  # runs reported on
+    left_out: tuple[str, ...]  # runs with flagged closing samples or without any, not reported on
+    as_it_is: Score  # the source's estimator as it is
+    adapted: Score  # the source's estimator adapted with the runs used
+    # the same kind fitted on the target's other runs, in folds; None where not done
     scratch: Score | None
+    # share of the samples inside the adapted estimator's interval; None without one
     covered: float | None
-    rmse_by_run: dict[str, float]
-    moved_zeros: tuple[MovedZero, ...]
+    rmse_by_run: dict[str, float]  # error of the adapted estimator by run
+    moved_zeros: tuple[MovedZero, ...]  # runs at another zero than the others
     provenance: Provenance
 
 

@@ -29,55 +29,39 @@ CERTAIN = 0.05
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two estimators, by its file and the file's hash.
-
-    Attributes:
-        origin: Where it comes from, as its file states; None where it states nothing.
-        seen: Runs compared on that it was fitted on, by the hash of their samples.
-    """
+    """One of the two estimators, by its file and the file's hash."""
 
     file: str
     hash: str
-    origin: Origin | None
-    seen: tuple[str, ...]
+    origin: Origin | None  # where it comes from, as its file states; None where it states nothing
+    seen: tuple[str, ...]  # runs compared on that it was fitted on, by the hash of their samples
 
 
 @dataclass(frozen=True)
 class RunErrors:
-    """Errors on the valid closing samples of one run, SI units, of the first and the second.
-
-    Attributes:
-        samples: Samples compared on.
-        mean: Mean errors, estimate less truth.
-        covered: Share of the samples inside the interval of 95 %, of those with one; None without.
-        conditions: The run's conditions that are numbers.
-    """
+    """Errors on the valid closing samples of one run, SI units, of the first and the second."""
 
     run: str
-    samples: int
+    samples: int  # samples compared on
     rmse: tuple[float, float]
-    mean: tuple[float, float]
+    mean: tuple[float, float]  # mean errors, estimate less truth
+    # share of the samples inside the interval of 95 %, of those with one; None without
     covered: tuple[float | None, float | None]
-    conditions: dict[str, float]
+    conditions: dict[str, float]  # the run's conditions that are numbers
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Result for the channel that both sides estimate.
-
-    Attributes:
-        left_out: Runs without a valid closing sample.
-        rmse: Root mean square errors over all samples.
-        p: Chance of runs' errors at least this different if neither were better (Wilcoxon's
-            signed-rank test); 1 for fewer than two runs.
-    """
+    """Result for the channel that both sides estimate."""
 
     schema: str
     target: str
     sides: tuple[Side, Side]
     runs: tuple[RunErrors, ...]
-    left_out: tuple[str, ...]
-    rmse: tuple[float, float]
+    left_out: tuple[str, ...]  # runs without a valid closing sample
+    rmse: tuple[float, float]  # root mean square errors over all samples
+    # chance of runs' errors at least this different if neither were better (Wilcoxon's signed-rank
+    # test); 1 for fewer than two runs
     p: float
     provenance: Provenance
 

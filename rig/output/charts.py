@@ -28,25 +28,17 @@ Line = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Chart:
-    """One chart.
+    """One chart."""
 
-    Attributes:
-        name: Id in the page and name of exported files.
-        judgement: Conclusion that the chart supports, in a sentence.
-        layout: Axes, as Plotly has them.
-        lines: What is drawn.
-        choices: Name to what is drawn once it is chosen, in place of `lines`; empty without choice.
-        table: Its numbers.
-    """
-
-    name: str
+    name: str  # id in the page and name of exported files
     title: str
-    judgement: str
+    judgement: str  # conclusion that the chart supports, in a sentence
     caption: str
-    layout: Mapping[str, Any]
-    lines: Sequence[Line] = ()
+    layout: Mapping[str, Any]  # axes, as Plotly has them
+    lines: Sequence[Line] = ()  # what is drawn
+    # name to what is drawn once it is chosen, in place of `lines`; empty without choice
     choices: Mapping[str, Sequence[Line]] = field(default_factory=dict)
-    table: TextTable | None = None
+    table: TextTable | None = None  # its numbers
 
 
 def numbers(values: FloatArray, digits: int = 5) -> list[float | None]:

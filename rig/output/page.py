@@ -13,18 +13,13 @@ from rig.output.table import TextTable, to_page
 
 @dataclass(frozen=True)
 class Page:
-    """A page of a result.
-
-    Attributes:
-        paragraphs: The result in a few sentences, then remarks for a comparison.
-        figures: Draws the figures, by the name of their file.
-    """
+    """A page of a result."""
 
     title: str
-    paragraphs: Sequence[str]
+    paragraphs: Sequence[str]  # the result in a few sentences, then remarks for a comparison
     tables: Sequence[TextTable]
     provenance: Provenance
-    figures: Callable[[], Mapping[str, str]] = dict
+    figures: Callable[[], Mapping[str, str]] = dict  # draws the figures, by the name of their file
 
     def markdown(self, places: Sequence[str] = ()) -> str:
         """Return the page as Markdown, with its figures at places relative to it."""

@@ -27,20 +27,13 @@ def utc_of(since_epoch_ns: int | None) -> str:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Data needed to reproduce a result.
+    """Data needed to reproduce a result."""
 
-    Attributes:
-        date: Day and time, UTC, ISO 8601 to the minute.
-        commit: As `commit` returns it.
-        seed: Seed of everything random.
-        command: Command line; of an absolute path only the last part, since the others are the
-            machine's own.
-    """
-
-    date: str
-    commit: str
+    date: str  # day and time, UTC, ISO 8601 to the minute
+    commit: str  # as `commit` returns it
     version: str
-    seed: int
+    seed: int  # seed of everything random
+    # command line; of an absolute path only the last part, since the others are the machine's own
     command: str
 
     @classmethod

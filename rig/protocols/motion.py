@@ -22,15 +22,11 @@ RELAX_DECAYS = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Setpoints of a whole motion: approach, the run, release.
+    """Setpoints of a whole motion: approach, the run, release."""
 
-    Attributes:
-        setpoints: One array of shape (n,) for each field of a setpoint, closing-positive, SI units.
-        first: Index of the run's first setpoint.
-    """
-
+    # one array of shape (n,) for each field of a setpoint, closing-positive, SI units
     setpoints: tuple[FloatArray, ...]
-    first: int
+    first: int  # index of the run's first setpoint
     last: int
 
 

@@ -44,20 +44,14 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class RunResult:
-    """Outcome of one run.
-
-    Attributes:
-        expected: Samples the plan asked for.
-        lost: Samples lost on the way from the logger.
-        drift: Zero before against zero after, for each judged sensor.
-    """
+    """Outcome of one run."""
 
     name: str
     path: Path
     samples: int
-    expected: int
-    lost: int
-    drift: tuple[Drift, ...]
+    expected: int  # samples the plan asked for
+    lost: int  # samples lost on the way from the logger
+    drift: tuple[Drift, ...]  # zero before against zero after, for each judged sensor
 
     @property
     def complete(self) -> bool:

@@ -24,25 +24,15 @@ STEP_TICKS = 200
 
 @dataclass(frozen=True)
 class CoreReplay:
-    """What came of a replay.
+    """What came of a replay."""
 
-    Attributes:
-        samples: Samples of the log.
-        same: How many of them the core gave again, bit for bit.
-        first_difference: The first that differs, in words; empty when none does.
-        trips: What the board tripped over in the log, in order.
-        core: Firmware version and build of the log.
-        is_same_core: Whether the core in use is that build.
-        commands: Bytes that were sent to the board.
-    """
-
-    samples: int
-    same: int
-    first_difference: str
-    trips: tuple[str, ...]
-    core: str
-    is_same_core: bool
-    commands: int
+    samples: int  # samples of the log
+    same: int  # how many of them the core gave again, bit for bit
+    first_difference: str  # the first that differs, in words; empty when none does
+    trips: tuple[str, ...]  # what the board tripped over in the log, in order
+    core: str  # firmware version and build of the log
+    is_same_core: bool  # whether the core in use is that build
+    commands: int  # bytes that were sent to the board
 
     @property
     def passed(self) -> bool:

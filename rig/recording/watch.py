@@ -14,12 +14,9 @@ from rig.importers.registry import open_campaign
 
 @dataclass
 class RunWatch:
-    """Watches the runs of a campaign as they are finished.
+    """Watches the runs of a campaign as they are finished."""
 
-    Attributes:
-        watches: Each model's monitor, and the result of each run, in order.
-    """
-
+    # each model's monitor, and the result of each run, in order
     watches: list[tuple[ResidualWatch, list[Sight]]]
 
     @property

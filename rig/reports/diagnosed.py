@@ -25,21 +25,14 @@ from rig.reports.diagnosis_words import sentences
 
 @dataclass(frozen=True)
 class FolderDiagnosis:
-    """The diagnosis of a folder.
+    """The diagnosis of a folder."""
 
-    Attributes:
-        sentences: What it found, in words; empty of a kept one.
-        result: The result as JSON; empty where it failed.
-        page: The page as HTML; empty where it failed, and of a kept one.
-        look: What the access log has to hold; None of a kept one.
-        failed: Why the campaign could not be diagnosed; empty otherwise.
-    """
-
-    sentences: tuple[str, ...] = ()
+    sentences: tuple[str, ...] = ()  # what it found, in words; empty of a kept one
+    # the result as JSON; empty where it failed
     result: Mapping[str, Any] = field(default_factory=dict)
-    page: str = ""
-    look: Look | None = None
-    failed: str = ""
+    page: str = ""  # the page as HTML; empty where it failed, and of a kept one
+    look: Look | None = None  # what the access log has to hold; None of a kept one
+    failed: str = ""  # why the campaign could not be diagnosed; empty otherwise
 
 
 def diagnose_all(

@@ -25,15 +25,11 @@ Task = TypeVar("Task")
 
 @dataclass(frozen=True)
 class Keeper:
-    """Where the outcomes of a study are kept, and how they are made.
-
-    Attributes:
-        workers: Processes; each does one seed at a time.
-        on_seed: Called after each seed, also after one that was kept.
-    """
+    """Where the outcomes of a study are kept, and how they are made."""
 
     state: Path
-    workers: int = 1
+    workers: int = 1  # processes; each does one seed at a time
+    # called after each seed, also after one that was kept
     on_seed: Callable[[], None] = lambda: None
 
 

@@ -36,27 +36,21 @@ class NotMappedError(DataError):
 
 @dataclass(frozen=True)
 class Samples:
-    """One file in SI units.
-
-    Attributes:
-        time_s: Shape (n,), as it is there.
-        edges: First sample of each run, and the end of the last one.
-        channels: Name to values, shape (n,) each; not finite where a cell is empty.
-        conditions: Name to one value, or to values that must be constant in each run.
-        zero_ns: Date at which `time_s` is 0, ns since 1970; 0 where its clock has no date, and
-            None where no column holds the time.
-        remarks: What was assumed about its clock, in words.
-    """
+    """One file in SI units."""
 
     raw: Raw
     mapping: ColumnMapping
-    time_s: FloatArray
-    edges: list[int]
+    time_s: FloatArray  # shape (n,), as it is there
+    edges: list[int]  # first sample of each run, and the end of the last one
+    # name to values, shape (n,) each; not finite where a cell is empty
     channels: dict[str, FloatArray]
+    # name to one value, or to values that must be constant in each run
     conditions: dict[str, float | str | Values]
+    # date at which `time_s` is 0, ns since 1970; 0 where its clock has no date, and None where no
+    # column holds the time
     zero_ns: int | None = None
     doubts: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what was assumed about its clock, in words
 
 
 def to_samples(raw: Raw, mapping: ColumnMapping) -> Samples:

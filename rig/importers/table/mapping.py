@@ -27,15 +27,12 @@ class _Whole(Section):
 
 @dataclass(frozen=True)
 class ColumnMapping:
-    """A mapping, and where each of its entries is written.
-
-    Attributes:
-        flags: Path of an entry to the words of the command line that state it.
-    """
+    """A mapping, and where each of its entries is written."""
 
     data: Data
     file: Path | None = None
     text: str = ""
+    # path of an entry to the words of the command line that state it
     flags: Mapping[tuple[str, ...], str] = field(default_factory=dict)
 
     def where(self, *path: str | int) -> str:

@@ -72,19 +72,13 @@ class RunView:
 
 @dataclass(frozen=True)
 class Preview:
-    """A look at a table.
-
-    Attributes:
-        first: Channel and time to the values of the first samples.
-        wrong: What may be wrong with channels together, in words.
-        remarks: What was assumed, left out or filled in, in words.
-    """
+    """A look at a table."""
 
     runs: tuple[RunView, ...]
     channels: tuple[ChannelView, ...]
-    first: dict[str, list[float]]
-    wrong: tuple[str, ...]
-    remarks: tuple[str, ...]
+    first: dict[str, list[float]]  # channel and time to the values of the first samples
+    wrong: tuple[str, ...]  # what may be wrong with channels together, in words
+    remarks: tuple[str, ...]  # what was assumed, left out or filled in, in words
 
     @property
     def questions(self) -> list[str]:

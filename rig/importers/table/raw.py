@@ -26,27 +26,21 @@ IMPOSSIBLE = 1e24
 
 @dataclass(frozen=True)
 class Raw:
-    """One file.
-
-    Attributes:
-        columns: Name to column, shape (n,) each. Columns of a file without a head are named by
-            their number, from 1.
-        fields: Name to a value that holds for the whole file.
-        remarks: What was found out about the layout, in words.
-        first_line: Line of the file that holds the first sample; 0 where it has no lines.
-        units: Column to what a line of units below the head states of it; nothing where none does.
-        decimal: Decimal sign of a text table; empty for any other file.
-        repeated: Name that several columns have to how many; the second one is called `NAME.2`.
-    """
+    """One file."""
 
     path: Path
+    # Name to column, shape (n,) each. Columns of a file without a head are named by their number,
+    # from 1.
     columns: dict[str, Values]
+    # name to a value that holds for the whole file
     fields: dict[str, float | str] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
-    first_line: int = 0
+    remarks: tuple[str, ...] = ()  # what was found out about the layout, in words
+    first_line: int = 0  # line of the file that holds the first sample; 0 where it has no lines
+    # column to what a line of units below the head states of it; nothing where none does
     units: Mapping[str, str] = field(default_factory=dict)
     units_line: int = 0
-    decimal: str = ""
+    decimal: str = ""  # decimal sign of a text table; empty for any other file
+    # name that several columns have to how many; the second one is called `NAME.2`
     repeated: Mapping[str, int] = field(default_factory=dict)
 
     def __len__(self) -> int:

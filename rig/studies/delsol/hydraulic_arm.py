@@ -74,20 +74,13 @@ SPREAD = 0.2
 
 @dataclass(frozen=True)
 class HydraulicArm:
-    """One arm drawn at random around the plausible one.
+    """One arm drawn at random around the plausible one."""
 
-    Attributes:
-        values: Parameters in the order of `estimation.arm.regressor.names`.
-        hidden: Amplitude of hidden friction of each actuated joint, N m.
-        hose: Stiffness of the hoses on joint 1, N m/rad.
-        constants: True over nominal pressure constant of each actuated joint.
-        form: Hidden torque of a drawn family, in place of the friction with memory.
-    """
-
-    values: FloatArray
-    hidden: FloatArray
-    hose: float
-    constants: FloatArray
+    values: FloatArray  # parameters in the order of `estimation.arm.regressor.names`
+    hidden: FloatArray  # amplitude of hidden friction of each actuated joint, N m
+    hose: float  # stiffness of the hoses on joint 1, N m/rad
+    constants: FloatArray  # true over nominal pressure constant of each actuated joint
+    # hidden torque of a drawn family, in place of the friction with memory
     form: HiddenTorque | None = None
 
 

@@ -70,19 +70,12 @@ LOW_PASS = LowPass(cutoff_hz=5.0, order=3)
 
 @dataclass(frozen=True)
 class Outcome:
-    """One seed's results by one method.
+    """One seed's results by one method."""
 
-    Attributes:
-        residual_n_m: RMS residual of each joint on the points of the fit, N m.
-        impact_n: RMS error of the vertical force of the impact, N.
-        impact_percent: The same over the force's peak, %.
-        sliding_n: RMS error of the sliding force, N.
-    """
-
-    residual_n_m: tuple[float, ...]
-    impact_n: float
-    impact_percent: float
-    sliding_n: float
+    residual_n_m: tuple[float, ...]  # RMS residual of each joint on the points of the fit, N m
+    impact_n: float  # RMS error of the vertical force of the impact, N
+    impact_percent: float  # the same over the force's peak, %
+    sliding_n: float  # RMS error of the sliding force, N
 
 
 Effects = tuple[tuple[int, Term], ...]
@@ -91,36 +84,25 @@ Effects = tuple[tuple[int, Term], ...]
 
 @dataclass(frozen=True)
 class Named:
-    """One finding of the diagnosis.
-
-    Attributes:
-        family: Its name in the catalogue; `unknown` where it is not named.
-        before_n_m: RMS error on the runs set aside before it, after what was found earlier, N m.
-        after_n_m: The same with it, N m.
-    """
+    """One finding of the diagnosis."""
 
     joint: int
-    family: str
+    family: str  # its name in the catalogue; `unknown` where it is not named
     verdict: str
     alternatives: tuple[str, ...]
+    # RMS error on the runs set aside before it, after what was found earlier, N m
     before_n_m: float
-    after_n_m: float
+    after_n_m: float  # the same with it, N m
 
 
 @dataclass(frozen=True)
 class DelSolStudy:
-    """Results of the study.
-
-    Attributes:
-        seeds: Arms of each family.
-        outcomes: By method, one an arm, in the order of their numbers.
-        named: What the diagnosis named on each arm.
-    """
+    """Results of the study."""
 
     schema: str
-    seeds: int
-    outcomes: dict[str, tuple[Outcome, ...]]
-    named: tuple[tuple[Named, ...], ...]
+    seeds: int  # arms of each family
+    outcomes: dict[str, tuple[Outcome, ...]]  # by method, one an arm, in the order of their numbers
+    named: tuple[tuple[Named, ...], ...]  # what the diagnosis named on each arm
     provenance: Provenance
 
 

@@ -36,36 +36,24 @@ COUNTS = (1, 3)
 
 @dataclass(frozen=True)
 class Held:
-    """The interval on runs that were not fitted, each run alike, in the target's SI unit.
+    """The interval on runs that were not fitted, each run alike, in the target's SI unit."""
 
-    Attributes:
-        instrument: Whose runs; of an adapted estimator `source -> other`.
-        left_out: `run`, `between` or `edge` of the levels of a condition, or the runs adapted with.
-        runs: Runs held out; a run counts for each condition whose level was left out.
-        covered: Mean over runs of the share of samples inside their interval.
-        median: Median over runs of that share.
-        worst_run: Smallest share of a run.
-        worst_level: Smallest mean share of one fit.
-        no_width: Share of the samples for which none is stated.
-        spread: Standard error of `covered` over runs.
-        rmse_ratio: Adapted: the error over the median of every other choice of as many runs.
-        worst_ratio: Adapted: the worst of these choices over their median.
-    """
-
-    instrument: str
+    instrument: str  # whose runs; of an adapted estimator `source -> other`
     target: str
+    # `run`, `between` or `edge` of the levels of a condition, or the runs adapted with
     left_out: str
-    runs: int
+    runs: int  # runs held out; a run counts for each condition whose level was left out
     rmse: float
-    covered: float
-    median: float
-    worst_run: float
-    worst_level: float
+    covered: float  # mean over runs of the share of samples inside their interval
+    median: float  # median over runs of that share
+    worst_run: float  # smallest share of a run
+    worst_level: float  # smallest mean share of one fit
     half_width: float
-    no_width: float
-    spread: float
+    no_width: float  # share of the samples for which none is stated
+    spread: float  # standard error of `covered` over runs
+    # adapted: the error over the median of every other choice of as many runs
     rmse_ratio: float = float("nan")
-    worst_ratio: float = float("nan")
+    worst_ratio: float = float("nan")  # adapted: the worst of these choices over their median
 
 
 @dataclass(frozen=True)

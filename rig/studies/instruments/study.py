@@ -40,34 +40,26 @@ class InstrumentRow:
 
 @dataclass(frozen=True)
 class DrawnRow:
-    """States adapted with many choices of so many runs, N m.
-
-    Attributes:
-        usual: Whether runs at another zero than most are left out, of those adapted with and of
-            those reported on.
-        rmse_n_m: Error on the runs not used, by choice, rising.
-        covered: Mean over the choices of the share of samples inside their interval; None without.
-    """
+    """States adapted with many choices of so many runs, N m."""
 
     instrument: str
+    # whether runs at another zero than most are left out, of those adapted with and of those
+    # reported on
     usual: bool
     runs: int
-    rmse_n_m: tuple[float, ...]
+    rmse_n_m: tuple[float, ...]  # error on the runs not used, by choice, rising
+    # mean over the choices of the share of samples inside their interval; None without
     covered: float | None
 
 
 @dataclass(frozen=True)
 class InstrumentStudy:
-    """Results.
-
-    Attributes:
-        drawn: What the choice of the runs makes of them.
-    """
+    """Results."""
 
     schema: str
     source: str
     rows: tuple[InstrumentRow, ...]
-    drawn: tuple[DrawnRow, ...]
+    drawn: tuple[DrawnRow, ...]  # what the choice of the runs makes of them
     provenance: Provenance
 
 

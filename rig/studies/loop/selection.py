@@ -30,14 +30,10 @@ RIDGE = 1e-9
 
 @dataclass(frozen=True)
 class Chosen:
-    """A model and what its last effect gained.
-
-    Attributes:
-        gain: Share of the squared error of the model before it, on training runs left out.
-    """
+    """A model and what its last effect gained."""
 
     model: Model
-    gain: float
+    gain: float  # share of the squared error of the model before it, on training runs left out
 
 
 def selected(

@@ -29,29 +29,18 @@ TIMELESS = ("change.step", "friction.warmup", "sensor.drift", "motor.thermal")
 
 @dataclass(frozen=True)
 class Task:
-    """One row of the study.
+    """One row of the study."""
 
-    Attributes:
-        name: Target and regressor of the estimate.
-        balance: Equation whose effects are searched.
-        source: Channel of the linear model.
-        measured: Channels an effect may read, besides the device's clock.
-        instead: Channel to the one that plays its roles here.
-        parameters: Named parameters at most.
-        to_reach: Error to reach, N m.
-        beyond: A better one, N m.
-    """
-
-    name: str
-    balance: str
+    name: str  # target and regressor of the estimate
+    balance: str  # equation whose effects are searched
     target: str
-    source: str
-    measured: tuple[str, ...]
-    instead: Mapping[str, str]
+    source: str  # channel of the linear model
+    measured: tuple[str, ...]  # channels an effect may read, besides the device's clock
+    instead: Mapping[str, str]  # channel to the one that plays its roles here
     samples: Samples
-    parameters: int
-    to_reach: float
-    beyond: float
+    parameters: int  # named parameters at most
+    to_reach: float  # error to reach, N m
+    beyond: float  # a better one, N m
 
 
 _COMMAND = "motor_command_ratio"
@@ -86,58 +75,37 @@ TASKS = (
 
 @dataclass(frozen=True)
 class Step:
-    """One effect added.
+    """One effect added."""
 
-    Attributes:
-        effect: Id of its form.
-        gain: Share of squared error it removed from training runs left out.
-        rmse: Error on the test runs with it and those before it, means included, N m.
-    """
-
-    effect: str
+    effect: str  # id of its form
     parameters: int
-    gain: float
-    rmse: float
+    gain: float  # share of squared error it removed from training runs left out
+    rmse: float  # error on the test runs with it and those before it, means included, N m
 
 
 @dataclass(frozen=True)
 class Row:
-    """The answer to a task.
-
-    Attributes:
-        linear: Error of the linear model on the test runs, means included, N m.
-        steps: Effects in the order they were added.
-        parameters: Named parameters of the last model.
-        rmse: Its error on the test runs, means included, N m.
-        rmse_without_means: The same with each run's mean error removed.
-        runs_improved: Test runs whose error fell.
-        rmse_by_run: Test run to the error before and after, N m.
-    """
+    """The answer to a task."""
 
     task: Task
-    linear: float
-    steps: tuple[Step, ...]
-    parameters: int
-    rmse: float
-    rmse_without_means: float
-    runs_improved: int
-    rmse_by_run: Mapping[str, tuple[float, float]]
+    linear: float  # error of the linear model on the test runs, means included, N m
+    steps: tuple[Step, ...]  # effects in the order they were added
+    parameters: int  # named parameters of the last model
+    rmse: float  # its error on the test runs, means included, N m
+    rmse_without_means: float  # the same with each run's mean error removed
+    runs_improved: int  # test runs whose error fell
+    rmse_by_run: Mapping[str, tuple[float, float]]  # test run to the error before and after, N m
     families: int
     candidates: int
 
 
 @dataclass(frozen=True)
 class LoopStudy:
-    """The whole study.
-
-    Attributes:
-        sealed: The split, the same for every task.
-        left_out: Runs left out of evidence, with the reason.
-    """
+    """The whole study."""
 
     rows: tuple[Row, ...]
-    sealed: Sealed
-    left_out: Mapping[str, str]
+    sealed: Sealed  # the split, the same for every task
+    left_out: Mapping[str, str]  # runs left out of evidence, with the reason
     source: str
     provenance: Provenance
 

@@ -22,15 +22,10 @@ CUTOFF_HZ, ORDER, BORDER, EVERY = 100.0, 4, 49, 10
 
 @dataclass(frozen=True)
 class Published:
-    """A published model fitted again.
+    """A published model fitted again."""
 
-    Attributes:
-        parameters: Name with unit to value.
-        percent: Norm of the residual over that of the force, %.
-    """
-
-    parameters: dict[str, float]
-    percent: float
+    parameters: dict[str, float]  # name with unit to value
+    percent: float  # norm of the residual over that of the force, %
 
 
 def standard(recording: Recording) -> Published:

@@ -30,24 +30,17 @@ from rig.studies.machines.published import Published, by_direction, standard
 
 @dataclass(frozen=True)
 class Case:
-    """One machine, or one part of it.
-
-    Attributes:
-        machine: Shipped machine.
-        folder: Folder of its recordings in the data, or `machine-FOLDER.tar.xz`; also the name of
-            the page that says what is declared, published and suspected.
-        published: Published error, in words.
-        files: Pattern of the files in the folder; all when empty.
-        equation: Only this equation; all when empty.
-        only: Condition to the value that a run must have.
-    """
+    """One machine, or one part of it."""
 
     name: str
-    machine: str
+    machine: str  # shipped machine
+    # folder of its recordings in the data, or `machine-FOLDER.tar.xz`; also the name of the page
+    # that says what is declared, published and suspected
     folder: str
-    published: str
-    files: str = ""
-    equation: str = ""
+    published: str  # published error, in words
+    files: str = ""  # pattern of the files in the folder; all when empty
+    equation: str = ""  # only this equation; all when empty
+    # condition to the value that a run must have
     only: Mapping[str, float] = field(default_factory=dict)
 
     def wants(self, recording: Recording) -> bool:
@@ -100,41 +93,29 @@ def unpacked(data: Path, folder: str) -> Iterator[Path | None]:
 
 @dataclass(frozen=True)
 class Row:
-    """One equation of a machine.
-
-    Attributes:
-        published: Published error, in words.
-        card: Page of the machine.
-        runs: Runs that trained, and that were held out.
-        declared_percent: Error of the declared model on the held-out runs, % of the root mean
-            square of the target there.
-        found_percent: The same with the effects that were found.
-        findings: What the diagnosis says of the equation, a sentence each.
-        checks: What a technician would check, one for each named effect.
-    """
+    """One equation of a machine."""
 
     case: str
     equation: str
-    published: str
-    card: str
-    runs: tuple[int, int]
+    published: str  # published error, in words
+    card: str  # page of the machine
+    runs: tuple[int, int]  # runs that trained, and that were held out
+    # error of the declared model on the held-out runs, % of the root mean square of the target
+    # there
     declared_percent: float
-    found_percent: float
-    findings: tuple[str, ...]
-    checks: tuple[str, ...]
+    found_percent: float  # the same with the effects that were found
+    findings: tuple[str, ...]  # what the diagnosis says of the equation, a sentence each
+    checks: tuple[str, ...]  # what a technician would check, one for each named effect
 
 
 @dataclass(frozen=True)
 class MachineStudy:
-    """The study.
-
-    Attributes:
-        reproduced: The published estimates of EMPS made again; empty without its data.
-        skipped: Machines without data, and equations that could not be diagnosed, in words.
-    """
+    """The study."""
 
     rows: tuple[Row, ...]
+    # the published estimates of EMPS made again; empty without its data
     reproduced: tuple[tuple[str, Published], ...]
+    # machines without data, and equations that could not be diagnosed, in words
     skipped: tuple[str, ...]
     seconds: float
     provenance: Provenance

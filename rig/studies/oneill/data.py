@@ -29,15 +29,11 @@ POSE_FREQUENCY_HZ = 0.3
 
 @dataclass(frozen=True)
 class Source:
-    """Data for the study.
-
-    Attributes:
-        measured: Whether it was measured on the paper's instrument.
-    """
+    """Data for the study."""
 
     campaign: Campaign
     name: str
-    measured: bool
+    measured: bool  # whether it was measured on the paper's instrument
     notes: tuple[str, ...] = ()
 
 
@@ -111,22 +107,17 @@ def pose_runs(folder: Path | None, pose: str) -> Campaign | None:
 
 @dataclass(frozen=True)
 class ClosingTable:
-    """Closing samples of many runs.
+    """Closing samples of many runs."""
 
-    Attributes:
-        columns: Names of the columns: channels, conditions, and channels after `CAUSAL`.
-        values: Shape (n, columns).
-        run: Index of each sample's run, shape (n,).
-        conditions: Condition to the value of each run, shape (runs,); NaN where it is not stated.
-        flagged: Other runs of which a closing sample is flagged, with the reason.
-    """
-
+    # names of the columns: channels, conditions, and channels after `CAUSAL`
     columns: tuple[str, ...]
-    values: FloatArray
-    run: NDArray[np.intp]
+    values: FloatArray  # shape (n, columns)
+    run: NDArray[np.intp]  # index of each sample's run, shape (n,)
     names: tuple[str, ...] = ()
+    # condition to the value of each run, shape (runs,); NaN where it is not stated
     conditions: Mapping[str, FloatArray] = field(default_factory=dict)
     excluded: Mapping[str, str] = field(default_factory=dict)
+    # other runs of which a closing sample is flagged, with the reason
     flagged: Mapping[str, str] = field(default_factory=dict)
 
     def __getitem__(self, names: Iterable[str]) -> FloatArray:

@@ -27,18 +27,12 @@ UNSEEN, LAG = 1.15, 1.2
 
 @dataclass(frozen=True)
 class Reached:
-    """Result of one estimate.
+    """Result of one estimate."""
 
-    Attributes:
-        live: On runs not seen, every filter causal.
-        without_lag: The same without lag.
-        unseen: The live error by `lofo` and `lopo`, where there are such levels.
-        network: Error of the paper's network on the same runs, None where it was not trained.
-    """
-
-    live: StateRow
-    without_lag: StateRow
-    unseen: dict[str, StateRow]
+    live: StateRow  # on runs not seen, every filter causal
+    without_lag: StateRow  # the same without lag
+    unseen: dict[str, StateRow]  # the live error by `lofo` and `lopo`, where there are such levels
+    # error of the paper's network on the same runs, None where it was not trained
     network: float | None
 
     @property

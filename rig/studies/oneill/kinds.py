@@ -34,16 +34,11 @@ EVERY = 24
 
 @dataclass(frozen=True)
 class KindRow:
-    """Error of one kind of estimator on runs held out, N m.
-
-    Attributes:
-        filters: `zero-phase` or `live`.
-        score: Errors over the closing samples of all runs, each held out once.
-    """
+    """Error of one kind of estimator on runs held out, N m."""
 
     kind: str
-    filters: str
-    score: Score
+    filters: str  # `zero-phase` or `live`
+    score: Score  # errors over the closing samples of all runs, each held out once
 
 
 def recipes() -> dict[str, Recipe]:

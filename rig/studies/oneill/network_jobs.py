@@ -27,20 +27,14 @@ MOTOR = [("end-to-end", "command"), ("end-to-end", "current")]
 
 @dataclass(frozen=True)
 class Job:
-    """One kind of network under one protocol: a row or two of a table.
+    """One kind of network under one protocol: a row or two of a table."""
 
-    Attributes:
-        pose: Key of `POSES`.
-        way: `end-to-end` or `staged` as in the paper; `+ acceleration`, `+ travel` for networks
-            with physical states, and `causal` for the last of them on channels filtered as live.
-        surrogate: Key of `LOADS`.
-        protocol: As for `held_out_masks`.
-    """
-
-    pose: str
+    pose: str  # key of `POSES`
+    # `end-to-end` or `staged` as in the paper; `+ acceleration`, `+ travel` for networks with
+    # physical states, and `causal` for the last of them on channels filtered as live
     way: str
-    surrogate: str
-    protocol: str
+    surrogate: str  # key of `LOADS`
+    protocol: str  # as for `held_out_masks`
     targets: tuple[str, ...]
 
     @property

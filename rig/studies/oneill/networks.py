@@ -43,20 +43,14 @@ class NetworkRow:
 
 @dataclass(frozen=True)
 class NetworkStudy:
-    """Results.
-
-    Attributes:
-        not_run: Jobs that were not, or not wholly, trained.
-        peak_torque_n_m: Largest distal torque of the neutral pose.
-        every: Every n-th closing sample of a pose was trained on, by pose.
-    """
+    """Results."""
 
     schema: str
     rows: tuple[NetworkRow, ...]
-    not_run: tuple[Job, ...]
+    not_run: tuple[Job, ...]  # jobs that were not, or not wholly, trained
     samples: dict[str, int]
-    peak_torque_n_m: float
-    every: dict[str, int]
+    peak_torque_n_m: float  # largest distal torque of the neutral pose
+    every: dict[str, int]  # every n-th closing sample of a pose was trained on, by pose
     settings: Settings
     notes: tuple[str, ...]
     provenance: Provenance
@@ -86,22 +80,16 @@ class Task:
 
 @dataclass(frozen=True)
 class Training:
-    """How long, on what and where networks are trained.
-
-    Attributes:
-        settings: Settings of the training; nodes and seed are the study's.
-        every: Train on every n-th closing sample of the neutral pose, and on as many of others.
-        seed: Seed of splits and of first weights.
-        workers: Processes; each trains on one core.
-        minutes: No network is started after this time.
-    """
+    """How long, on what and where networks are trained."""
 
     state: Path
+    # settings of the training; nodes and seed are the study's
     settings: Settings = field(default_factory=Settings)
+    # train on every n-th closing sample of the neutral pose, and on as many of others
     every: int = 8
-    seed: int = 0
-    workers: int = 1
-    minutes: float = float("inf")
+    seed: int = 0  # seed of splits and of first weights
+    workers: int = 1  # processes; each trains on one core
+    minutes: float = float("inf")  # no network is started after this time
 
 
 class Trainer:

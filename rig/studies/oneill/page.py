@@ -24,13 +24,9 @@ TITLE = "Grip torque and jaw angle from motor current: O'Neill et al. 2018, made
 
 @dataclass(frozen=True)
 class OneillPage(Page):
-    """The page, whose Markdown has its first table above the remarks, and figures with captions.
+    """The page, whose Markdown has its first table above the remarks, and figures with captions."""
 
-    Attributes:
-        lead: How many of the paragraphs are the result.
-    """
-
-    lead: int = 1
+    lead: int = 1  # how many of the paragraphs are the result
     captions: Sequence[str] = ()
 
     def markdown(self, places: Sequence[str] = ()) -> str:

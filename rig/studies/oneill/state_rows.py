@@ -22,22 +22,14 @@ RESAMPLED = 2000
 
 @dataclass(frozen=True)
 class StateJob:
-    """One estimator under one protocol.
+    """One estimator under one protocol."""
 
-    Attributes:
-        pose: Key of `POSES`.
-        surrogate: Key of `LOADS`.
-        filters: `zero-phase`, or `live` for inputs filtered causally.
-        protocol: `run-wise`, `lofo` or `lopo`.
-        without: Effect left out, a key of `EFFECTS`, or empty.
-    """
-
-    pose: str
-    surrogate: str
+    pose: str  # key of `POSES`
+    surrogate: str  # key of `LOADS`
     target: str
-    filters: str = "zero-phase"
-    protocol: str = "run-wise"
-    without: str = ""
+    filters: str = "zero-phase"  # `zero-phase`, or `live` for inputs filtered causally
+    protocol: str = "run-wise"  # `run-wise`, `lofo` or `lopo`
+    without: str = ""  # effect left out, a key of `EFFECTS`, or empty
 
     @property
     def bank(self) -> Bank:
@@ -48,44 +40,30 @@ class StateJob:
 
 @dataclass(frozen=True)
 class Level:
-    """One frequency or power level that was left out.
-
-    Attributes:
-        covered: Share of them inside their interval.
-    """
+    """One frequency or power level that was left out."""
 
     value: float
     samples: int
     rmse: float
-    covered: float
+    covered: float  # share of them inside their interval
 
 
 @dataclass(frozen=True)
 class StateRow:
-    """Error of one job, in the target's SI unit.
-
-    Attributes:
-        score: Errors over all closing samples of the held-out runs.
-        run_offset: Root mean square of the runs' mean errors.
-        covered: Share of the samples inside their interval.
-        covered_between: Between what 95 % of that share lies if other runs like these had come.
-        covered_median: Median of that share over runs.
-        covered_worst: Smallest share of a run.
-        inside: Share of the samples inside the range that was fitted.
-        rmse_inside: Error over these samples; NaN where there are none.
-        levels: What was left out in turn, ascending; empty where it was folds of runs.
-    """
+    """Error of one job, in the target's SI unit."""
 
     job: StateJob
     runs: int
-    score: Score
-    run_offset: float
-    covered: float
+    score: Score  # errors over all closing samples of the held-out runs
+    run_offset: float  # root mean square of the runs' mean errors
+    covered: float  # share of the samples inside their interval
+    # between what 95 % of that share lies if other runs like these had come
     covered_between: tuple[float, float]
-    covered_median: float
-    covered_worst: float
-    inside: float
-    rmse_inside: float
+    covered_median: float  # median of that share over runs
+    covered_worst: float  # smallest share of a run
+    inside: float  # share of the samples inside the range that was fitted
+    rmse_inside: float  # error over these samples; NaN where there are none
+    # what was left out in turn, ascending; empty where it was folds of runs
     levels: tuple[Level, ...]
 
 

@@ -31,35 +31,25 @@ DRAWN = (Bank(LOADS["command"]), "live")
 
 @dataclass(frozen=True)
 class StateStudy:
-    """Results.
-
-    Attributes:
-        weights: Number of weights of the neutral pose's estimator.
-    """
+    """Results."""
 
     schema: str
     rows: tuple[StateRow, ...]
-    weights: int
+    weights: int  # number of weights of the neutral pose's estimator
     notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Estimates of one target on the closing samples of a run held out, in its SI unit.
-
-    Attributes:
-        rows: Filtered channels of the bank, shape (n, channels).
-        truth: The target without lag, shape (n,).
-        before: Estimate by a straight line through the surrogate, as in Table I of the paper.
-        after: Estimate by physical states, fitted on the same runs.
-    """
+    """Estimates of one target on the closing samples of a run held out, in its SI unit."""
 
     name: str
     time_s: FloatArray
-    rows: FloatArray
-    truth: FloatArray
+    rows: FloatArray  # filtered channels of the bank, shape (n, channels)
+    truth: FloatArray  # the target without lag, shape (n,)
+    # estimate by a straight line through the surrogate, as in Table I of the paper
     before: FloatArray
-    after: FloatArray
+    after: FloatArray  # estimate by physical states, fitted on the same runs
 
 
 @dataclass(frozen=True, eq=False)

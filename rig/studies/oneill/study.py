@@ -34,50 +34,34 @@ class StudyError(EstimationError):
 
 @dataclass(frozen=True)
 class Row:
-    """One linear fit and its error.
-
-    Attributes:
-        protocol: Short name of the protocol, see `PROTOCOLS`.
-        gain: Fitted gain; None where several fits were made.
-        offset_n_m: Fitted offset; None where several fits were made.
-    """
+    """One linear fit and its error."""
 
     surrogate: str
-    protocol: str
+    protocol: str  # short name of the protocol, see `PROTOCOLS`
     runs: int
-    gain: float | None
+    gain: float | None  # fitted gain; None where several fits were made
     gain_unit: str
-    offset_n_m: float | None
+    offset_n_m: float | None  # fitted offset; None where several fits were made
     score: Score
 
 
 @dataclass(frozen=True)
 class Study:
-    """Results of the study.
-
-    Attributes:
-        closing_samples: Closing samples of all runs after the paper's processing.
-        public_samples: The count the public data is known to give.
-        runs: Names of the runs behind the run-wise rows.
-        left_out: Runs left out of these rows, with the reason.
-        paper: The paper's rows by surrogate.
-        others_reach_n_m: RMSE of others' reproduction of the authors' way.
-        rmse_by_run_n_m: Run-wise error of each run with the measured current, or with what there
-            is in its place.
-    """
+    """Results of the study."""
 
     schema: str
     source: str
     measured: bool
     notes: tuple[str, ...]
-    closing_samples: int
+    closing_samples: int  # closing samples of all runs after the paper's processing
     paper_samples: int
-    public_samples: int
-    runs: tuple[str, ...]
-    left_out: dict[str, str]
+    public_samples: int  # the count the public data is known to give
+    runs: tuple[str, ...]  # names of the runs behind the run-wise rows
+    left_out: dict[str, str]  # runs left out of these rows, with the reason
     rows: tuple[Row, ...]
-    paper: dict[str, PaperRow]
-    others_reach_n_m: dict[str, float]
+    paper: dict[str, PaperRow]  # the paper's rows by surrogate
+    others_reach_n_m: dict[str, float]  # RMSE of others' reproduction of the authors' way
+    # run-wise error of each run with the measured current, or with what there is in its place
     rmse_by_run_n_m: dict[str, float]
     provenance: Provenance
 

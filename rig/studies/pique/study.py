@@ -38,59 +38,44 @@ SIMPLER_PERCENT = (1.0, 3.0)
 
 @dataclass(frozen=True)
 class Row:
-    """One model, fitted on one path and tested on another.
-
-    Attributes:
-        condition: Condition number of the fit's weighted columns, each of unit length; None of a
-            damped or bounded fit, whose damping or bounds set it.
-        nrmsd_percent: Error of each joint on the test path, % of its torque's range.
-        fitted_nrmsd_percent: The same on the path of the fit.
-        without_offset_percent: The error on the test path with each joint's mean error removed, or
-            None where it was not asked for.
-    """
+    """One model, fitted on one path and tested on another."""
 
     model: str
     fitted_on: str
     tested_on: str
     parameters: int
+    # condition number of the fit's weighted columns, each of unit length; None of a damped or
+    # bounded fit, whose damping or bounds set it
     condition: float | None
+    # error of each joint on the test path, % of its torque's range
     nrmsd_percent: tuple[float, ...]
-    fitted_nrmsd_percent: tuple[float, ...]
+    fitted_nrmsd_percent: tuple[float, ...]  # the same on the path of the fit
+    # the error on the test path with each joint's mean error removed, or None where it was not
+    # asked for
     without_offset_percent: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One identified base parameter of the thesis' model.
-
-    Attributes:
-        value: By weighted least squares.
-        standard_error: Of that value; includes noise only.
-        consistent: By the physically consistent fit.
-    """
+    """One identified base parameter of the thesis' model."""
 
     name: str
-    value: float
-    standard_error: float
-    consistent: float
+    value: float  # by weighted least squares
+    standard_error: float  # of that value; includes noise only
+    consistent: float  # by the physically consistent fit
 
 
 @dataclass(frozen=True)
 class Study:
-    """Results of the study.
-
-    Attributes:
-        paths: The two paths; the search fits the first and tests on the second.
-        rows: The models, each in both directions, then on further runs.
-        parameters: Identified parameters of the thesis' model on the first path, SI units.
-    """
+    """Results of the study."""
 
     schema: str
     arm: str
-    paths: tuple[str, str]
-    rows: tuple[Row, ...]
+    paths: tuple[str, str]  # the two paths; the search fits the first and tests on the second
+    rows: tuple[Row, ...]  # the models, each in both directions, then on further runs
     thesis: tuple[float, ...]
     trials: tuple[Trial, ...]
+    # identified parameters of the thesis' model on the first path, SI units
     parameters: tuple[Parameter, ...]
     provenance: Provenance
 

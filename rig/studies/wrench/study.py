@@ -83,27 +83,19 @@ JOINTS_ALONE = replace(PSM, wrist=None, wrist_coupling=())
 
 @dataclass(frozen=True)
 class Arm:
-    """One arm's results.
-
-    Attributes:
-        errors: NRMSD, %, by table and, in it, by method.
-    """
+    """One arm's results."""
 
     family: str
-    errors: dict[str, dict[str, tuple[float, ...]]]
+    errors: dict[str, dict[str, tuple[float, ...]]]  # NRMSD, %, by table and, in it, by method
     effects: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class WrenchStudy:
-    """Results of the simulated study.
-
-    Attributes:
-        seeds: Arms of each family.
-    """
+    """Results of the simulated study."""
 
     schema: str
-    seeds: int
+    seeds: int  # arms of each family
     arms: tuple[Arm, ...]
     provenance: Provenance
 

@@ -28,13 +28,10 @@ EVERY = 5
 
 @dataclass(frozen=True)
 class Learnt:
-    """What is known of an arm with one instrument.
-
-    Attributes:
-        networks: Of joints 1 to 6, trained with the gripper moving and closed.
-    """
+    """What is known of an arm with one instrument."""
 
     psm: Psm
+    # of joints 1 to 6, trained with the gripper moving and closed
     networks: tuple[JointNetwork, ...]
     gripper: JointNetwork
     physics: Physics

@@ -31,15 +31,10 @@ TRANSFER = Settings(nodes=8, iterations=10)
 
 @dataclass(frozen=True)
 class JointNetwork:
-    """One joint's network.
+    """One joint's network."""
 
-    Attributes:
-        joint: The joint, from 0.
-        network: From states to its torque, N m or N.
-    """
-
-    joint: int
-    network: Network
+    joint: int  # the joint, from 0
+    network: Network  # from states to its torque, N m or N
 
     def __call__(self, run: PsmRun) -> FloatArray:
         """Return the torque of each sample, shape (n,)."""

@@ -129,18 +129,12 @@ def of_moving_gripper() -> list[ArmEffect]:
 
 @dataclass(frozen=True)
 class Physics:
-    """A fitted arm: declared columns, the effects found, and networks on the residual.
+    """A fitted arm: declared columns, the effects found, and networks on the residual."""
 
-    Attributes:
-        arm: The arm with its instrument's nominal coupling.
-        effects: What was found, in order.
-        values: Parameters of the declared columns, then of the effects.
-        rest: For each joint, the network on the residual; None where none improves it.
-    """
-
-    arm: Arm
-    effects: tuple[ArmEffect, ...]
-    values: FloatArray
+    arm: Arm  # the arm with its instrument's nominal coupling
+    effects: tuple[ArmEffect, ...]  # what was found, in order
+    values: FloatArray  # parameters of the declared columns, then of the effects
+    # for each joint, the network on the residual; None where none improves it
     rest: tuple[Network | None, ...]
 
     def __call__(self, run: PsmRun, network: bool = True) -> FloatArray:

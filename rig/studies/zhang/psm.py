@@ -70,24 +70,15 @@ CHUNK = 8000
 
 @dataclass(frozen=True)
 class Kind:
-    """An instrument family as it is drawn around.
-
-    Attributes:
-        model: Model number, by which its nominal coupling is known.
-        open_rad: Angle to which its gripper opens; closed is 0.
-        offset_n_m: Torque of the resting gripper.
-        spring_n_m_rad: Stiffness of the gripper's cables against opening.
-        friction_n_m: Friction of the gripper.
-        memory_n_m: Friction with memory of the gripper.
-    """
+    """An instrument family as it is drawn around."""
 
     name: str
-    model: str
-    open_rad: float
-    offset_n_m: float
-    spring_n_m_rad: float
-    friction_n_m: float
-    memory_n_m: float
+    model: str  # model number, by which its nominal coupling is known
+    open_rad: float  # angle to which its gripper opens; closed is 0
+    offset_n_m: float  # torque of the resting gripper
+    spring_n_m_rad: float  # stiffness of the gripper's cables against opening
+    friction_n_m: float  # friction of the gripper
+    memory_n_m: float  # friction with memory of the gripper
 
 
 KINDS = {
@@ -105,25 +96,16 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Psm:
-    """One arm with one instrument, drawn around the plausible ones.
+    """One arm with one instrument, drawn around the plausible ones."""
 
-    Attributes:
-        arm: The arm; its hidden strengths are not used but scale those here.
-        memory: Friction with memory of joints 1 to 6, N m or N.
-        cable_n_m: Friction with memory of the four motors and their cables.
-        noise: Standard deviation of the noise of each joint, N m or N.
-        true_coupling: From motors to roll, pitch, yaw and gripper, shape (4, 4).
-        leak: A_nominal^-T A_true^T: torque shown by torque there is, shape (4, 4).
-        form: Hidden torque of a drawn family, in place of friction with memory.
-    """
-
-    arm: SimulatedArm
+    arm: SimulatedArm  # the arm; its hidden strengths are not used but scale those here
     kind: Kind
-    memory: FloatArray
-    cable_n_m: FloatArray
-    noise: FloatArray
-    true_coupling: FloatArray
-    leak: FloatArray
+    memory: FloatArray  # friction with memory of joints 1 to 6, N m or N
+    cable_n_m: FloatArray  # friction with memory of the four motors and their cables
+    noise: FloatArray  # standard deviation of the noise of each joint, N m or N
+    true_coupling: FloatArray  # from motors to roll, pitch, yaw and gripper, shape (4, 4)
+    leak: FloatArray  # A_nominal^-T A_true^T: torque shown by torque there is, shape (4, 4)
+    # hidden torque of a drawn family, in place of friction with memory
     form: HiddenTorque | None = None
 
     @property
@@ -140,17 +122,11 @@ class Psm:
 
 @dataclass(frozen=True)
 class PsmRun:
-    """The readings of the arm's sensors in a run.
+    """The readings of the arm's sensors in a run."""
 
-    Attributes:
-        position: Measured positions, shape (n, 7), rad or m.
-        velocity: Measured velocities, shape (n, 7).
-        torque: Joint torques as the nominal coupling shows them, shape (n, 7), N m or N.
-    """
-
-    position: FloatArray
-    velocity: FloatArray
-    torque: FloatArray
+    position: FloatArray  # measured positions, shape (n, 7), rad or m
+    velocity: FloatArray  # measured velocities, shape (n, 7)
+    torque: FloatArray  # joint torques as the nominal coupling shows them, shape (n, 7), N m or N
 
     def __len__(self) -> int:
         return len(self.position)

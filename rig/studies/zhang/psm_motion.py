@@ -94,17 +94,11 @@ def _smooth_random(rng: np.random.Generator, seconds: float, columns: int) -> Fl
 
 @dataclass(frozen=True)
 class Grasp:
-    """A run with something between the jaws.
+    """A run with something between the jaws."""
 
-    Attributes:
-        motion: The arm's motion as it is measured, lead included.
-        touching: Whether, or how far, the tip may touch its surroundings, shape (n,).
-        scored: Samples of the experiment itself, shape (n,).
-    """
-
-    motion: Motion
-    touching: FloatArray
-    scored: np.ndarray
+    motion: Motion  # the arm's motion as it is measured, lead included
+    touching: FloatArray  # whether, or how far, the tip may touch its surroundings, shape (n,)
+    scored: np.ndarray  # samples of the experiment itself, shape (n,)
 
     def force(self, psm: Psm) -> FloatArray:
         """Return the force on what is held, N: the true angle differs from the measured one."""

@@ -48,33 +48,23 @@ PAPER_FORCE_N, PAPER_MOMENT_N_M, PAPER_GRASP_N = 1.4, (0.04, 0.06), 0.1
 
 @dataclass(frozen=True)
 class Outcome:
-    """Results of one arm.
-
-    Attributes:
-        traces: Forces over time by `experiment | what`, N.
-        effects: Names of the effects found on the arm with the Cadiere Forceps, in order.
-    """
+    """Results of one arm."""
 
     cells: Cells
-    traces: Cells
+    traces: Cells  # forces over time by `experiment | what`, N
+    # names of the effects found on the arm with the Cadiere Forceps, in order
     effects: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class ZhangStudy:
-    """Results of the study.
-
-    Attributes:
-        seeds: Arms of each family of hidden torque.
-        outcomes: Of each arm, in the order of their numbers, its errors by
-            `experiment | condition | method`.
-        traces: Forces over time of the first arm, by `experiment | what`.
-    """
+    """Results of the study."""
 
     schema: str
-    seeds: int
+    seeds: int  # arms of each family of hidden torque
+    # of each arm, in the order of their numbers, its errors by `experiment | condition | method`
     outcomes: tuple[Cells, ...]
-    traces: Cells
+    traces: Cells  # forces over time of the first arm, by `experiment | what`
     effects: dict[str, int]
     provenance: Provenance
 

@@ -39,14 +39,10 @@ Estimate = Callable[[Recording], tuple[FloatArray, FloatArray]]
 
 @dataclass(frozen=True)
 class Stiffness:
-    """One place or material.
-
-    Attributes:
-        true_n_rad: What it is, force at the tip over joint angle.
-    """
+    """One place or material."""
 
     name: str
-    true_n_rad: float
+    true_n_rad: float  # what it is, force at the tip over joint angle
     grasps_n_rad: tuple[float, ...]
 
     @property
@@ -57,22 +53,17 @@ class Stiffness:
 
 @dataclass(frozen=True)
 class Answer:
-    """The result of one method.
-
-    Attributes:
-        order_confidence: Confidence that neighbours in the found order differ, the least of them.
-        found: Place with the inclusion, from 0.
-        place_confidence: Confidence that this place is stiffer than the stiffest other.
-    """
+    """The result of one method."""
 
     method: str
     materials: tuple[Stiffness, ...]
+    # confidence that neighbours in the found order differ, the least of them
     order_confidence: float
     order_is_right: bool
     places: tuple[Stiffness, ...]
-    found: int
+    found: int  # place with the inclusion, from 0
     true: int
-    place_confidence: float
+    place_confidence: float  # confidence that this place is stiffer than the stiffest other
 
 
 def haptics_of(

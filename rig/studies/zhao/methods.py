@@ -60,27 +60,19 @@ ToForce = Callable[[Recording], FloatArray]
 
 @dataclass(frozen=True)
 class Lacking:
-    """The effects that the diagnosis finds missing in a degree of freedom's model.
-
-    Attributes:
-        model: The declared model with the effects it named, and the signals they read, as TOML.
-    """
+    """The effects that the diagnosis finds missing in a degree of freedom's model."""
 
     findings: tuple[tuple[str, str], ...]
-    model: str
+    model: str  # the declared model with the effects it named, and the signals they read, as TOML
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One method on one degree of freedom of one grasper.
+    """One method on one degree of freedom of one grasper."""
 
-    Attributes:
-        errors_n: Estimate less force, mean over the levels, in the order of `INPUTS`.
-        delay_ms: Of the estimate behind the force in periodic input; negative where it leads.
-    """
-
+    # estimate less force, mean over the levels, in the order of `INPUTS`
     errors_n: tuple[float, float, float]
-    delay_ms: float
+    delay_ms: float  # of the estimate behind the force in periodic input; negative where it leads
 
 
 def axes_of(prototype: Prototype, dof: str, seed: int, spread: float, family: str = OWN) -> Axes:

@@ -42,34 +42,26 @@ LOOKED_AT = 1000
 
 @dataclass(frozen=True)
 class Cell:
-    """One degree of freedom of one grasper.
-
-    Attributes:
-        slope: Of the paper's estimate over force in long steady grasps; one over its coefficient.
-        ours: The declared model with the added effects.
-        undeclared: The declared model alone, fitted on the same runs.
-    """
+    """One degree of freedom of one grasper."""
 
     seed: int
+    # of the paper's estimate over force in long steady grasps; one over its coefficient
     slope: float
     paper: Outcome
-    ours: Outcome
-    undeclared: Outcome
+    ours: Outcome  # the declared model with the added effects
+    undeclared: Outcome  # the declared model alone, fitted on the same runs
 
 
 @dataclass(frozen=True)
 class Study:
-    """The whole study.
-
-    Attributes:
-        cells: Degree of freedom to its cells, one a grasper, in the order of their numbers.
-        lacking: Family and degree of freedom to what the diagnosis found on the grasper it looked
-            at, and what was therefore added to ours.
-    """
+    """The whole study."""
 
     prototype: str
     spread: float
+    # degree of freedom to its cells, one a grasper, in the order of their numbers
     cells: Mapping[str, Sequence[Cell]]
+    # family and degree of freedom to what the diagnosis found on the grasper it looked at, and what
+    # was therefore added to ours
     lacking: Mapping[tuple[str, str], Lacking] = field(default_factory=dict)
 
 
