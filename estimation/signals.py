@@ -42,17 +42,11 @@ class Direction:
 
 @dataclass(frozen=True)
 class Combination:
-    """A derived channel that is a weighted sum of others.
+    """A derived channel that is a weighted sum of others."""
 
-    Attributes:
-        name: Channel name, ends in its unit.
-        shares: What is summed.
-        direction: Nominal Coulomb friction, or None.
-    """
-
-    name: str
-    shares: tuple[Share, ...]
-    direction: Direction | None = None
+    name: str  # channel name, ends in its unit
+    shares: tuple[Share, ...]  # what is summed
+    direction: Direction | None = None  # nominal Coulomb friction, or None
 
     def gain(self, measured: str) -> float:
         """Return the change of the combination per change of a measured channel."""
@@ -61,19 +55,12 @@ class Combination:
 
 @dataclass(frozen=True)
 class Reading:
-    """What is stated of a sensor; None where nothing is.
+    """What is stated of a sensor; None where nothing is."""
 
-    Attributes:
-        noise: Standard deviation of its white noise, in the unit of the channel.
-        step: One count, in the unit of the channel.
-        rate_hz: New values a second.
-        delay_s: Age of a value when it is recorded.
-    """
-
-    noise: float | None = None
-    step: float | None = None
-    rate_hz: float | None = None
-    delay_s: float | None = None
+    noise: float | None = None  # standard deviation of its white noise, in the unit of the channel
+    step: float | None = None  # one count, in the unit of the channel
+    rate_hz: float | None = None  # new values a second
+    delay_s: float | None = None  # age of a value when it is recorded
 
     def age_s(self, sample_rate_hz: float) -> float:
         """Return the mean age of a recorded value, s; a slower sensor's is held until the next."""
@@ -83,30 +70,25 @@ class Reading:
 
 @dataclass(frozen=True)
 class Signals:
-    """The derived channels of a machine, when its parts are at rest, and its sensors.
+    """The derived channels of a machine, when its parts are at rest, and its sensors."""
 
-    Attributes:
-        combinations: Derived channels.
-        rest: Channel of each speed that friction depends on, and the speed below which the part is
-            at rest, in the unit of the channel. While a gearbox winds up the motor turns and the
-            spindle stands still: an equation is static when the speed of its own friction is below
-            the threshold. Slower than a share of the usual speed is at rest too, see
-            `estimation.rest`, so 0 is a threshold that follows the data.
-        readings: What is stated of the sensors of some channels; of a temperature or a position
-            that it is one.
-        joined: Positions that follow from another's by the ratio of a transmission. One whose axis
-            has no encoder is among the combinations, too; else a reading can be compared with it.
-        integrals: Positions that no sensor reads, to the speeds that they are the integrals of.
-        loads: Known forces and torques, which are no sensor's: a weight by a formula of the angle.
-        actuators: What drives the machine: a current, a voltage, or the force itself.
-    """
-
-    combinations: tuple[Combination, ...] = ()
+    combinations: tuple[Combination, ...] = ()  # derived channels
+    # Channel of each speed that friction depends on, and the speed below which the part is at rest,
+    # in the unit of the channel. While a gearbox winds up the motor turns and the spindle stands
+    # still: an equation is static when the speed of its own friction is below the threshold. Slower
+    # than a share of the usual speed is at rest too, see `estimation.rest`, so 0 is a threshold
+    # that follows the data.
     rest: Mapping[str, float] = field(default_factory=dict)
+    # what is stated of the sensors of some channels; of a temperature or a position that it is one
     readings: Mapping[str, Reading] = field(default_factory=dict)
+    # Positions that follow from another's by the ratio of a transmission. One whose axis has no
+    # encoder is among the combinations, too; else a reading can be compared with it.
     joined: tuple[Combination, ...] = ()
+    # positions that no sensor reads, to the speeds that they are the integrals of
     integrals: Mapping[str, str] = field(default_factory=dict)
+    # known forces and torques, which are no sensor's: a weight by a formula of the angle
     loads: tuple[str, ...] = ()
+    # what drives the machine: a current, a voltage, or the force itself
     actuators: tuple[str, ...] = ()
 
     @property

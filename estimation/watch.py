@@ -38,20 +38,14 @@ FIRST = 5
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """The verdict of one run on the model.
-
-    Attributes:
-        rmse: Its error, in the unit of the target, its mean removed where offsets are a nuisance.
-        usual: The error of the model's own fit; None while it is still being learnt.
-        statistic: The cumulative sum, in spreads.
-        since: First run that the model does not fit, or None while it fits.
-    """
+    """The verdict of one run on the model."""
 
     name: str
+    # its error, in the unit of the target, its mean removed where offsets are a nuisance
     rmse: float
-    usual: float | None
-    statistic: float
-    since: str | None
+    usual: float | None  # the error of the model's own fit; None while it is still being learnt
+    statistic: float  # the cumulative sum, in spreads
+    since: str | None  # first run that the model does not fit, or None while it fits
 
     @property
     def fits(self) -> bool:

@@ -36,83 +36,56 @@ _STATES = (
 
 @dataclass(frozen=True, kw_only=True)
 class MotorLimits:
-    """What is watched over time of a motor with a position loop.
+    """What is watched over time of a motor with a position loop."""
 
-    Attributes:
-        max_motor_step: Fastest motor, counts a tick, in three ticks on end.
-        continuous_current: Current that warms the motor no further, counts.
-        i2t: Heat above it that the motor can take, counts^2 s: the integral of the measured current
-            squared less the continuous one squared, never below 0.
-        stall_current: Current, counts, above which a motor that does not move is stalled.
-        stall_motion: Motor counts within which it does not move.
-    """
-
-    max_motor_step: int = TOP
-    continuous_current: int = TOP
+    max_motor_step: int = TOP  # fastest motor, counts a tick, in three ticks on end
+    continuous_current: int = TOP  # current that warms the motor no further, counts
+    # heat above it that the motor can take, counts^2 s: the integral of the measured current
+    # squared less the continuous one squared, never below 0
     i2t: int = TOP
-    stall_current: int = TOP
-    stall_motion: int = 0
+    stall_current: int = TOP  # current, counts, above which a motor that does not move is stalled
+    stall_motion: int = 0  # motor counts within which it does not move
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoopLimits(MotorLimits):
-    """What a motor's position loop is believed by, too.
+    """What a motor's position loop is believed by, too."""
 
-    Attributes:
-        max_motor_jump: Farthest the motor's count may go in one tick.
-        max_target_step: Farthest a setpoint may be from the one before it, counts; the first after
-            arming may be `max_following` from where the shaft stands.
-        max_following: Farthest the shaft may be from its target, counts.
-        following_ticks: How long it may be farther.
-        full_scale_current: Measured current at a command of 10000, counts, signed; 0 where current
-            and command are not compared.
-        current_offset: Measured current at a command of 0, counts.
-        max_current_error: Largest difference between measured and commanded current, counts.
-        current_ticks: Ticks over which that difference is averaged.
-        frozen_current: Change of the current, counts, behind which a motor that did not move has a
-            dead encoder.
-        frozen_motion: Motor counts within which it did not move.
-    """
-
-    max_motor_jump: int = TOP
+    max_motor_jump: int = TOP  # farthest the motor's count may go in one tick
+    # farthest a setpoint may be from the one before it, counts; the first after arming may be
+    # `max_following` from where the shaft stands
     max_target_step: int = TOP
-    max_following: int = TOP
-    following_ticks: int = TOP
+    max_following: int = TOP  # farthest the shaft may be from its target, counts
+    following_ticks: int = TOP  # how long it may be farther
+    # measured current at a command of 10000, counts, signed; 0 where current and command are not
+    # compared
     full_scale_current: int = 0
-    current_offset: int = 0
+    current_offset: int = 0  # measured current at a command of 0, counts
+    # largest difference between measured and commanded current, counts
     max_current_error: int = TOP
-    current_ticks: int = 1
+    current_ticks: int = 1  # ticks over which that difference is averaged
+    # change of the current, counts, behind which a motor that did not move has a dead encoder
     frozen_current: int = TOP
-    frozen_motion: int = 0
+    frozen_motion: int = 0  # motor counts within which it did not move
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choices:
-    """How long each watch lasts, and what a tripped board does.
+    """How long each watch lasts, and what a tripped board does."""
 
-    Attributes:
-        stall_ticks: How long a motor may be stalled.
-        saturated_ticks: How long a converter's count may be at the end of its range.
-        stale_ticks: How long a converter's count may stay the same.
-        dry_ticks: How long the last setpoint is held while none follows.
-        watchdog_us: How long the host may be silent, 5 ms to 1 s.
-        safe_state: `SafeState`. Held are a silent host, a stall, and a saturated or stale sensor;
-            any other crossing releases whatever is asked for.
-        hold_command_e4: Largest command while holding, 1e-4 of full scale.
-        hold_ticks: How long it may hold; then it releases.
-        seek: 1 to move without a reference, towards a stop: the controller's limit is then no
-            larger than `hold_command_e4`, and the board has no reference from then on. 0 on a
-            grasper, which is referenced by hand.
-    """
-
-    stall_ticks: int = TOP
-    saturated_ticks: int = TOP
-    stale_ticks: int = TOP
-    dry_ticks: int = TOP
-    watchdog_us: int = WATCHDOG_US
+    stall_ticks: int = TOP  # how long a motor may be stalled
+    saturated_ticks: int = TOP  # how long a converter's count may be at the end of its range
+    stale_ticks: int = TOP  # how long a converter's count may stay the same
+    dry_ticks: int = TOP  # how long the last setpoint is held while none follows
+    watchdog_us: int = WATCHDOG_US  # how long the host may be silent, 5 ms to 1 s
+    # `SafeState`. Held are a silent host, a stall, and a saturated or stale sensor; any other
+    # crossing releases whatever is asked for.
     safe_state: int = SafeState.RELEASE
-    hold_command_e4: int = 0
-    hold_ticks: int = TOP
+    hold_command_e4: int = 0  # largest command while holding, 1e-4 of full scale
+    hold_ticks: int = TOP  # how long it may hold; then it releases
+    # 1 to move without a reference, towards a stop: the controller's limit is then no larger than
+    # `hold_command_e4`, and the board has no reference from then on. 0 on a grasper, which is
+    # referenced by hand
     seek: int = 0
 
 
@@ -131,33 +104,20 @@ class ArmLimits(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A kind of board, as described by its frames.
+    """A kind of board, as described by its frames."""
 
-    Attributes:
-        name: Its name: in the host library, in messages, in configurations.
-        title: First line of the contract.
-        tick_us: Period of a control tick and of a sample, microseconds.
-        sample: Layout of a sample.
-        arm: Layout of the arm command: header, gains, limits.
-        setpoint: Layout of one setpoint, one field a motor.
-        max_setpoints: Most setpoints in one frame.
-        motors: Motors with a position loop.
-        input_names: Fields of a sample that the guards check, in the order of their channels.
-        further_names: Fields a trip can name behind those.
-        sampled_hz: Samples a second where they are not those of the core's ticks.
-    """
-
-    name: str
-    title: str
-    tick_us: int
-    sample: np.dtype[np.void]
-    arm: np.dtype[np.void]
-    setpoint: np.dtype[np.void]
-    max_setpoints: int
-    motors: int
+    name: str  # its name: in the host library, in messages, in configurations
+    title: str  # first line of the contract
+    tick_us: int  # period of a control tick and of a sample, microseconds
+    sample: np.dtype[np.void]  # layout of a sample
+    arm: np.dtype[np.void]  # layout of the arm command: header, gains, limits
+    setpoint: np.dtype[np.void]  # layout of one setpoint, one field a motor
+    max_setpoints: int  # most setpoints in one frame
+    motors: int  # motors with a position loop
+    # fields of a sample that the guards check, in the order of their channels
     input_names: tuple[str, ...]
-    further_names: tuple[str, ...] = ()
-    sampled_hz: float | None = None
+    further_names: tuple[str, ...] = ()  # fields a trip can name behind those
+    sampled_hz: float | None = None  # samples a second where they are not those of the core's ticks
 
     @property
     def rate_hz(self) -> float:

@@ -38,47 +38,37 @@ EVERY = 4
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """Estimates with what is known about their error, each of shape (n,).
+    """Estimates with what is known about their error, each of shape (n,)."""
 
-    Attributes:
-        value: The estimate, in the target's unit.
-        half_width: Half the width of the interval that covers 95 %; NaN where unknown: far from the
-            fitted conditions, opening, at rest, on another instrument, or in a recording that
-            states another level of a condition than the only one fitted.
-        inside: Whether position, load, speed and acceleration lie in the range fitted on.
-    """
-
-    value: FloatArray
+    value: FloatArray  # the estimate, in the target's unit
+    # half the width of the interval that covers 95 %; NaN where unknown: far from the fitted
+    # conditions, opening, at rest, on another instrument, or in a recording that states another
+    # level of a condition than the only one fitted
     half_width: FloatArray
+    # whether position, load, speed and acceleration lie in the range fitted on
     inside: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class BankEstimator:
-    """A fitted sum of products of physical states.
-
-    Attributes:
-        weights: Weight of each product, shape (size,).
-        interval: The error's interval; None where too few runs were fitted.
-        ranges: Lowest and highest value of each judged channel fitted on, shape (2, judged).
-        scale: Spread of each product over the samples fitted on, shape (size,).
-        instrument: Instrument it was fitted on; empty where it is not known, or does not matter.
-        only: Level of each condition that all runs fitted on had alike.
-        of_any: Whether it is used on instruments it was not fitted on: nothing is in its range.
-    """
+    """A fitted sum of products of physical states."""
 
     SCHEMA: ClassVar[str] = "rig.bank/4"
 
     bank: Bank
     target: str
-    weights: FloatArray
-    interval: Interval | None
+    weights: FloatArray  # weight of each product, shape (size,)
+    interval: Interval | None  # the error's interval; None where too few runs were fitted
+    # lowest and highest value of each judged channel fitted on, shape (2, judged)
     ranges: FloatArray
-    scale: FloatArray
+    scale: FloatArray  # spread of each product over the samples fitted on, shape (size,)
+    # instrument it was fitted on; empty where it is not known, or does not matter
     instrument: str = ""
     low_pass: LowPass = PAPER
     origin: Origin | None = None
+    # level of each condition that all runs fitted on had alike
     only: Mapping[str, float] = field(default_factory=dict)
+    # whether it is used on instruments it was not fitted on: nothing is in its range
     of_any: bool = False
 
     def __post_init__(self) -> None:
@@ -251,14 +241,11 @@ def fit_runs(runs: Sequence[RunEvidence], bank: Bank, target: str) -> BankEstima
 
 @dataclass(frozen=True)
 class BankRecipe:
-    """Fits a state estimator of a target on the closing samples of a campaign.
-
-    Attributes:
-        causal: Fit on channels filtered as live, for use as live; the target has no lag anyway.
-    """
+    """Fits a state estimator of a target on the closing samples of a campaign."""
 
     target: str
     bank: Bank = field(default_factory=Bank)
+    # fit on channels filtered as live, for use as live; the target has no lag anyway
     causal: bool = False
     low_pass: LowPass = PAPER
 
