@@ -60,11 +60,7 @@ class CalibrationSet:
 
     @classmethod
     def from_json(cls, text: str) -> "CalibrationSet":
-        """Read a set written by `to_json`.
-
-        Raises:
-            CalibrationError: The text is not such a set.
-        """
+        """Read a set written by `to_json`; CalibrationError where the text is none."""
         try:
             raw = json.loads(text)
             lines = {name: LinearCalibration(**line) for name, line in raw["channels"].items()}

@@ -42,11 +42,7 @@ def encode_reply(value: int) -> bytes:
 
 
 def decode_reply(reply: bytes) -> int:
-    """Return the 14-bit value in an answer.
-
-    Raises:
-        FrameError: Not two bytes, or the check bits do not fit.
-    """
+    """Return the 14-bit value in an answer; FrameError for a wrong size or check bits."""
     if len(reply) != REPLY_SIZE:
         raise FrameError(f"An AMT21 answers with {REPLY_SIZE} bytes, not {len(reply)}.")
     word = int.from_bytes(reply, "little")

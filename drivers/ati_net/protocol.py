@@ -95,11 +95,7 @@ def decode_command(datagram: bytes) -> tuple[int, int]:
 
 
 def decode_records(datagram: bytes) -> NDArray[np.void]:
-    """Return the records of a datagram, shape (n,), `RECORD_DTYPE`.
-
-    Raises:
-        FrameError: It is not made of whole records.
-    """
+    """Return the records of a datagram, shape (n,), `RECORD_DTYPE`; FrameError of partial ones."""
     if not datagram or len(datagram) % RECORD_DTYPE.itemsize:
         raise FrameError(f"A datagram of {len(datagram)} bytes is not made of RDT records.")
     return np.frombuffer(datagram, RECORD_DTYPE)

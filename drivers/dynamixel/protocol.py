@@ -132,11 +132,7 @@ def write_question(register: Register, value: int) -> bytes:
 
 
 def decode_ping(parameters: bytes) -> tuple[int, int]:
-    """Return model number and firmware version of the answer to a ping.
-
-    Raises:
-        FrameError: It has not 3 bytes.
-    """
+    """Return model number and firmware version of the answer to a ping; FrameError of others."""
     if len(parameters) != _PING_ANSWER.size:
         raise FrameError(f"The answer to a ping has 3 bytes, not {len(parameters)}.")
     model, firmware = _PING_ANSWER.unpack(parameters)

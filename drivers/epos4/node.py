@@ -99,11 +99,7 @@ class Node:
     def wait(
         self, what: str, reached: Callable[[], bool], timeout_s: float = STATE_TIMEOUT_S
     ) -> None:
-        """Serve the bus until `reached` returns true.
-
-        Raises:
-            LinkTimeoutError: That did not happen in time.
-        """
+        """Serve the bus until `reached` returns true; LinkTimeoutError after too long."""
         give_up_s = self._bus.now_s + timeout_s
         while not reached():
             if self._bus.now_s > give_up_s:

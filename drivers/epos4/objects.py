@@ -168,11 +168,7 @@ class PowerStage:
         self._node.wait("the power stage to be off", lambda: self._state() in protocol.POWERLESS)
 
     def reset_fault(self) -> None:
-        """Reset a fault whose cause is gone; the stage stays off.
-
-        Raises:
-            LinkTimeoutError: The fault stays.
-        """
+        """Reset a fault whose cause is gone; the stage stays off. LinkTimeoutError if it stays."""
         self._link.write(0x6040, 0, protocol.DISABLE_VOLTAGE)
         self._link.write(0x6040, 0, protocol.FAULT_RESET)
         self._node.wait(

@@ -107,11 +107,7 @@ def encode_command(controlword: int, torque_per_mille: int) -> bytes:
 
 
 def decode_emergency(data: bytes) -> tuple[int, int]:
-    """Return error code and error register of an emergency frame.
-
-    Raises:
-        FrameError: It has not 8 bytes.
-    """
+    """Return error code and error register of an emergency frame; FrameError unless of 8 bytes."""
     if len(data) != _EMERGENCY.size:
         raise FrameError(f"An emergency frame has 8 bytes, not {len(data)}.")
     code, register, _ = _EMERGENCY.unpack(data)

@@ -32,11 +32,7 @@ class Ft300(StreamedSensor):
         super().__init__(transport, RATE_HZ)
 
     def identify(self) -> DeviceIdentity:
-        """End the stream; ask for firmware and serial number.
-
-        Raises:
-            DriverError: It is another device.
-        """
+        """End the stream; ask for firmware and serial number. DriverError of another device."""
         self.quieten()
         firmware, serial = (
             self.read_registers(*place) for place in (protocol.FIRMWARE, protocol.SERIAL)

@@ -139,11 +139,7 @@ class Moteus(PolledDrive):
         )
 
     def identify(self) -> DeviceIdentity:
-        """Ask for model, firmware and serial number.
-
-        Raises:
-            FrameError: The answer is not of a moteus.
-        """
+        """Ask for model, firmware and serial number; FrameError of another device."""
         question = protocol.read(protocol.INT32, protocol.MODEL, 2)
         question += protocol.read(protocol.INT32, protocol.SERIAL, 3)
         found = self._link.ask(question, protocol.registers)

@@ -180,11 +180,7 @@ def padded(data: bytes) -> bytes:
 
 
 def decode_line(line: bytes) -> tuple[int, bytes] | None:
-    """Return identifier and data of a line with a frame, None for a line without.
-
-    Raises:
-        FrameError: The line is neither.
-    """
+    """Return identifier and data of a line, None of one without a frame; FrameError of neither."""
     words = line.split()
     if not words or words == [b"OK"]:
         return None

@@ -44,11 +44,7 @@ def set_rate() -> bytes:
 
 
 def decode_packet(packet: bytes) -> tuple[tuple[int, int], bytes]:
-    """Return command and payload of a packet.
-
-    Raises:
-        FrameError: Its length or its checksum does not fit.
-    """
+    """Return command and payload of a packet; FrameError where length or checksum do not fit."""
     if len(packet) < 5 or packet[0] != 0x00 or packet[1] != len(packet):
         raise FrameError("A QIA128 packet has the wrong length.", "Bytes were lost.")
     if checksum(packet[:-1]) != packet[-1]:

@@ -217,11 +217,7 @@ class Profile:
         return np.frombuffer(payload, self.setpoint, offset=SESSION_DTYPE.itemsize)
 
     def decode_trip_report(self, fields: np.void) -> TripReport:
-        """Return the crossed limit that a board reports.
-
-        Raises:
-            FrameError: The reported reason is unknown.
-        """
+        """Return the crossed limit that a board reports; FrameError of an unknown reason."""
         code, channel = int(fields["code"]), int(fields["channel"])
         named = self.input_names + self.further_names
         if code not in Trip.__members__.values():

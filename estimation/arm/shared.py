@@ -37,11 +37,7 @@ class SharedFit:
 
 
 def shared_fit(arm: ArmBalances, recordings: Sequence[Recording]) -> SharedFit:
-    """Fit the declared parameters to all joints of the training runs together.
-
-    Raises:
-        ArmError: They are too short.
-    """
+    """Fit the declared parameters to all joints of the training runs; ArmError of short runs."""
     tables, torques = [], []
     for run in recordings:
         rate_hz = run.sample_rate_hz

@@ -30,11 +30,7 @@ class Origin:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> "Origin | None":
-        """Return the origin of named arrays, None where the file states none.
-
-        Raises:
-            ValueError: It cannot be read.
-        """
+        """Return the origin of named arrays, None where there is none; ValueError if damaged."""
         if "origin" not in arrays:
             return None
         found = json.loads(str(arrays["origin"]))

@@ -16,11 +16,7 @@ from rig.errors import UsageError
 def refuse_unknown_limits(
     config: Config, calibrations: CalibrationSet, companions: Sequence[Companion]
 ) -> None:
-    """Refuse a limit on a channel that the opened devices do not have.
-
-    Raises:
-        UsageError: Names every such key and what was meant.
-    """
+    """Refuse a limit on a channel that the opened devices do not have (UsageError)."""
     known = {*calibrations.channels, *(name for one in companions for name in one.channels)}
     found = _unknown(config.limits.further, known)
     if found:

@@ -65,11 +65,7 @@ class SensorWay:
 
 
 def require_units(name: str, channels: Sequence[Channel]) -> None:
-    """Refuse a channel of a driver whose name ends in another unit than it has.
-
-    Raises:
-        DriverError: Names the channel.
-    """
+    """Refuse a channel of a driver whose name ends in another unit than it has (DriverError)."""
     for channel in channels:
         named = unit_or_none(channel.name)
         if named is not None and named != channel.unit:

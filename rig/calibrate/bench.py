@@ -117,11 +117,7 @@ class RigBench:
 
 
 def read_for(device: Device, duration_s: float) -> Batch:
-    """Read a device for a while, by its own nominal rate.
-
-    Raises:
-        DriverError: It sends nothing, or too little.
-    """
+    """Read a device for a while, by its nominal rate; DriverError where it sends too little."""
     rate_hz = device.channels[0].rate_hz
     wanted = round(duration_s * rate_hz)
     batches: list[Batch] = []

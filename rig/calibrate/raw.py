@@ -26,11 +26,7 @@ KIND = "calibration"
 
 
 def require_absent(folder: Path) -> None:
-    """Refuse a folder that exists.
-
-    Raises:
-        UsageError: It does.
-    """
+    """Refuse a folder that exists (UsageError)."""
     if folder.exists():
         raise UsageError(
             f"{folder} is there already.", "Nothing recorded is ever overwritten.", "Name another."

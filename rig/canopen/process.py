@@ -84,11 +84,7 @@ class CanopenProcess(HostLink):
         return data
 
     def write(self, data: bytes) -> None:
-        """Send all of `data`.
-
-        Raises:
-            LinkLostError: The process is gone.
-        """
+        """Send all of `data`; LinkLostError where the process is gone."""
         self._require_link()
         try:
             self._socket.settimeout(TAKES_S)
@@ -131,11 +127,7 @@ class CanopenProcess(HostLink):
                 return
 
     def _hear(self) -> bool:
-        """Read the messages of the process; return whether it is ready.
-
-        Raises:
-            DriverError: It reports one.
-        """
+        """Read the messages of the process, raise what it reports; return whether it is ready."""
         said = os.read(self._told, LARGEST_READ)
         if not said:
             raise self._gone()

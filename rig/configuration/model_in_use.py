@@ -41,11 +41,7 @@ def models_folder() -> Path:
 
 
 def choices() -> list[Choice]:
-    """Return all choices, the oldest first.
-
-    Raises:
-        OutputError: The file of choices is damaged.
-    """
+    """Return all choices, the oldest first; OutputError where their file is damaged."""
     file = models_folder() / CHOICES
     if not file.is_file():
         return []

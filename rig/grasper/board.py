@@ -13,11 +13,7 @@ from rig.simulation.logger import uses_firmware
 
 
 def grasper_board(simulation: SimulationSection) -> tuple[Board, float]:
-    """Return the simulated board of a grasper, and its tick, s.
-
-    Raises:
-        UsageError: Hidden effects are asked for.
-    """
+    """Return the simulated board of a grasper, and its tick, s; UsageError with hidden effects."""
     if simulation.hidden or simulation.draw_hidden is not None:
         raise UsageError(
             "The simulated grasper has no hidden effects.",

@@ -51,11 +51,7 @@ class Adaptation:
 
 
 def open_source(estimator: Estimator) -> Adaptable:
-    """Return an estimator that can be adapted.
-
-    Raises:
-        UsageError: It is of another kind.
-    """
+    """Return an estimator that can be adapted; UsageError of any other kind."""
     if isinstance(estimator, Adaptable):
         return estimator
     raise UsageError(

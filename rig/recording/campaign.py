@@ -78,11 +78,7 @@ class RunResult:
 
 
 def check_disk_space(folder: Path, plans: Iterable[Plan]) -> None:
-    """Refuse to begin what the disk cannot hold.
-
-    Raises:
-        UsageError: Less is free than the campaign may need.
-    """
+    """Refuse to begin what the disk cannot hold (UsageError)."""
     needed = sum(plan.samples for plan in plans) * BYTES_PER_SAMPLE
     free = shutil.disk_usage(folder).free
     if free < needed:
@@ -94,11 +90,7 @@ def check_disk_space(folder: Path, plans: Iterable[Plan]) -> None:
 
 
 def read_manifest(folder: Path) -> tuple[Protocol, Config]:
-    """Return the protocol and the configuration a campaign was begun with.
-
-    Raises:
-        UsageError: The folder holds no campaign.
-    """
+    """Return protocol and configuration a campaign was begun with; UsageError of no campaign."""
     manifest = folder / MANIFEST
     try:
         described = json.loads(manifest.read_text())

@@ -44,11 +44,7 @@ class FormulaError(ValueError):
 
 
 def names_in(text: str) -> list[str]:
-    """Return the channels and conditions that a formula reads, in order.
-
-    Raises:
-        FormulaError: The text is not a formula.
-    """
+    """Return the names that a formula reads, in order; FormulaError where it is none."""
     tree = _parsed(text)
     called = {n.func for n in ast.walk(tree) if isinstance(n, ast.Call)}
     found = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n not in called]

@@ -60,11 +60,7 @@ def open_table(path: Path, mapping: ColumnMapping, skip_bad: bool = False) -> Ca
 
 
 def require_runs(runs: Sequence[Recording], path: Path, mapping: ColumnMapping) -> None:
-    """Refuse a table of which no run is left.
-
-    Raises:
-        DataError: There are none.
-    """
+    """Refuse a table of which no run is left (DataError)."""
     if runs:
         return
     rules = ", ".join(sorted(mapping.data.runs.model_fields_set))

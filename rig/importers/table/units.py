@@ -108,11 +108,7 @@ class Unit:
 
 
 def read_unit(text: str) -> Unit:
-    """Read a unit such as `mm/s`, `N m`, `rev/4096` or `degC`.
-
-    Raises:
-        NotAUnitError: The text is not one.
-    """
+    """Read a unit such as `mm/s`, `N m`, `rev/4096` or `degC`; NotAUnitError where it is none."""
     text = text.strip()
     if text in SHIFTED:
         factor, shift = SHIFTED[text]
