@@ -141,11 +141,8 @@ def fit_fsr(
 def hysteresis_ratio(runs: Sequence[FsrRun]) -> float | None:
     """Return how far loading and unloading are apart, over the span of force.
 
-    Samples are sorted by whether force rises or falls by more than 5 % of its greatest rate, and
-    compared in equal bins of voltage.
-
-    Returns:
-        The greatest difference of the mean forces of a bin; None where no bin has both.
+    Samples are sorted by whether force rises or falls by more than 5 % of its greatest rate. It is
+    the greatest difference of the mean forces in equal bins of voltage; None where no bin has both.
     """
     volts = np.concatenate([run.fsr_v for run in runs])
     forces = np.concatenate([run.force_n for run in runs])

@@ -133,11 +133,7 @@ def encode_frames(payloads: NDArray[np.uint8]) -> bytes:
 
 
 class FrameStream:
-    """Decodes a byte stream that arrives in pieces, however it is cut.
-
-    Args:
-        payload_size: Size of the frequent frames' payload, bytes.
-    """
+    """Decodes a byte stream, however it is cut; frequent frames have a payload of so many bytes."""
 
     def __init__(self, payload_size: int) -> None:
         self._payload_size = payload_size

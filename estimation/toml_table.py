@@ -37,11 +37,7 @@ class TableError(EstimationError):
 
 
 class Lines:
-    """The lines on which the tables and keys of a TOML text stand.
-
-    Args:
-        text: TOML; a table within a table is named with dots.
-    """
+    """The lines of a TOML text's tables and keys; a table within a table is named with dots."""
 
     def __init__(self, text: str) -> None:
         self._line: dict[Place, int] = {}

@@ -26,9 +26,8 @@ MOST_DATAGRAMS = 10_000
 class AtiNet(StreamedDevice):
     """One force/torque sensor with a Net Box, or an Ethernet Axia.
 
-    Args:
-        open_calibration: Opens the way to its TCP port, used to ask for counts per unit.
-        rate_hz: The RDT rate set on its web page.
+    Its TCP port, which `open_calibration` opens, is asked for counts per unit. The rate is the RDT
+    rate set on its web page.
     """
 
     name = "ati-net"

@@ -40,8 +40,7 @@ _STATES = {
 class Node:
     """What the network says of one drive.
 
-    Args:
-        host_timeout_ms: Silence of the host after which the drive stops by itself; 0 for never.
+    It stops by itself after `host_timeout_ms` of silence of the host; 0 for never.
     """
 
     def __init__(self, link: "CanopenLink", host_timeout_ms: int, counters: DeviceCounters) -> None:

@@ -39,8 +39,7 @@ def raw_channels(profile: Profile = REFERENCE) -> dict[str, Channel]:
 class TeensyDevice(LinkedDevice):
     """The logger's stream in units, time-stamped by its own clock. It is never armed.
 
-    Args:
-        wired: Channels by the field of a sample; all inputs by default.
+    `wired` are channels by the field of a sample; all inputs by default.
     """
 
     name = "teensy"

@@ -80,7 +80,6 @@ class Bench(Protocol):
         behind them, the physics moves a tick. The result does not depend on how ticks are divided
         between calls.
 
-        Args:
-            setpoints: Shape (ticks, fields), in the order of the profile's setpoint.
-            controllers: The board's, changed in place.
+        Setpoints have shape (ticks, fields), in the order of the profile's; the controllers, which
+        are the board's, are changed in place.
         """

@@ -40,9 +40,8 @@ class Fault(StrEnum):
 class Faults:
     """Faults that wait to strike, and what each does to bytes.
 
-    Args:
-        seed: Seed of the places and values of damage.
-        rates: Probability that a fault strikes a chunk by itself, by fault; for long tests.
+    Places and values of damage are random. `rates` are, for long tests, the probabilities that a
+    fault strikes a chunk by itself.
     """
 
     def __init__(self, seed: int = 0, rates: Mapping[Fault, float] | None = None) -> None:
@@ -187,11 +186,7 @@ class _Cable(Generic[Chunk]):
 
 
 class FaultyTransport(_Cable[bytes]):
-    """Any transport behind a bad cable.
-
-    Args:
-        packets: Whether each read of `inner` is one packet rather than part of a stream.
-    """
+    """Any transport behind a bad cable; with `packets` each read of it is one packet."""
 
     def __init__(
         self, inner: Transport, faults: Faults | None = None, packets: bool = False

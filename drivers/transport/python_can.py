@@ -53,11 +53,7 @@ _INTERFACES = {
 
 
 class PythonCanBus(HostLink):
-    """A bus over an open python-can interface.
-
-    Args:
-        echoes: Whether the interface returns own frames. Each is then dropped once.
-    """
+    """A bus over an open python-can interface; own frames that it `echoes` are dropped once."""
 
     def __init__(self, url: str, bus: can.BusABC, echoes: bool = False) -> None:
         super().__init__(url)

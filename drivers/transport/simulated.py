@@ -48,8 +48,7 @@ class Outbox:
 class Pace:
     """Keeps a simulated device from running ahead of a person who watches.
 
-    Args:
-        pace: Simulated seconds a real second; None for as fast as possible.
+    It is simulated seconds a real second; None for as fast as possible.
     """
 
     def __init__(self, pace: float | None) -> None:
@@ -69,11 +68,9 @@ class Pace:
 
 
 class SimulatedTransport(HostLink):
-    """A transport to a board in this process; see also `Pace`.
+    """A transport to a board in this process, of a tick in s; see also `Pace`.
 
-    Args:
-        step_s: Longest virtual time between looks at the board's output.
-        tick_s: A tick of the board, s.
+    `step_s` is the longest virtual time between looks at the board's output.
     """
 
     def __init__(

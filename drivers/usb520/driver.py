@@ -17,11 +17,7 @@ PATIENCE_S = 1.0
 
 
 class Usb520(StreamedDevice):
-    """One amplifier on USB, sending lines by itself.
-
-    Args:
-        rate_hz: Lines a second.
-    """
+    """One amplifier on USB, sending so many lines a second by itself."""
 
     name = "usb520"
 

@@ -61,13 +61,10 @@ class ExcitationStudy:
 def run_excitation(
     starts: int, evaluations: int, on_start: Callable[[int, int], None] = lambda done, total: None
 ) -> tuple[ExcitationStudy, Excitation]:
-    """Search from so many starts, of seeds from 0, by both ways.
+    """Return the comparison of both searches, and our excitation of the lowest condition number.
 
-    Each search may take `evaluations` condition numbers of each start; `on_start` is called with
-    the number of starts done and their total.
-
-    Returns:
-        The comparison, and our excitation of the lowest condition number.
+    They go from so many starts, of seeds from 0. Each search may take `evaluations` condition
+    numbers of each start; `on_start` is called with the number of starts done and their total.
     """
     rows, made = [], []
     for seed in range(starts):

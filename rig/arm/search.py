@@ -234,10 +234,8 @@ def search(
     """Add effects one by one, while one helps on the path that was not fitted.
 
     Effects are chosen `there`, from a path to fit to a path to test on; one that does not help in
-    the other direction is left out. `on_round` is called with the number of each round.
-
-    Returns:
-        What became of each candidate, kept ones first, and the names of those kept in order.
+    the other direction is left out. `on_round` is called with the number of each round. Returns
+    what became of each candidate, kept ones first, and the names of those kept in order.
     """
     kept: list[str] = []
     trials: list[Trial] = []

@@ -49,9 +49,8 @@ class Beside:
 class Companion:
     """One device in addition to the logger.
 
-    Args:
-        in_step: It is a fake with a clock of its own, which is to keep step with the logger's.
-        limits: Limit of each limited channel, as `[limits]` names it: `NAME.channel`.
+    One that is `in_step` is a fake with a clock of its own, which is to keep step with the
+    logger's. Limits are those of its limited channels, as `[limits]` names them: `NAME.channel`.
     """
 
     def __init__(

@@ -29,12 +29,9 @@ _HEAD = (("sequence", "<u4"), ("tick_us", "<u4"), ("status", "<u2"), (FLAGS, "u1
 class SensorWay:
     """A device without motors, with the interface of `drivers.transport.Transport`.
 
-    Bytes cannot be sent through it: what arms, stops or tests a rig is refused.
-
-    Args:
-        url: Where it is, for messages.
-        is_simulated: Whether its time passes only while it is read.
-        pace: Simulated seconds a real second; None for as fast as possible.
+    Bytes cannot be sent through it: what arms, stops or tests a rig is refused. The time of a
+    simulated one passes only while it is read, at a pace of simulated seconds a real second; None
+    for as fast as possible.
     """
 
     def __init__(

@@ -46,8 +46,7 @@ class DeviceMachine(Machine):
 class DriveMachine(DeviceMachine, ReferenceMachine):
     """A drive in place of the reference rig's motor and spindle.
 
-    Args:
-        rate_hz: Samples a second; divides 1000, the rate of the trajectories.
+    Its samples a second divide 1000, the rate of the trajectories.
     """
 
     shown = ("motor_current_a", "spindle_angle_rad")

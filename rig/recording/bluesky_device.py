@@ -58,12 +58,9 @@ class RecordedRuns(StandardReadable, Triggerable):
     ) -> None:
         """Prepare a campaign; nothing is connected before the device is staged.
 
-        Args:
-            config: A configuration's file, or the name of a shipped one.
-            protocol: A protocol's file, or the name of a shipped one.
-            folder: Folder of the logs, new or empty.
-            notes: Operator's notes, stored in every log.
-            name: Name of the device in bluesky's documents.
+        Configuration and protocol are files, or names of shipped ones. The folder of the logs is
+        new or empty, the notes are stored in every log, and the name is the device's in bluesky's
+        documents.
 
         Raises:
             UsageError: A file is wrong, or the folder is in use.

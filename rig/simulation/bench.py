@@ -135,10 +135,8 @@ _run_with_controller, _run_with_board = _build_loops(hash_of(SOURCES))
 class SimulatedBench:
     """A rig in virtual time: the same seed gives the same counts however the calls are cut.
 
-    Args:
-        effects: Hidden effects that are switched on.
-        seed: Seed of the sensors' noise and drift.
-        start_count: Spindle encoder count at which the rig stands at rest, with no torque.
+    The seed is that of the sensors' noise and drift. The rig stands at rest at `start_count` of the
+    spindle encoder, with no torque.
     """
 
     def __init__(

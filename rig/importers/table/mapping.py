@@ -54,11 +54,9 @@ class ColumnMapping:
 def read_mapping(
     file: Path | None, flags: Sequence[tuple[tuple[str, ...], Any, str]]
 ) -> ColumnMapping:
-    """Read the mapping of a machine's file and of the command line, which comes first.
+    """Read the mapping of a machine's file, if any, and of the command line, which comes first.
 
-    Args:
-        file: The machine's file, or None; `rig.machines.shipped.place_of` finds a shipped one.
-        flags: For each entry of the command line its path below `[data]`, value and words.
+    `flags` has for each entry of the command line its path below `[data]`, value and words.
 
     Raises:
         UsageError: A file is not there or not TOML, a key is unknown or wrong, a unit does not fit.

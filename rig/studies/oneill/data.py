@@ -38,11 +38,9 @@ class Source:
 
 
 def open_reference(path: Path) -> Source:
-    """Open the paper's part of the measured data.
+    """Open the paper's part of the measured data, by the folder or archive of Tool_4_Maryland_L_4.
 
-    Args:
-        path: The folder or archive of Tool_4_Maryland_L_4, or a folder or archive that holds it
-            among others; any other recordings are taken as they are.
+    It may be among others in a folder or archive; any other recordings are taken as they are.
 
     Raises:
         UsageError: There is nothing at the path.
@@ -164,12 +162,9 @@ def closing_table(
 ) -> ClosingTable:
     """Reduce a campaign to its closing samples, flagged ones too, as the paper does.
 
-    Args:
-        campaign: Raw runs, read one at a time; excluded ones are in the table too.
-        channels: Channels, measured or derived.
-        conditions: Conditions of the runs that become columns.
-        on_run: Called with each run's name when it has been processed.
-        live: Whether each channel is given as filtered live, too.
+    Raw runs are read one at a time, excluded ones too; `on_run` is called with each one's name when
+    it has been processed. Conditions of the runs become columns; `live` adds each channel as
+    filtered live.
 
     Raises:
         DataError: A run lacks a condition, or nothing is left.
