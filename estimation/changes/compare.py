@@ -117,7 +117,7 @@ def compare(
         predicted=_predicted(layout, late, [(x, _is_later(x, is_b)) for x in causes])
         if third
         else {},
-        notes=_notes(first, second),
+        notes=(*_shared(first, second), *_other_conditions(first, second)),
         seed=seed,
     )
 
@@ -149,10 +149,6 @@ def _check_number(campaign: str, runs: Sequence[Recording], least: int = 4) -> N
             f"Record {least} runs at least of each, or cut a long recording into runs:"
             " lap_s under [data.runs] of the machine file.",
         )
-
-
-def _notes(first: Sequence[Recording], second: Sequence[Recording]) -> tuple[str, ...]:
-    return (*_shared(first, second), *_other_conditions(first, second))
 
 
 def _shared(first: Sequence[Recording], second: Sequence[Recording]) -> tuple[str, ...]:

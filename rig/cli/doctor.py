@@ -110,20 +110,19 @@ def selftest(
     Nothing moves. Exit code 1 when a check fails.
     """
     from rig.configuration.check import refuse_problems
-    from rig.doctor.bench import bench_tests
-    from rig.doctor.selftest import selftest as checks
+    from rig.doctor import selftest as acceptance
 
     settings = chosen_rig(config, sim)
     refuse_problems(settings)
     screen = results(json)
     done = []
-    for check in checks(settings):
+    for check in acceptance.selftest(settings):
         done.append(check)
         word = "pass" if check.passed else "FAIL"
         screen.print(f"{word}  {check.name}: {check.detail}")
     failed = [check.name for check in done if not check.passed]
     said = [f"{len(done) - len(failed)} of {len(done)} checks passed on {settings.name}."]
-    by_hand = bench_tests() if bench else []
+    by_hand = acceptance.bench_tests() if bench else []
     for number, test in enumerate(by_hand, 1):
         said += [f"by hand {number}  {test.name}: {test.do}", f"    must show: {test.shows}"]
     present(json, {"passed": not failed, "checks": done, "by_hand": by_hand}, *said)

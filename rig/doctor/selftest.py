@@ -1,10 +1,13 @@
 """The acceptance test of a bench: every device, and that the board really makes itself safe.
 
 Nothing moves: the board is armed without a setpoint, so the motors stay without current throughout.
+What that cannot show is left to a person, by the tests in `bench.toml`.
 """
 
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from calibration.errors import CalibrationError
 from calibration.zero import drift_verdicts, measure_zeros
@@ -36,6 +39,22 @@ class Check:
     name: str
     passed: bool
     detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class BenchTest:
+    """One test for a person with a bench: why nothing else shows it, what to do, what it shows."""
+
+    name: str
+    why: str
+    do: str
+    shows: str
+
+
+def bench_tests() -> list[BenchTest]:
+    """Return the tests for a person, in the order in which they are made."""
+    text = Path(__file__).with_name("bench.toml").read_text("utf-8")
+    return [BenchTest(**test) for test in tomllib.loads(text)["tests"]]
 
 
 def selftest(config: Config) -> Iterator[Check]:

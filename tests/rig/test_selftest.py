@@ -16,9 +16,8 @@ from drivers.teensy.profile import Profile
 from drivers.transport.simulated import SimulatedTransport
 from rig.configuration.check import refuse_problems
 from rig.configuration.config import load_config
-from rig.doctor.bench import bench_tests
 from rig.doctor.commission import REACH_RAD, commission
-from rig.doctor.selftest import selftest
+from rig.doctor.selftest import bench_tests, selftest
 from rig.simulation.bench import SimulatedBench
 from tests.rig.simulated import behind, simulated, transport
 
