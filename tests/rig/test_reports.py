@@ -86,6 +86,33 @@ def test_every_family_has_a_meaning_in_plain_words():
         assert not words.endswith("."), family
 
 
+def found(family, **more):
+    """Return a finding of the equation of the motor, or of another one."""
+    place = more.get("balance", "motor")
+    usual = {"balance": place, "error_of": place, "verdict": "identified"}
+    return Finding(family=family, **usual | more)
+
+
+def diagnosis(*findings, unit=None, **more):
+    """Return a diagnosis with these findings, made with one discovery run."""
+    return Diagnosis(findings, {}, unit or {}, {}, {}, Sealed((), ("a",), 0, "", ""), **more)
+
+
+def change(family, equation, parameter, size, ci95, unit, **more):
+    """Return an effect that came, with one parameter before the others."""
+    usual = {
+        "verdict": "came",
+        "how": "came",
+        "name": f"{family} at {equation}",
+        "alternatives": (),
+        "confidence": 0.99,
+        "before": {parameter: None},
+        "shape": {},
+    }
+    values = {"parameters": {parameter: size}, "ci95": {parameter: ci95}, "unit": unit}
+    return Change(family=family, equation=equation, **usual | values | more)
+
+
 def test_the_form_that_was_found_is_described_and_not_the_head_of_its_family():
     forms = {
         "spring.position.curved": "stiffness changes along its travel",
@@ -95,11 +122,7 @@ def test_the_form_that_was_found_is_described_and_not_the_head_of_its_family():
         "friction.drag": "square of speed",
     }
     for form, words in forms.items():
-        family = catalogue()[form].family
-        found = Finding(
-            balance="pan", error_of="pan", family=family, form=form, verdict="identified"
-        )
-        assert words in meaning_of(found)
+        assert words in meaning_of(found(catalogue()[form].family, form=form))
     assert meaning("spring.end_stop") == "a contact spring beyond a limit angle"  # of both forms
 
 
@@ -123,15 +146,7 @@ def test_sizes_are_those_of_the_wave_and_in_readable_units(along, repeats):
         "order": Value(7.0, "1", None),
         "time": Value(0.25, "s", None),
     }
-    finding = Finding(
-        balance="motor",
-        error_of="motor",
-        place="motor",
-        family="ripple.motor",
-        verdict="identified",
-        depends_on=(along,),
-        parameters=wave,
-    )
+    finding = found("ripple.motor", place="motor", depends_on=(along,), parameters=wave)
     assert sizes_of(finding) == {"amplitude": "5 mN m", "time": "0.25 s"} | repeats
     assert "lead of the screw, the pitch of the belt" in check_of(finding)
 
@@ -140,92 +155,52 @@ def test_sizes_are_those_of_the_wave_and_in_readable_units(along, repeats):
 def test_a_parameter_that_is_half_of_a_size_is_labelled_so(form):
     """Wherever it is printed: a part may be ordered by it."""
     named = "gap (half the free travel)"
-    finding = Finding(
-        balance="tendon",
-        error_of="tendon",
-        family="transmission.backlash",
-        form=form,
-        verdict="identified",
-        parameters={
-            "gap": Value(2.5e-3, "rad", (2.4e-3, 2.6e-3)),
-            "width": Value(0.1, "N m", None),
-        },
-    )
+    gap, width = Value(2.5e-3, "rad", (2.4e-3, 2.6e-3)), Value(0.1, "N m", None)
+    parameters = {"gap": gap, "width": width}
+    finding = found("transmission.backlash", balance="tendon", form=form, parameters=parameters)
     assert sizes_of(finding) == {named: "0.0025 rad", "width": "100 mN m"}
     assert parameter_table([finding]).rows[0][0] == f"tendon, transmission.backlash, {named}"
-    play = {"gap": 2.5e-3}
-    change = Change(
-        verdict="came",
-        how="came",
-        name="transmission.backlash at gearbox",
-        equation="gearbox",
-        family="transmission.backlash",
-        alternatives=(),
-        confidence=0.99,
-        parameters=play,
-        ci95={"gap": (2.4e-3, 2.6e-3)},
-        unit={"gap": "rad"},
-        before={"gap": None},
-        shape={},
-        depends_on=(),
-    )
-    found = Difference((change,), {})
-    assert f"{named} +0.0025 rad" in next(changes.lines(found))
-    assert changes.change_table(found).rows[0][1] == named
+    of_gap = (2.5e-3, (2.4e-3, 2.6e-3), {"gap": "rad"})
+    difference = Difference((change("transmission.backlash", "gearbox", "gap", *of_gap),), {})
+    assert f"{named} +0.0025 rad" in next(changes.lines(difference))
+    assert changes.change_table(difference).rows[0][1] == named
 
 
 def test_a_change_is_stated_with_the_form_and_the_shape_of_its_effect():
     """A share of a load says little without the power of that load."""
-    change = Change(
-        verdict="came",
-        how="came",
-        name="friction.load at motor",
-        equation="motor",
-        family="friction.load",
-        form="friction.load.power",
-        alternatives=(),
-        confidence=0.99,
-        parameters={"friction": 0.67},
-        ci95={"friction": (0.56, 0.7)},
-        unit={"friction": "1", "exponent": "1", "width": "rad/s"},
-        before={"friction": None},
-        shape={"exponent": 2.0 / 3.0, "width": 0.4},
-    )
-    found = Difference((change,), {})
+    unit = {"friction": "1", "exponent": "1", "width": "rad/s"}
+    shape = {"exponent": 2.0 / 3.0, "width": 0.4}
+    of_load = ("friction.load", "motor", "friction", 0.67, (0.56, 0.7), unit)
+    came = change(*of_load, form="friction.load.power", shape=shape)
+    difference = Difference((came,), {})
     named = "friction (share of a load of 0.1)"
-    assert next(changes.lines(found)) == (
+    assert next(changes.lines(difference)) == (
         f"New effect: friction.load at motor (friction.load.power), {named} +0.67"
         " (+0.56 to +0.7), exponent 0.667, width 0.4 rad/s (confidence 99%)."
     )
-    assert [row[1:4] for row in changes.change_table(found).rows] == [
+    assert [row[1:4] for row in changes.change_table(difference).rows] == [
         (named, "-", "+0.67"),
         ("exponent", "-", "0.6667"),
         ("width", "-", "0.4"),
     ]
-    moved = replace(change, verdict="moved", how="moved", before={"friction": 0.1})
+    moved = replace(came, verdict="moved", how="moved", before={"friction": 0.1})
     assert "exponent" not in next(changes.lines(Difference((moved,), {})))
 
 
 def test_the_page_has_the_period_of_a_wave_along_a_travel():
-    finding = Finding(
-        balance="carriage",
-        error_of="carriage",
-        family="ripple.motor",
-        verdict="identified",
-        confidence=0.9999,
-        depends_on=("table_position",),
-        parameters={"order": Value(1250.0, "1", (1200.0, 1300.0))},
-    )
+    order = {"order": Value(1250.0, "1", (1200.0, 1300.0))}
+    along = {"depends_on": ("table_position",), "parameters": order}
+    finding = found("ripple.motor", balance="carriage", confidence=0.9999, **along)
     (row,) = parameter_table([finding]).rows
     assert row == ["carriage, ripple.motor, period", "0.00503", "0.00483 to 0.00524", "m"]
-    diagnosis = Diagnosis((finding,), {}, {"carriage": "N"}, {}, {}, Sealed((), ("a",), 0, "", ""))
-    assert "confidence more than 99%" in sentences(diagnosis)[0]
-    assert ("Confidence", "more than 99%") in card(finding, diagnosis)["facts"]
+    whole = diagnosis(finding, unit={"carriage": "N"})
+    assert "confidence more than 99%" in sentences(whole)[0]
+    assert ("Confidence", "more than 99%") in card(finding, whole)["facts"]
 
 
 def test_what_may_be_wrong_with_the_recordings_comes_before_what_is_found_in_them():
     notes = ("motor: a limit.", "Check: tool_force_n: is it clipped?")
-    said = lines(Diagnosis((), {}, {}, {}, {}, Sealed((), ("a",), 0, "", ""), notes=notes))
+    said = lines(diagnosis(notes=notes))
     assert [said[0], said[-1]] == [notes[1], notes[0]]
     assert said[1].startswith("No unmodelled effect found")
 
@@ -254,25 +229,13 @@ def test_a_plan_states_why_an_effect_is_not_seen(offsets):
 
 
 def test_a_finding_whose_own_equation_gains_nothing_states_the_error_of_another():
-    finding = Finding(
-        balance="motor",
-        also_in=("cable",),
-        family="sensor.delay",
-        verdict="identified",
-        error_of="cable",
-        rmse_before=0.004,
-        rmse_after=0.001,
-        runs_improved=2,
-        runs_total=2,
-    )
-    units = {"motor": "N", "cable": "N m"}
-    (sentence,) = sentences(
-        Diagnosis((finding,), {}, units, {}, {}, Sealed((), ("a", "b"), 0, "", ""))
-    )
+    errors = {"rmse_before": 0.004, "rmse_after": 0.001, "runs_improved": 2, "runs_total": 2}
+    finding = found("sensor.delay", also_in=("cable",), error_of="cable", **errors)
+    unit = {"motor": "N", "cable": "N m"}
+    (sentence,) = sentences(diagnosis(finding, unit=unit))
     assert sentence.startswith("motor: ")
     assert "error of cable on 2 held-out test runs 4 -> 1 mN m" in sentence
-    own = replace(finding, error_of="motor")
-    (sentence,) = sentences(Diagnosis((own,), {}, units, {}, {}, Sealed((), ("a", "b"), 0, "", "")))
+    (sentence,) = sentences(diagnosis(replace(finding, error_of="motor"), unit=unit))
     assert "; error on 2 held-out test runs 0.004 -> 0.001 N" in sentence
 
 
@@ -293,19 +256,9 @@ def test_a_finding_states_the_error_by_which_it_is_confirmed(within, means, is_s
     )
     old, new, has_means = that_falls(before, after, means, 0.01)
     assert ((old.rmse, new.rmse), has_means) == (is_stated, with_means)
-    finding = Finding(
-        balance="motor",
-        family="unknown",
-        verdict="depends_on",
-        error_of="motor",
-        with_means=has_means,
-        rmse_before=old.rmse,
-        rmse_after=new.rmse,
-        runs_total=1,
-    )
-    (said,) = sentences(
-        Diagnosis((finding,), {}, {"motor": "N"}, {}, {}, Sealed((), (), 0, "", ""))
-    )
+    errors = {"rmse_before": old.rmse, "rmse_after": new.rmse, "runs_total": 1}
+    finding = found("unknown", verdict="depends_on", with_means=has_means, **errors)
+    (said,) = sentences(diagnosis(finding, unit={"motor": "N"}))
     means_too = ", the mean of each run included:" * with_means
     assert f"error on 1 held-out test run{means_too} {old.rmse:.3g} -> " in said
 
