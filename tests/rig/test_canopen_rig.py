@@ -14,7 +14,7 @@ from drivers.epos4.driver import Epos4
 from drivers.epos4.fake import Epos4Fake
 from drivers.epos4.faults import DriveFaultError
 from drivers.epos4.protocol import State
-from drivers.errors import CommandRefusedError, DriverError, LinkError
+from drivers.errors import CommandRefusedError, LinkError
 from drivers.teensy.driver import TeensyLogger
 from drivers.transport.simulated import SimulatedTransport
 from drivers.transport.simulated_can import SimulatedCanBus
@@ -22,7 +22,6 @@ from rig.bench.logger import open_logger
 from rig.bench.session import Session
 from rig.canopen.simulated import open_simulated_bus, open_simulated_canopen
 from rig.configuration.config import Config, load_config
-from rig.errors import SafetyTripError
 from rig.log.check import check_log
 from rig.log.devices import topic_of
 from rig.log.reader import read_log
@@ -55,22 +54,6 @@ def alone() -> tuple[Config, LogicLink]:
     return settings, open_simulated_canopen(settings)
 
 
-def test_the_spindle_follows_its_target_and_the_drive_ends_without_power(alone):
-    settings, link = alone
-    with Session(settings, link) as session:
-        next(session.rest(0.1))
-        session.settle()
-        start = session.here[0]
-        readings = list(session.play(start + np.linspace(0, 0.2, 600), np.zeros(600)))
-        assert drive_of(link).state is State.OPERATION_ENABLED
-    setpoint = np.concatenate([r.setpoint for r in readings])
-    assert np.array_equal(setpoint[setpoint >= 0], np.arange(600))
-    columns = readings[-1].columns
-    assert abs(columns["spindle_angle_rad"][-1] - columns["target_angle_rad"][-1]) < 0.03
-    assert drive_of(link).state is State.SWITCH_ON_DISABLED
-    assert drive_of(link).torque_n_m == 0
-
-
 def test_a_drive_that_was_left_in_force_is_disarmed_by_opening_it():
     drive = Epos4Fake()
     drive.state = State.OPERATION_ENABLED
@@ -86,33 +69,6 @@ def test_a_fault_of_the_drive_ends_the_session_in_its_own_words(alone):
             if k == 5:
                 drive_of(link).fail(0x2310, 2)
     assert drive_of(link).torque_n_m == 0
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"limits": {"motor_current_a": 0.05}}, "current|motor_current_a"),
-        ({"safety": {"motor_speed_rad_s": 2.0}}, "too fast"),
-        ({"safety": {"watchdog_s": 0.005}}, "received nothing"),
-    ],
-)
-def test_the_guards_of_the_board_hold_here_too(change, message):
-    settings = config(devices={}, **change)
-    link = open_simulated_canopen(settings)
-    unsafe = pytest.raises((SafetyTripError, DriverError), match=message)
-    with unsafe, Session(settings, link) as session:
-        for _ in session.play(np.linspace(-1.04, 0.0, 900), np.zeros(900)):
-            pass
-    assert drive_of(link).state is State.SWITCH_ON_DISABLED
-
-
-def test_a_drive_that_falls_silent_is_missing_and_its_state_unknown(monkeypatch, alone):
-    settings, link = alone
-    unsafe = pytest.raises((SafetyTripError, DriverError), match=r"not confirm")
-    with unsafe, Session(settings, link) as session:
-        for k, _ in enumerate(session.play(*STILL)):
-            if k == 5:
-                monkeypatch.setattr(drive_of(link), "transmit", list)
 
 
 def test_a_campaign_is_recorded_with_the_further_devices_on_the_loggers_time(tmp_path):
