@@ -76,13 +76,12 @@ def test_a_damaged_run_stops_a_command_unless_it_is_asked_to_skip_it(
         (folder / f"{number:03}.TXT").write_text(text)
     (folder / "003.TXT").write_text(make_log().text() + "1.0, garbage\n")
     assert "003.TXT" in said(words, folder, code=5).err
-    err = said(words, folder, "--skip-bad").err
-    assert "Run 003 does not count:" in err
-    assert "003.TXT" in err
     refused = said(words, folder, "--skip-bad --exclude 004", code=5).err
     assert "has no run '004'" in refused
     assert "fix: Name one of these." in refused
-    assert "Run 002 does not count" in said(words, folder, "--skip-bad --exclude 002").err
+    err = said(words, folder, "--skip-bad --exclude 002").err
+    for part in ("Run 002 does not count", "Run 003 does not count:", "003.TXT"):
+        assert part in err
 
 
 def test_a_folder_without_recordings_is_described(tmp_path, said):

@@ -140,5 +140,5 @@ def test_its_channel_is_fitted_and_diagnosed_by_a_machine_file(tmp_path, answere
     machine.write_text(MACHINE)
     fitted = answered("fit", tmp_path, "--machine", machine, "-o", tmp_path / "grip.model.toml")
     assert "ft_force_z_n" in json.dumps(fitted)
-    found = answered("diagnose", tmp_path, "--machine", machine)
+    found = answered("diagnose --quick", tmp_path, "--machine", machine)
     assert "spring.position" in json.dumps(found["findings"])
