@@ -24,14 +24,19 @@ motor_angle_rad = "angle:deg"
 """
 
 
-def refused(folder, content=TABLE, mapping=GOOD, name="run.csv", flags=()):
-    """Return the words of the error that a table and a mapping raise."""
+def opened(folder, content=TABLE, mapping=GOOD, name="run.csv", flags=()):
+    """Write a table and a mapping, and open the one by the other."""
     path, file = folder / name, folder / "bench.toml"
     if content is not None:
         path.write_bytes(content.encode() if isinstance(content, str) else content)
     file.write_text(mapping)
+    return open_table(path, read_mapping(file, list(flags)))
+
+
+def refused(folder, *given, **more):
+    """Return the words of the error that a table and a mapping raise."""
     with pytest.raises(RigError) as error:
-        open_table(path, read_mapping(file, list(flags)))
+        opened(folder, *given, **more)
     return str(error.value)
 
 
@@ -89,6 +94,10 @@ MAPPINGS = {
         *("\n$", '\n[data.conditions]\nload_a = "current"\n'),
         *(7, "not constant in run run"),
     ),
+    "cuts of which no run is left": (
+        *("\n$", "\n[data.runs]\nleast_s = 60\n"),
+        *(None, "Change least_s (bench.toml, line 6)"),
+    ),
     "a name of a file that does not match": (
         *("\\[data.co", "[data]\nfile_name = 'load_(\\\\d+)'\n[data.co"),
         *(4, "does not match"),
@@ -116,11 +125,8 @@ FORMULAS = {
 
 @pytest.mark.parametrize("formula", FORMULAS.values(), ids=FORMULAS)
 def test_a_wrong_formula_is_a_mistake_of_the_machine_file(tmp_path, formula):
-    file, table = tmp_path / "bench.toml", tmp_path / "run.csv"
-    table.write_text(TABLE)
-    file.write_text(GOOD + formula)
     with pytest.raises(UsageError):
-        open_table(table, read_mapping(file, []))
+        opened(tmp_path, mapping=GOOD + formula)
 
 
 def test_what_is_wrong_on_the_command_line_is_named_as_it_was_typed(tmp_path):
@@ -191,11 +197,6 @@ def test_a_run_whose_time_is_wrong_at_its_end_is_not_left_out_as_short(tmp_path,
     assert "line 22" in said
 
 
-def test_cuts_of_which_no_run_is_left_are_named(tmp_path):
-    said = refused(tmp_path, mapping=GOOD + "[data.runs]\nleast_s = 60\n")
-    assert "Change least_s (bench.toml, line 6)" in said
-
-
 def test_a_machine_file_that_is_not_utf8_is_named_with_its_line(tmp_path):
     file = tmp_path / "bench.toml"
     file.write_bytes(GOOD.replace("bench", "Prüfstand").encode("latin-1"))
@@ -224,8 +225,7 @@ def test_a_unit_in_the_name_of_a_column_is_not_passed_over(tmp_path, column):
     said = refused(tmp_path, table, mapping)
     assert f"the name of the column {column!r} states" in said
     assert f"Write motor_angle_rad = '{column}:deg'" in said
-    (tmp_path / "bench.toml").write_text(mapping.replace(column, f"{column}:rad"))
-    (run,) = open_table(tmp_path / "run.csv", read_mapping(tmp_path / "bench.toml", []))
+    (run,) = opened(tmp_path, table, mapping.replace(column, f"{column}:rad"))
     assert run["motor_angle_rad"][-1] == 19.0
 
 
@@ -346,14 +346,11 @@ def test_a_row_of_units_that_agrees_with_the_mapping(tmp_path, case):
 def test_a_decimal_comma_in_the_name_of_a_file(tmp_path):
     mapping = "[data]\nfile_name = 'lauf_(?P<f>.+)Hz'\n" + MAPPED
     mapping += '[data.conditions]\nfrequency_hz = "f"\n'
-    (tmp_path / "bench.toml").write_text(mapping)
     for name in ("lauf_0,1Hz.csv", "lauf_0.1Hz.csv"):
-        (tmp_path / name).write_text(GERMAN)
-        (run,) = open_table(tmp_path / name, read_mapping(tmp_path / "bench.toml", []))
+        (run,) = opened(tmp_path, GERMAN, mapping, name)
         assert run.conditions["frequency_hz"] == 0.1
-    mapping = (
-        mapping.replace("Zeit:iso8601", "time").replace("Weg", "angle").replace("Kraft", "current")
-    )
+    for german, name in (("Zeit:iso8601", "time"), ("Weg", "angle"), ("Kraft", "current")):
+        mapping = mapping.replace(german, name)
     said = refused(tmp_path, TABLE, mapping, "lauf_0,1Hz.csv")
     assert "'0,1'. frequency_hz ends in a unit" in said
     assert "Write it with a point, 0.1, or state decimal" in said
@@ -400,6 +397,13 @@ def test_files_and_runs_that_cannot_be_read_are_left_out_where_asked(tmp_path):
         open_table(runs, mapping, skip_bad=True)
 
 
+def with_force(cell):
+    """Return the German table with this cell as the force of its line 50."""
+    lines = GERMAN.splitlines()
+    lines[49] = ";".join([*lines[49].split(";")[:2], cell])
+    return "\n".join(lines) + "\n"
+
+
 LAST = GERMAN.splitlines()[-1]
 IN_A_CELL = {
     "a sign between thousands": ("1.234,50", "'1.234,50'", "sign between thousands"),
@@ -410,9 +414,7 @@ IN_A_CELL = {
 @pytest.mark.parametrize("case", IN_A_CELL.values(), ids=IN_A_CELL)
 def test_a_cell_that_is_not_a_number_is_quoted_with_its_remedy(tmp_path, case):
     cell, *words = case
-    lines = GERMAN.splitlines()
-    lines[49] = ";".join([*lines[49].split(";")[:2], cell])
-    said = refused(tmp_path, "\n".join(lines) + "\n", MAPPED)
+    said = refused(tmp_path, with_force(cell), MAPPED)
     assert "line 50 holds" in said
     assert all(word in said for word in words), said
 
@@ -438,20 +440,14 @@ def test_a_point_of_thousands_is_not_a_decimal_one(tmp_path, mapping, stated):
 
 @pytest.mark.parametrize("cell", ["0.500", "1.5"])
 def test_a_column_of_decimal_points_next_to_one_of_decimal_commas(tmp_path, cell):
-    (tmp_path / "run.csv").write_text(THOUSANDS.replace("999", cell))
-    (tmp_path / "bench.toml").write_text(IN_NEWTON)
-    mapping = read_mapping(tmp_path / "bench.toml", [(("decimal",), ",", "")])
-    (run,) = open_table(tmp_path / "run.csv", mapping)
+    flags = [(("decimal",), ",", "")]
+    (run,) = opened(tmp_path, THOUSANDS.replace("999", cell), IN_NEWTON, flags=flags)
     assert run["load_force_n"].tolist() == [1.5, float(cell), 1.001]
 
 
 def test_a_text_that_means_no_value_is_flagged_as_an_empty_cell(tmp_path):
-    lines = GERMAN.splitlines()
-    lines[49] = ";".join([*lines[49].split(";")[:2], "OVERLOAD"])
-    (tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
     flags = [(("missing",), ["OVERLOAD"], "")]
-    (tmp_path / "bench.toml").write_text(MAPPED)
-    (run,) = open_table(tmp_path / "run.csv", read_mapping(tmp_path / "bench.toml", flags))
+    (run,) = opened(tmp_path, with_force("OVERLOAD"), MAPPED, flags=flags)
     assert np.flatnonzero(~run.valid).tolist() == [47]
 
 
@@ -469,8 +465,7 @@ def test_lines_after_the_samples_are_left_out_where_the_error_states_how(tmp_pat
     found = re.search(r"skip_last_lines = (\d+) under \[data\]", said)
     assert found, said
     flags = [(("skip_last_lines",), int(found[1]), "")]
-    mapping = read_mapping(tmp_path / "bench.toml", flags)
-    (run,) = open_table(tmp_path / "run.csv", mapping)
+    (run,) = opened(tmp_path, GERMAN + footer, MAPPED, flags=flags)
     assert len(run) == 100
     assert run.valid.all()
 
@@ -496,15 +491,18 @@ def test_rows_of_trials_that_alternate_are_an_error_and_in_a_preview_a_question(
     assert any("201 parts" in doubt for run in open_table(path, with_least) for doubt in run.doubts)
 
 
+T_AND_Q = [(("columns", "time_s"), "t", ""), (("columns", ANGLE), "q:deg", "")]
+"""The options that map a time t and an angle q."""
+
+
 def test_a_column_of_which_there_are_two_is_asked_about(tmp_path):
     path = tmp_path / "two.csv"
     path.write_text("t,q,q\n" + "".join(f"{0.1 * k},{k % 7},{k % 5}\n" for k in range(100)))
-    flags = [(("columns", "time_s"), "t", ""), (("columns", "motor_angle_rad"), "q:deg", "")]
-    (run,) = open_table(path, read_mapping(None, flags))
+    (run,) = open_table(path, read_mapping(None, T_AND_Q))
     (doubt,) = run.doubts
     assert doubt.startswith("motor_angle_rad: 2 columns are called 'q', and the first one is read;")
-    flags[1] = (("columns", "motor_angle_rad"), "q.2:deg", "")
-    (run,) = open_table(path, read_mapping(None, flags))
+    second = (("columns", ANGLE), "q.2:deg", "")
+    (run,) = open_table(path, read_mapping(None, [T_AND_Q[0], second]))
     assert run.doubts == ()
 
 
@@ -514,9 +512,8 @@ def test_names_of_columns_among_the_samples_are_an_error_with_their_line(tmp_pat
     path = tmp_path / "again.csv"
     rows = [f"{0.1 * k},{k % 7}\n" for k in range(100)]
     path.write_text("".join([above, "t,q\n", *rows[:50], "t,q\n", *rows[50:]]))
-    flags = [(("columns", "time_s"), "t", ""), (("columns", "motor_angle_rad"), "q:deg", "")]
     with pytest.raises(DataError, match=f"line {53 if above else 52}") as error:
-        open_table(path, read_mapping(None, flags))
+        open_table(path, read_mapping(None, T_AND_Q))
     assert "elete" in error.value.fix
 
 
@@ -525,8 +522,7 @@ def test_a_line_of_the_side_file_without_its_recording_is_asked_about(tmp_path):
         table = "t,q\n" + "".join(f"{0.1 * k},{k % 7 + ord(name)}\n" for k in range(100))
         (tmp_path / f"{name}.csv").write_text(table)
     (tmp_path / "runs.csv").write_text("file,load\na.csv,1\nb,2\nc.csv,3\n")
-    flags = [(("columns", "time_s"), "t", ""), (("columns", "motor_angle_rad"), "q:deg", "")]
-    mapping = read_mapping(None, [*flags, (("side_file",), "runs.csv", "")])
+    mapping = read_mapping(None, [*T_AND_Q, (("side_file",), "runs.csv", "")])
     asked = questions(list(open_table(tmp_path, mapping)))
     assert "runs.csv has a line for c.csv, and there is no such file; is a recording lost?" in (
         " ".join(asked)
