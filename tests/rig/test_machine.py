@@ -16,6 +16,7 @@ from estimation.recording import Recording
 from rig.errors import ExitCode
 from rig.log.convert import write_recording
 from rig.machines.shipped import read_machine, shipped
+from tests.rig.importers.conftest import text_table
 
 SLIDE = """
 schema = "rig.machine/1"
@@ -109,10 +110,13 @@ def slide_table(folder, runs=8):
     speed = np.gradient(position, time_s)
     force = 95.0 * np.gradient(speed, time_s) + 200.0 * speed + 20.0 * np.tanh(speed / 2e-3)
     force += np.random.default_rng(1).normal(0.0, 0.5, time_s.size)
-    rows = np.column_stack([time_s, 1e3 * position, force / 35.0])
-    table = folder / "slide.csv"
-    np.savetxt(table, rows, delimiter=",", header="t,x,volts", comments="", fmt="%.9g")
-    return table
+    columns = {"t": time_s, "x": 1e3 * position, "volts": force / 35.0}
+    return text_table(folder / "slide.csv", columns)
+
+
+def read_back(table):
+    """Return time, position and voltage of a table of the slide."""
+    return np.loadtxt(table, delimiter=",", skiprows=1, unpack=True)
 
 
 @pytest.fixture
@@ -204,11 +208,11 @@ def test_a_load_that_differs_between_runs_and_is_left_out_is_reported(
     tmp_path, said, answered, constant_n
 ):
     table = slide_table(tmp_path)
-    rows = np.loadtxt(table, delimiter=",", skiprows=1)
-    load = constant_n * (np.floor(rows[:, 0] / 3.0) % 3)
-    drive = 35.0 * rows[:, 2] + load + 8.0 * np.sign(np.gradient(rows[:, 1]))
-    rows = np.column_stack([rows[:, :2], drive / 35.0, 0.9 * (35.0 * rows[:, 2]) + load])
-    np.savetxt(table, rows, delimiter=",", header="t,x,volts,cell", comments="", fmt="%.9g")
+    time_s, x, volts = read_back(table)
+    load = constant_n * (np.floor(time_s / 3.0) % 3)
+    drive = 35.0 * volts + load + 8.0 * np.sign(np.gradient(x))
+    cell = 0.9 * 35.0 * volts + load
+    text_table(table, {"t": time_s, "x": x, "volts": drive / 35.0, "cell": cell})
     file = tmp_path / "slide.toml"
     for stated, reported in (("true", constant_n > 0), ("false", False)):
         file.write_text(LOADED.replace("run_offsets = false", f"run_offsets = {stated}"))
@@ -222,11 +226,10 @@ def test_a_load_that_differs_between_runs_and_is_left_out_is_reported(
 def test_zeros_that_differ_between_runs_are_not_taken_for_a_load(tmp_path, said):
     """With the means of runs in the fit such an error would remain, and spoil the parameters."""
     table = slide_table(tmp_path)
-    rows = np.loadtxt(table, delimiter=",", skiprows=1)
-    zero = 60.0 * np.random.default_rng(3).normal(size=8)[(rows[:, 0] / 3.0).astype(int)]
-    drive = 35.0 * rows[:, 2] + 8.0 * np.sign(np.gradient(rows[:, 1]))
-    rows = np.column_stack([rows[:, :2], drive / 35.0, 0.9 * (35.0 * rows[:, 2]) + zero])
-    np.savetxt(table, rows, delimiter=",", header="t,x,volts,cell", comments="", fmt="%.9g")
+    time_s, x, volts = read_back(table)
+    zero = 60.0 * np.random.default_rng(3).normal(size=8)[(time_s / 3.0).astype(int)]
+    drive, cell = 35.0 * volts + 8.0 * np.sign(np.gradient(x)), 0.9 * 35.0 * volts + zero
+    text_table(table, {"t": time_s, "x": x, "volts": drive / 35.0, "cell": cell})
     file = tmp_path / "slide.toml"
     file.write_text(LOADED.replace("run_offsets = false", "run_offsets = true"))
     printed = said("machine check", file, table).out
@@ -307,10 +310,9 @@ def test_friction_and_offset_of_a_machine_that_moves_one_way_are_not_separated(
     slide, said, one_way
 ):
     file, table = slide
-    rows = np.loadtxt(table, delimiter=",", skiprows=1)
+    time_s, x, volts = read_back(table)
     if one_way:
-        rows[:, 1] += 500.0 * rows[:, 0]
-        np.savetxt(table, rows, delimiter=",", header="t,x,volts", comments="", fmt="%.9g")
+        text_table(table, {"t": time_s, "x": x + 500.0 * time_s, "volts": volts})
     printed = " ".join(said("machine check", file, table).out.split())
     reason = "carriage_velocity_m_s never changes its sign: Coulomb friction and the offset cannot"
     assert (reason in printed) == one_way
@@ -318,9 +320,9 @@ def test_friction_and_offset_of_a_machine_that_moves_one_way_are_not_separated(
 
 def test_an_acceleration_that_is_mostly_noise_is_reported_with_a_cutoff_that_helps(slide, said):
     file, table = slide
-    rows = np.loadtxt(table, delimiter=",", skiprows=1)
-    rows[:, 1] += np.random.default_rng(2).normal(0.0, 0.02, len(rows))
-    np.savetxt(table, rows, delimiter=",", header="t,x,volts", comments="", fmt="%.9g")
+    time_s, x, volts = read_back(table)
+    noise = np.random.default_rng(2).normal(0.0, 0.02, len(x))
+    text_table(table, {"t": time_s, "x": x + noise, "volts": volts})
     printed = " ".join(said("machine check", file, table).out.split())
     (cutoff_hz,) = re.findall(
         r"of carriage_acceleration_m_s2 is noise of .* cutoff_hz = (\d+) under", printed
@@ -345,9 +347,8 @@ def test_a_load_that_is_a_condition_is_named(slide, said):
 def test_a_clipped_channel_is_asked_about_at_every_step(slide, tmp_path, said, answered):
     """Of tables and of logs; samples that are flagged as invalid do not count."""
     file, table = slide
-    rows = np.loadtxt(table, delimiter=",", skiprows=1)
-    rows[:, 2] = np.clip(rows[:, 2], -1.2, 1.2)
-    np.savetxt(table, rows, delimiter=",", header="t,x,volts", comments="", fmt="%.9g")
+    time_s, x, volts = read_back(table)
+    text_table(table, {"t": time_s, "x": x, "volts": np.clip(volts, -1.2, 1.2)})
     logs = tmp_path / "logs"
     asked = said("import", table, "--machine", file, "--out", logs).err
     assert "drive_force_n: " in asked
@@ -428,13 +429,12 @@ def test_a_machine_without_any_equation_reports_what_is_needed(tmp_path, said):
 
 def speed_read_slide(folder, asymmetry=0.0, noise_mm_s=0.0):
     """Return the file and the table of a slide whose speed alone is read."""
-    rows = np.loadtxt(slide_table(folder), delimiter=",", skiprows=1)
-    speed = np.gradient(rows[:, 1], rows[:, 0])
-    force = 35.0 * rows[:, 2] + asymmetry * np.abs(speed)
-    speed += np.random.default_rng(4).normal(0.0, noise_mm_s, len(rows))
-    rows = np.column_stack([rows[:, 0], speed, force / 35.0])
-    table = folder / "slide.csv"
-    np.savetxt(table, rows, delimiter=",", header="t,v,volts", comments="", fmt="%.9g")
+    time_s, x, volts = read_back(slide_table(folder))
+    speed = np.gradient(x, time_s)
+    force = 35.0 * volts + asymmetry * np.abs(speed)
+    speed += np.random.default_rng(4).normal(0.0, noise_mm_s, len(x))
+    columns = {"t": time_s, "v": speed, "volts": force / 35.0}
+    table = text_table(folder / "slide.csv", columns)
     file = folder / "slide.toml"
     words = {"position_m": "velocity_m_s", "x:mm": "v:mm/s", '"position"': '"speed"'}
     text = SLIDE

@@ -37,6 +37,16 @@ def machine(folder, text=MAPPED):
     return read_mapping(path, [])
 
 
+def opened(folder, content, text=MAPPED):
+    """Return the runs of a text table, of its text or of its columns, by a mapping."""
+    path = folder / "run.csv"
+    if isinstance(content, str):
+        path.write_text(content)
+    else:
+        text_table(path, content)
+    return open_table(path, machine(folder, text))
+
+
 def write(folder, kind):
     """Write the same samples in a format, and return the file."""
     path = folder / f"run.{kind}"
@@ -80,6 +90,7 @@ def test_a_table_without_a_head_or_a_clock_is_mapped_by_number_and_rate(tmp_path
 
 SECONDS = '[data.columns]\ntime_s = "t"\n'
 ANGLE = f'{SECONDS}motor_angle_rad = "enc"\n'
+IN_DEG = f'{SECONDS}motor_angle_rad = "enc:deg"\n'
 EVEN = f"[data]\neven_rate_hz = 100\n{MAPPED}"
 TEXT = "t,enc,i\n0,0,100\n10,45,200\n20,90,300\n"
 IN_SI = {"time_s": [0.0, 0.01, 0.02], "motor_current_a": [0.1, 0.2, 0.3]}
@@ -192,37 +203,30 @@ def test_what_a_table_holds_becomes_si(tmp_path, case):
 
 
 def test_a_column_that_is_not_mapped_is_left_out_and_a_second_value_at_a_time_refused(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text("time_s,motor_angle_rad,Remark\n0,1,0\n0.1,2,0\n")
-    (run,) = open_table(path, machine(tmp_path, "[data]\n"))
+    (run,) = opened(tmp_path, "time_s,motor_angle_rad,Remark\n0,1,0\n0.1,2,0\n", "[data]\n")
     assert set(run.columns) == {"motor_angle_rad"}
-    path.write_text("time_s,motor_angle_rad\n0,1\n0.1,2\n0.1,2.5\n0.2,3\n")
     with pytest.raises(DataError, match="line 4: time goes from") as error:
-        open_table(path, machine(tmp_path, "[data]\n"))
+        opened(tmp_path, "time_s,motor_angle_rad\n0,1\n0.1,2\n0.1,2.5\n0.2,3\n", "[data]\n")
     assert "1 sample has the time of the one before it" in error.value.why
     assert "even_rate_hz = 10 under [data]" in error.value.fix
     assert "resets" not in error.value.fix
-    path.write_text("t,enc,i\n23:59:59.500,0,0\n")
     with pytest.raises(DataError) as error:
-        open_table(path, machine(tmp_path))
+        opened(tmp_path, "t,enc,i\n23:59:59.500,0,0\n")
     assert error.value.fix == "Write time_s = 't:iso8601'."
 
 
 def test_samples_that_do_not_count_are_flagged_with_the_reason(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text("time_s,motor_angle_rad,drive_ratio\n0,1,1\n0.1,,1\n0.2,3,0\n0.3,4,0\n")
+    table = "time_s,motor_angle_rad,drive_ratio\n0,1,1\n0.1,,1\n0.2,3,0\n0.3,4,0\n"
     text = '[[data.invalid]]\nwhen = "drive_ratio < 1"\nreason = "the drive was off"\n'
-    (run,) = open_table(path, machine(tmp_path, text))
+    (run,) = opened(tmp_path, table, text)
     assert run.valid.tolist() == [True, False, False, False]
     (stretch,) = run.stretches
     assert (stretch.start_s, stretch.stop_s, stretch.reason) == (0.2, 0.3, "the drive was off")
 
 
 def test_a_reading_that_is_none_is_bridged_before_a_filter_smears_it(tmp_path):
-    path = tmp_path / "run.csv"
     time_s = np.arange(200) / 100
     angle = np.sin(2 * time_s)
-    text_table(path, {"t": time_s.tolist(), "q": np.where(time_s == 1.0, -np.pi, angle).tolist()})
     text = """
         [data]
         even_rate_hz = 100.0
@@ -234,7 +238,7 @@ def test_a_reading_that_is_none_is_bridged_before_a_filter_smears_it(tmp_path):
         reason = "the servo did not answer"
         missing = true
         """
-    (run,) = open_table(path, machine(tmp_path, text))
+    (run,) = opened(tmp_path, {"t": time_s, "q": np.where(time_s == 1.0, -np.pi, angle)}, text)
     filtered = filter_recording(run, LowPass(15.0, 3))
     assert not filtered.valid[100]
     error = (filtered["motor_angle_rad"] - angle)[filtered.valid]
@@ -275,13 +279,10 @@ def test_a_formula_is_of_channels_and_conditions_in_si(tmp_path):
 
 
 def test_dates_are_a_clock_and_the_start_of_the_run(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text(
-        "when,enc\n2024-05-01T12:00:00+00:00,1\n2024-05-01T12:00:00.250+00:00,2\n"
-        "2024-05-01T12:00:00.500+00:00,3\n"
-    )
+    hour = "2024-05-01T12:00:00"
+    table = f"when,enc\n{hour}+00:00,1\n{hour}.250+00:00,2\n{hour}.500+00:00,3\n"
     text = '[data.columns]\ntime_s = "when:iso8601"\nmotor_angle_rad = "enc:deg"\n'
-    (run,) = open_table(path, machine(tmp_path, text))
+    (run,) = opened(tmp_path, table, text)
     np.testing.assert_allclose(run.time_s, [0, 0.25, 0.5])
     assert run.started_at_ns == 1714564800 * 10**9
 
@@ -300,20 +301,13 @@ def test_a_clock_that_goes_on_from_file_to_file_is_the_start_of_the_runs(
     for number, start_s in enumerate(starts_s):
         columns = {"t": [start_s + 0.1 * k for k in range(4)], "enc": [number, 1, 2, 3]}
         text_table(tmp_path / f"{number}.csv", columns)
-    text, remarks = SECONDS + 'motor_angle_rad = "enc:deg"\n', []
-    runs = read_runs(tmp_path, machine(tmp_path, text), remarks)
+    remarks = []
+    runs = read_runs(tmp_path, machine(tmp_path, IN_DEG), remarks)
     assert [run.started_at_ns for run in runs] == (
         [None] * 3 if known_s is None else [round(1e9 * start_s) for start_s in known_s]
     )
     said = [f"{remark}, so the pauses between runs are not known"] if remark else []
     assert [text for _, text in remarks if "pauses" in text] == said
-
-
-def cut(tmp_path, rule, columns):
-    path = tmp_path / "run.csv"
-    text_table(path, columns)
-    runs = f'[data.columns]\ntime_s = "t"\nmotor_angle_rad = "enc:deg"\n[data.runs]\n{rule}\n'
-    return [run["motor_angle_rad"] for run in open_table(path, machine(tmp_path, runs))]
 
 
 CUTS = [
@@ -331,18 +325,20 @@ CUTS = [
 
 @pytest.mark.parametrize(("rule", "columns"), CUTS)
 def test_runs_are_cut_where_the_mapping_states(tmp_path, rule, columns):
-    parts = cut(tmp_path, rule, {**columns, "enc": [1, 2, 3, 4, 5, 6]})
-    assert [np.degrees(part).round().tolist() for part in parts] == [[1, 2, 3], [4, 5, 6]]
+    runs = opened(
+        tmp_path, {**columns, "enc": [1, 2, 3, 4, 5, 6]}, f"{IN_DEG}[data.runs]\n{rule}\n"
+    )
+    found = [np.degrees(run["motor_angle_rad"]).round().tolist() for run in runs]
+    assert found == [[1, 2, 3], [4, 5, 6]]
 
 
 def test_a_counter_that_starts_again_does_so_in_each_run_for_itself(tmp_path):
     """The second run begins with the counter at 0; one cell of it is empty."""
-    path = tmp_path / "run.csv"
-    path.write_text(
+    table = (
         "t,trial,enc\n0,1,3072\n0.1,1,4095\n0.2,1,1024\n0.3,2,0\n0.4,2,4000\n0.5,2,\n0.6,2,3900\n"
     )
     text = SECONDS + 'motor_angle_rad = { column = "enc", unit = "rev/4096", wraps_at = 4096 }\n'
-    first, second = open_table(path, machine(tmp_path, f'{text}[data.runs]\nchanges = ["trial"]'))
+    first, second = opened(tmp_path, table, f'{text}[data.runs]\nchanges = ["trial"]')
     np.testing.assert_allclose(
         first["motor_angle_rad"], np.array([3072, 4095, 5120]) / 2048 * np.pi
     )
@@ -363,19 +359,17 @@ def test_a_counter_that_starts_again_does_so_in_each_run_for_itself(tmp_path):
     ],
 )
 def test_runs_are_named_by_their_trial_where_each_has_its_own(tmp_path, trials, names):
-    path = tmp_path / "run.csv"
     rows = [f"{0.1 * k},{k},{trial}\n" for k, trial in enumerate(trials)]
-    path.write_text("".join(["t,enc,trial\n", *rows]))
-    text = SECONDS + 'motor_angle_rad = "enc:deg"\n[data.runs]\nchanges = ["trial"]\n'
-    runs = open_table(path, machine(tmp_path, text))
+    text = f'{IN_DEG}[data.runs]\nchanges = ["trial"]\n'
+    runs = opened(tmp_path, "".join(["t,enc,trial\n", *rows]), text)
     assert [run.name for run in runs] == names
 
 
 def test_each_run_is_on_a_clock_of_its_own_and_a_short_rest_is_left_out(tmp_path):
     path = tmp_path / "run.csv"
     text_table(path, {"t": [0.1 * k for k in range(7)], "enc": list(range(7))})
-    text = '[data.columns]\ntime_s = "t"\nmotor_angle_rad = "enc:deg"\n[data.runs]\nlap_s = 0.3\n'
     remarks = []
+    text = f"{IN_DEG}[data.runs]\nlap_s = 0.3\n"
     runs = list(read_runs(path, machine(tmp_path, text), remarks))
     assert [run.name for run in runs] == ["run-00", "run-01"]
     assert [run.time_s[0] for run in runs] == [0, 0]
@@ -420,14 +414,11 @@ def test_channels_of_two_rates_in_one_table_are_each_interpolated(tmp_path):
     rows = "".join(
         f"{t * 1000},{90 * t},{100 * t if k % 5 == 0 else ''}\n" for k, t in enumerate(time)
     )
-    (tmp_path / "run.csv").write_text("t,enc,i\n" + rows)
+    (run,) = opened(tmp_path, "t,enc,i\n" + rows, "[data]\neven_rate_hz = 50\n" + MAPPED)
     remarks = []
     list(read_runs(tmp_path / "run.csv", machine(tmp_path), remarks))
     assert "160 samples with a cell that is empty, NaN or inf flagged" in remarks[-1][1]
     assert "even_rate_hz = 20.1 interpolates" in remarks[-1][1]
-    (run,) = open_table(
-        tmp_path / "run.csv", machine(tmp_path, "[data]\neven_rate_hz = 50\n" + MAPPED)
-    )
     inside = run.time_s <= 1.95
     assert not run.flags[inside].any()
     np.testing.assert_allclose(run["motor_current_a"][inside], 0.1 * run.time_s[inside], atol=1e-9)
@@ -435,11 +426,9 @@ def test_channels_of_two_rates_in_one_table_are_each_interpolated(tmp_path):
 
 
 def test_an_uneven_clock_is_made_even_where_asked_for(tmp_path):
-    path = tmp_path / "run.csv"
     time_s = np.cumsum(np.random.default_rng(0).uniform(0.008, 0.012, 300))
-    text_table(path, {"t": time_s.tolist(), "enc": (10 * time_s).tolist()})
-    text = '[data]\neven_rate_hz = 100\n[data.columns]\ntime_s = "t"\nmotor_angle_rad = "enc"\n'
-    (run,) = open_table(path, machine(tmp_path, text))
+    text = f"[data]\neven_rate_hz = 100\n{ANGLE}"
+    (run,) = opened(tmp_path, {"t": time_s, "enc": 10 * time_s}, text)
     np.testing.assert_allclose(np.diff(run.time_s), 0.01)
     np.testing.assert_allclose(run["motor_angle_rad"], 10 * (run.time_s + time_s[0]), atol=1e-9)
 
