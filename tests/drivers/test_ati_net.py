@@ -114,11 +114,6 @@ def test_a_status_is_reported_in_words_and_flags_its_samples():
     assert device.counters["device_errors"] == 50
 
 
-def test_the_numbers_wrap_without_a_gap():
-    batch = start(RdtFake(first_sequence=2**32 - 30)).read(0.1)
-    assert batch.sequence.tolist() == list(range(50))
-    assert batch.lost == 0
-
 
 def followed(numbers: list[int]) -> tuple[list[bool], list[int], DeviceCounters]:
     counters = DeviceCounters()
