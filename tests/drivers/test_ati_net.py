@@ -114,7 +114,6 @@ def test_a_status_is_reported_in_words_and_flags_its_samples():
     assert device.counters["device_errors"] == 50
 
 
-
 def followed(numbers: list[int]) -> tuple[list[bool], list[int], DeviceCounters]:
     counters = DeviceCounters()
     kept, given_numbers = RecordSequence(counters).follow(np.array(numbers, np.uint32))

@@ -7,7 +7,7 @@ import pytest
 
 from estimation.bank.fitting import Normal, Pool, Settings, Shape, solve
 from estimation.bank.interval import covered_share
-from estimation.bank.states import STATES, Bank
+from estimation.bank.states import Bank
 from estimation.campaign import Campaign
 from estimation.closing import closing_samples, processed
 from estimation.estimator import load
@@ -33,41 +33,6 @@ def closing_error(estimator: BankEstimator, run: Recording, causal: bool = False
 
 def closing_rms(estimator: BankEstimator, run: Recording, causal: bool = False) -> float:
     return float(np.sqrt(np.mean(closing_error(estimator, run, causal)[0] ** 2)))
-
-
-@pytest.mark.parametrize("pose", ["", "wrist_roll_rad"])
-@pytest.mark.parametrize("turned_s", [0.2, 0.45, 0.499])
-def test_a_design_is_its_products_of_states_and_its_series_in_the_angle(turned_s, pose):
-    bank, p = Bank("motor_current_a", pose), 0.7 if pose else 0.0
-    past = [0.2, 0.21, 0.22, 0.23, 0.24, 0.25, 0.26, 0.27]
-    pushes = [100.0, 200.0, 300.0, 400.0, -100.0, -200.0, -300.0, -400.0]
-    now = [-0.2, 0.3, 42.0, 500.0, *([p] if pose else [])]
-    row = np.array([[*now, 2.5, turned_s, 0.05, 0.1, *past, *pushes]])
-    q, c = (-0.2 + 0.5) / 0.5, 0.3 / 0.21 - 1
-    v, a, i, d = 42 / 35 - 1, 0.5, 35 / 42, 0.05 / 0.21
-    t = 2.5 + 20 * max(turned_s - 0.4, 0) / 0.1  # a turn about to leave the window was long ago
-    k = [min(t / r, 1) - 0.5 for r in (1, 2, 3, 4)]
-    n = [min(t / (r * 0.3 / 0.21), 1) - 0.5 for r in (1, 2, 3)]
-    h = [0.1 / 0.21 * max(1 - t / r, 0) for r in (2, 4)]
-    lags = [load / 0.21 - 1 for load in past] + [push / 1000 for push in pushes]
-    values = [q, c, v, a, i, d, *k, *n, p, *h, *lags]
-    state = dict(zip(STATES, values, strict=True))
-    design = bank.design(row)[0]
-    for product, value in zip(bank.products, design, strict=False):
-        assert value == pytest.approx(np.prod([state[name] for name in product]), abs=1e-12)
-
-    def series(orders: int, turn: float, amplitudes: list[float]) -> list[float]:
-        return [
-            amplitude * part
-            for order in range(1, orders + 1)
-            for amplitude in amplitudes
-            for part in (np.sin(order * turn), np.cos(order * turn))
-        ]
-
-    ripple = series(bank.orders, 35 * 0.17 * -0.2, [1.0, c, v])
-    wrist = series(bank.wrist_orders, 2 * np.pi / 3.3 * -0.2, [p**power for power in range(5)])
-    np.testing.assert_allclose(design[len(bank.products) :], ripple + wrist, atol=1e-12)
-    assert len(bank.shape.stiffness) == len(design) == bank.size
 
 
 def test_a_run_s_own_offset_does_not_bend_the_slope():
