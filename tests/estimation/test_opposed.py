@@ -17,7 +17,6 @@ from estimation.plant_models import declared
 from estimation.recording import Recording
 from estimation.signals import Signals
 from estimation.travel import off_ratio, other_ratio, slope
-from estimation.turned import turned_runs
 from tests.estimation.causes.synthetic import axis, hoist, hoisted, turning
 
 
@@ -51,20 +50,6 @@ def test_a_drive_that_pulls_back_is_named(channel: str) -> None:
     found = [*driven_back(fit(hoist(), campaign, bootstrap=0), campaign)]
     assert len(found) == bool(channel)
     assert all(one.startswith("drive_command_v has a negative gain") for one in found)
-
-
-@pytest.mark.parametrize("channel", ["", "drive_command_v", "rope_force_n"])
-def test_a_channel_of_the_other_sign_in_one_run_is_named_with_the_run(channel: str) -> None:
-    """A weight is most of both, so that their correlation in a run shows nothing."""
-    runs = hoisted()
-    for place in (6, 9) if channel else ():
-        (runs[place],) = _negated(runs[place : place + 1], channel)
-    campaign = Campaign.of(runs)
-    found = [*turned_runs(fit(hoist(), campaign, bootstrap=0), campaign)]
-    assert len(found) == bool(channel)
-    assert all(
-        one.startswith(f"{channel} is about -1 times") and " 06, 09;" in one for one in found
-    )
 
 
 def test_no_cause_is_sought_where_a_sign_is_wrong(sound: list[Recording]) -> None:

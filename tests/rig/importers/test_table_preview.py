@@ -170,21 +170,26 @@ def test_the_travel_of_a_motor_counts_behind_its_gear(tmp_path, said, size, is_a
     assert bool(asked) == is_asked
 
 
-@pytest.mark.parametrize("turned", [(), (6, 9)])
-def test_a_channel_of_the_other_sign_in_some_runs_is_named_by_the_equation(tmp_path, said, turned):
+@pytest.mark.parametrize(
+    ("channel", "turned"),
+    [("rope_force_n", ()), ("rope_force_n", (6, 9)), ("drive_command_v", (6, 9))],
+)
+def test_a_channel_of_the_other_sign_in_some_runs_is_named_by_the_equation(
+    tmp_path, said, channel, turned
+):
     """As `rig machine check` does; of a weight, the correlation of two channels shows no sign."""
     for k, run in enumerate(hoisted()):
-        force = -run["rope_force_n"] if k in turned else run["rope_force_n"]
-        columns = {**run.columns, "rope_force_n": force}
+        columns = {**run.columns, channel: -run[channel] if k in turned else run[channel]}
         text_table(tmp_path / f"{run.name}.csv", {"time_s": run.time_s, **columns})
     file = tmp_path / "hoist.toml"
     file.write_text(f"{HOIST}\n[data]\n")
-    asked = "rope_force_n is about -1 times what the other runs predict for it in 06, 09; is its"
+    asked = f"{channel} is about -1 times what the other runs predict for it in 06, 09; is its"
     shown = said("import", tmp_path, "--machine", file, "--preview")
     assert (asked in shown.err) == bool(turned)
     assert ("Nothing looks wrong" in shown.out) != bool(turned)
     checked = " ".join(said("machine check", file, tmp_path).out.split())
     assert (asked in checked) == bool(turned)
+    assert checked.count("is about -1 times") == bool(turned)
 
 
 def test_a_file_in_another_unit_is_named_where_the_others_are_right(tmp_path):
