@@ -34,7 +34,6 @@ def test_a_sound_machine_has_no_channel_of_the_opposite_sign(sound: list[Recordi
     assert opposed(fit(axis(), campaign, bootstrap=0), campaign) == ""
 
 
-
 @pytest.mark.parametrize("channel", ["", "drive_command_v"])
 def test_a_drive_that_pulls_back_is_named(channel: str) -> None:
     runs = _negated(hoisted(), channel) if channel else hoisted()

@@ -24,10 +24,6 @@ NUMBERED = Stream(
 )
 
 
-def sample_report(path):
-    return next(t for t in check_log(path).topics if t.topic == SAMPLE)
-
-
 def write_numbered(path, sequence, x=None, log_time_ns=None, end=None):
     count = len(sequence)
     with LogWriter(path, RunInfo("a"), [NUMBERED]) as writer:
@@ -37,30 +33,6 @@ def write_numbered(path, sequence, x=None, log_time_ns=None, end=None):
         writer.write("/t", rows, np.arange(count) if log_time_ns is None else log_time_ns)
         writer.close(end)
     return path
-
-
-def test_a_complete_log_is_left_alone_by_a_repair(tmp_path, log):
-    report = check_log(log)
-    assert report.verdict is Verdict.COMPLETE
-    assert report.verdict.exit_code == ExitCode.OK
-    assert report.problems == ()
-    sample = sample_report(log)
-    assert (sample.received, sample.expected, sample.expected_by_recorder) == (600, 600, 600)
-    assert repair_log(log).repaired is None
-    assert [item.name for item in tmp_path.iterdir()] == ["run.mcap"]
-
-
-def test_every_gap_is_listed(tmp_path):
-    drop = frozenset({100, 101, 102, 350})
-    report = check_log(write_log(tmp_path / "a.mcap", drop=drop))
-    assert report.verdict is Verdict.INCOMPLETE
-    assert report.verdict.exit_code == ExitCode.FAILED
-    for topic in report.topics:
-        assert (topic.received, topic.expected) == (596, 600)
-        found = [(g.first_sequence, g.last_sequence, g.samples) for g in topic.gaps]
-        assert found == [(100, 102, 3), (350, 350, 1)]
-    first = sample_report(tmp_path / "a.mcap").gaps[0]
-    assert (first.start_s, first.length_s) == pytest.approx((0.099, 0.004))
 
 
 @pytest.mark.parametrize(

@@ -60,15 +60,21 @@ def test_brackets_and_colons_are_printed_as_they_were_typed(rig, tmp_path, log):
 def test_check_of_a_folder_ends_with_the_worst_code(rig, tmp_path):
     write_log(tmp_path / "a.mcap")
     rig("check", tmp_path)
-    write_log(tmp_path / "b.mcap", drop=frozenset({30, 31}))
+    write_log(tmp_path / "b.mcap", drop=frozenset({30, 31, 350}))
     out = rig("check", tmp_path, code=ExitCode.FAILED).out
-    assert "gap at 0.0290 s, 3.0 ms: 2 samples, 30 to 31" in out
+    for gap in ("0.0290 s, 3.0 ms: 2 samples, 30 to 31", "0.3490 s, 2.0 ms: 1 samples, 350 to 350"):
+        assert out.count(f"gap at {gap}") == 2  # in each of two streams
     whole = write_log(tmp_path / "c.mcap")
     whole.write_bytes(whole.read_bytes()[:-1])
     out = rig("check", tmp_path, json=True, code=ExitCode.DATA)
     assert out["exit_code"] == ExitCode.DATA
     assert [log["verdict"] for log in out["logs"]] == ["complete", "incomplete", "damaged"]
-    assert out["logs"][1]["topics"][0]["gaps"][0]["samples"] == 2
+    complete, incomplete, _ = out["logs"]
+    assert complete["problems"] == []
+    for log, samples, gaps in ((complete, 600, 0), (incomplete, 597, 2)):
+        assert log["topics"][0]["expected_by_recorder"] == 600
+        found = [(t["received"], t["expected"], len(t["gaps"])) for t in log["topics"]]
+        assert found == 2 * [(samples, 600, gaps)]
 
 
 def test_check_does_not_count_what_was_recorded_again(rig, tmp_path):
@@ -104,6 +110,7 @@ def test_check_names_the_runs_of_a_campaign_that_are_missing(rig, tmp_path):
 
 def test_repair_reports_what_was_saved_and_lost(rig, log):
     assert "not damaged" in rig("repair", log).out
+    assert [*log.parent.iterdir()] == [log]
     log.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
     out = rig("repair", log, json=True)
     assert out["repaired"].endswith("run.repaired.mcap")
