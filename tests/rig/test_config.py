@@ -29,12 +29,6 @@ def test_a_wrong_key_is_named(tmp_path, old, new, message):
         load_config(path)
 
 
-def test_a_shipped_configuration_is_found_by_name():
-    assert load_config(Path("reference")).name == "reference rig"
-    with pytest.raises(UsageError, match="reference"):
-        load_config(Path("referense"))
-
-
 @pytest.mark.parametrize("name", shipped_configs())
 def test_every_shipped_configuration_is_sound_and_survives_being_shown(name, tmp_path):
     config = load_config(Path(name))

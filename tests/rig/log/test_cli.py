@@ -126,6 +126,9 @@ def test_export(rig, log, tmp_path):
     told = rig("export", log, "--topic /rig/sample --out", tmp_path / "x.csv").out
     assert told == f"wrote {tmp_path / 'x.csv'}\n"
     assert "csv, parquet, npz" in rig("export", log, "--format xls", code=2).err
+    log.write_bytes(log.read_bytes()[:-50])
+    assert "rig log repair" in rig("export", log, "--out", tmp_path / "y.csv", code=5).err
+    assert not (tmp_path / "y.csv").exists()
 
 
 @pytest.mark.parametrize("format_name", ["parquet", "csv"])
