@@ -33,10 +33,6 @@ def by_check(findings: list[Finding]) -> dict[str, Finding]:
     return {finding.check: finding for finding in findings}
 
 
-def test_a_healthy_simulated_rig_has_no_complaint():
-    assert worst(examine(simulated())) is Level.OK
-
-
 def test_a_sensor_where_the_logger_is_is_examined(tmp_path):
     path = tmp_path / "cell.toml"
     logger = '[logger]\ndriver = "ft300"\nprofile = "sensor"\nurl = "sim://"\n'
@@ -185,8 +181,9 @@ def test_can_interfaces_are_known_by_their_kind(tmp_path):
 
 
 def test_the_verbs_speak_to_machines(answered):
-    findings = answered("doctor")["findings"]
-    assert {f["level"] for f in findings if f["subject"] == "logger"} == {"ok"}
+    told = answered("doctor")
+    assert {told["level"], *(f["level"] for f in told["findings"])} == {"ok"}
+    assert "logger" in {f["subject"] for f in told["findings"]}
     assert answered("devices --config canopen")["configured"]["jaw_force"]["driver"] == "ati-can"
     assert answered("stop")["state"] == "disarmed"
 
