@@ -12,10 +12,10 @@ from estimation.diagnosis.split import split
 from estimation.filters import LowPass
 from estimation.fitting import fit
 from estimation.opposed import driven_back, opposed
-from estimation.plant_file import parse
+from estimation.plant import Axis, Part, Plant, Sensor, Written
 from estimation.plant_models import declared
 from estimation.recording import Recording
-from estimation.signals import Signals
+from estimation.signals import Combination, Share, Signals
 from estimation.travel import off_ratio, other_ratio, slope
 from tests.estimation.causes.synthetic import axis, hoist, hoisted, turning
 
@@ -110,40 +110,24 @@ def test_motion_of_one_frequency_does_not_hide_another_ratio():
         assert found == expected
 
 
-CYLINDER = """
-schema = "rig.machine/1"
-[machine]
-name = "cylinder"
-[[axis]]
-name = "piston"
-unit = "m"
-[[sensor]]
-name = "piston_position_m"
-axis = "piston"
-reads = "position"
-[[sensor]]
-name = "head_pressure_pa"
-[[sensor]]
-name = "rod_pressure_pa"
-[[derived]]
-name = "net_pressure_pa"
-shares = [{ channel = "head_pressure_pa" }, { channel = "rod_pressure_pa", times = -0.64 }]
-[[equation]]
-name = "cylinder"
-target = "net_pressure_pa"
-[[equation.effects]]
-id = "inertia.missing"
-channels.acceleration = "piston_acceleration_m_s2"
-"""
+HEAD, ROD, NET = "head_pressure_pa", "rod_pressure_pa", "net_pressure_pa"
+INERTIA = Part("inertia.missing", 1, {"acceleration": "piston_acceleration_m_s2"})
+CYLINDER = Plant(
+    name="cylinder",
+    axes=(Axis("piston", "m"),),
+    sensors=(Sensor("piston_position_m", "piston", "position"), Sensor(HEAD), Sensor(ROD)),
+    derived=(Combination(NET, (Share(HEAD), Share(ROD, -0.64))),),
+    equations=(Written("cylinder", NET, (INERTIA,)),),
+)
 
 
 def test_a_difference_of_two_pressures_is_not_taken_for_a_deflection():
-    (model,) = declared(parse(CYLINDER))
+    (model,) = declared(CYLINDER)
     time_s = np.arange(0.0, 4.0, 0.002)
     position = 0.01 * np.sin(9.0 * time_s)
     rod = 1e6 - 2e8 * position
     head = 0.64 * rod - 81.0 * 6e5 * position
-    columns = {"piston_position_m": position, "head_pressure_pa": head, "rod_pressure_pa": rod}
+    columns = {"piston_position_m": position, HEAD: head, ROD: rod}
     assert off_ratio(model, [Recording("run", time_s, columns)]) == ""
 
 

@@ -177,30 +177,13 @@ def test_without_a_torque_sensor_the_drive_is_the_target_and_the_gap_is_named():
 
 
 def test_the_effort_that_is_needed_of_each_axis_is_in_the_unit_of_that_axis():
-    motor = """
-    [machine]
-    name = "belt"
-    [[axis]]
-    name = "motor"
-    unit = "rad"
-    [[axis]]
-    name = "carriage"
-    unit = "m"
-    [[transmission]]
-    name = "belt"
-    input = "motor"
-    output = "carriage"
-    ratio = 80.0
-    compliant = true
-    [[actuator]]
-    name = "motor_current_a"
-    axis = "motor"
-    [[sensor]]
-    name = "motor_angle_rad"
-    axis = "motor"
-    reads = "position"
-    """
-    plant = parse('schema = "rig.machine/1"\n' + motor, "belt.toml")
+    plant = Plant(
+        name="belt",
+        axes=(Axis("motor", "rad"), Axis("carriage", "m")),
+        transmissions=(Transmission("belt", "motor", "carriage", 80.0, compliant=True),),
+        actuators=(Actuator("motor_current_a", "motor"),),
+        sensors=(Sensor("motor_angle_rad", "motor", "position"),),
+    )
     needed = [gap.needed for gap in missing(plant)]
     assert "A sensor of effort on one of motor (N m), carriage (N)." in needed
 

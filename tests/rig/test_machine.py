@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.rigs import draw
 from estimation import model_file
+from estimation.plant import Axis, Part, Plant, Sensor, Written
 from estimation.plant_file import parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from estimation.recording import Recording
@@ -43,35 +44,25 @@ lap_s = 3.0
 """
 
 
-PENDULUM = r"""
-schema = "rig.machine/1"
-[machine]
-name = "pendulum"
-cutoff_hz = 10.0
-run_offsets = false
-[[axis]]
-name = "arm"
-unit = "rad"
-[[sensor]]
-name = "arm_angle_rad"
-axis = "arm"
-reads = "position"
-[[sensor]]
-name = "arm_current_a"
-[[sensor]]
-name = "scaled_arm_angle_rad"
-[[equation]]
-name = "swing"
-target = "arm_current_a"
-[[equation.effects]]
-id = "inertia.missing"
-channels.acceleration = "arm_acceleration_rad_s2"
-[[equation.effects]]
-id = "inertia.missing"
-channels.acceleration = "scaled_arm_acceleration_rad_s2"
-[[equation.effects]]
-id = "friction.viscous"
-channels.speed = "arm_velocity_rad_s"
+INERTIAS = [
+    Part("inertia.missing", 1, {"acceleration": f"{scaled}arm_acceleration_rad_s2"})
+    for scaled in ("", "scaled_")
+]
+FRICTION = Part("friction.viscous", 1, {"speed": "arm_velocity_rad_s"})
+PENDULUM = Plant(
+    name="pendulum",
+    cutoff_hz=10.0,
+    run_offsets=False,
+    axes=(Axis("arm", "rad"),),
+    sensors=(
+        Sensor("arm_angle_rad", "arm", "position"),
+        Sensor("arm_current_a"),
+        Sensor("scaled_arm_angle_rad"),
+    ),
+    equations=(Written("swing", "arm_current_a", (*INERTIAS, FRICTION)),),
+)
+"""A pendulum whose inertia follows its weight."""
+SWINGS = r"""
 [data]
 file_name = '\d_m(?P<mass>\d\.\d+)'
 [data.columns]
@@ -83,7 +74,6 @@ mass_kg = "mass"
 [data.formulas]
 scaled_arm_angle_rad = "mass_kg * 0.3**2 * arm_angle_rad"
 """
-"""A pendulum whose inertia follows its weight."""
 
 GEARED_SLIDE = """
 [[axis]]
@@ -288,7 +278,7 @@ def test_an_inertia_that_follows_a_condition_is_an_effect_of_the_scaled_angle(tm
         current = (0.02 + 1.5 * mass * 0.3**2) * acceleration + 0.1 * speed
         columns = np.column_stack([time_s, angle, current + random.normal(0, 1e-3, time_s.size)])
         np.savetxt(runs / f"{k}_m{mass:.2f}.csv", columns, "%.6f", ",", header="t,q,i", comments="")
-    file.write_text(PENDULUM)
+    file.write_text(to_toml(PENDULUM) + SWINGS)
     (found,) = answered("machine check", file, runs)["check"]["equations"]
     values = {one["effect"]: one["value"] for one in found["parameters"]}
     of = "inertia.missing({}arm_acceleration_rad_s2)"

@@ -8,7 +8,8 @@ import pytest
 from scipy.io import savemat
 
 from estimation.files import write_text_atomic
-from estimation.plant_file import parse
+from estimation.plant import Axis, Plant, Sensor, Transmission
+from estimation.plant_file import to_toml
 from rig.errors import ExitCode
 from rig.importers.questions import questions as questions_of
 from rig.importers.registry import left_out, open_campaign
@@ -135,38 +136,23 @@ def test_a_channel_that_is_clipped_in_some_runs_is_named_with_them(tmp_path):
     assert "held at the greatest value, 0.8 N in run2; is it clipped?" in found
 
 
-SCREW = """
-schema = "rig.machine/1"
-[machine]
-name = "lift"
-[[axis]]
-name = "motor"
-unit = "rad"
-[[axis]]
-name = "slide"
-unit = "m"
-[[transmission]]
-name = "screw"
-input = "motor"
-output = "slide"
-ratio = -628.0
-[[sensor]]
-name = "motor_angle_rad"
-axis = "motor"
-reads = "position"
-[data]
-"""
+SCREW = Plant(
+    name="lift",
+    axes=(Axis("motor", "rad"), Axis("slide", "m")),
+    transmissions=(Transmission("screw", "motor", "slide", -628.0),),
+    sensors=(Sensor("motor_angle_rad", "motor", "position"),),
+)
 
 
 @pytest.mark.parametrize(("size", "is_asked"), [(250.0, False), (20_000.0, True)])
 def test_the_travel_of_a_motor_counts_behind_its_gear(tmp_path, said, size, is_asked):
     file = tmp_path / "lift.toml"
-    file.write_text(SCREW)
+    file.write_text(f"{to_toml(SCREW)}\n[data]\n")
     columns = {"time_s": TIME, "motor_angle_rad": size * WAVE}
     path = text_table(tmp_path / "run.csv", columns)
     shown = said("import", path, "--machine", file, "--preview").err
     assert ("is unusually large" in shown) == is_asked
-    asked = questions_of(list(read_runs(path, read_mapping(file, []), [])), parse(SCREW))
+    asked = questions_of(list(read_runs(path, read_mapping(file, []), [])), SCREW)
     assert bool(asked) == is_asked
 
 

@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from estimation.plant import Axis, Part, Plant, Sensor, Written
+from estimation.plant_file import to_toml
 from estimation.recording import Flag
 from rig.importers.log import IMPORTER
 from rig.log.convert import log_times_ns
@@ -27,31 +29,15 @@ FT = Stream(
     ),
     None,
 )
-MACHINE = """
-schema = "rig.machine/1"
-[machine]
-name = "gripper"
-cutoff_hz = 20.0
-[[axis]]
-name = "jaw"
-unit = "m"
-[[sensor]]
-name = "jaw_position_m"
-axis = "jaw"
-reads = "position"
-[[sensor]]
-name = "motor_current_a"
-[[sensor]]
-name = "ft_force_z_n"
-[[equation]]
-name = "grip"
-target = "ft_force_z_n"
-[[equation.effects]]
-id = "motor.torque_constant"
-channels.source = "motor_current_a"
-[[equation.effects]]
-id = "sensor.offset"
-"""
+CURRENT, FORCE = "motor_current_a", "ft_force_z_n"
+DRIVE = Part("motor.torque_constant", 1, {"source": CURRENT})
+MACHINE = Plant(
+    name="gripper",
+    cutoff_hz=20.0,
+    axes=(Axis("jaw", "m"),),
+    sensors=(Sensor("jaw_position_m", "jaw", "position"), Sensor(CURRENT), Sensor(FORCE)),
+    equations=(Written("grip", FORCE, (DRIVE, Part("sensor.offset"))),),
+)
 
 
 def write(path, columns, device_s, force_n, flags=None, conditions=None):
@@ -137,7 +123,7 @@ def test_its_channel_is_fitted_and_diagnosed_by_a_machine_file(tmp_path, answere
                 conditions={"load_command_a": load, "frequency_hz": frequency_hz},
             )
     machine = tmp_path / "gripper.toml"
-    machine.write_text(MACHINE)
+    machine.write_text(to_toml(MACHINE))
     fitted = answered("fit", tmp_path, "--machine", machine, "-o", tmp_path / "grip.model.toml")
     assert "ft_force_z_n" in json.dumps(fitted)
     found = answered("diagnose --quick", tmp_path, "--machine", machine)
