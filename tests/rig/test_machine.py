@@ -3,6 +3,7 @@
 import io
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,16 @@ import pytest
 
 from benchmarks.rigs import draw
 from estimation import model_file
-from estimation.plant import Axis, Part, Plant, Sensor, Written
+from estimation.plant import (
+    Actuator,
+    Axis,
+    Load,
+    Part,
+    Plant,
+    Sensor,
+    Transmission,
+    Written,
+)
 from estimation.plant_file import parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from estimation.recording import Recording
@@ -19,21 +29,14 @@ from rig.log.convert import write_recording
 from rig.machines.shipped import read_machine, shipped
 from tests.rig.importers.conftest import text_table
 
-SLIDE = """
-schema = "rig.machine/1"
-[machine]
-name = "slide"
-run_offsets = false
-[[axis]]
-name = "carriage"
-unit = "m"
-[[actuator]]
-name = "drive_force_n"
-axis = "carriage"
-[[sensor]]
-name = "carriage_position_m"
-axis = "carriage"
-reads = "position"
+SLIDE = Plant(
+    name="slide",
+    run_offsets=False,
+    axes=(Axis("carriage", "m"),),
+    actuators=(Actuator("drive_force_n", "carriage"),),
+    sensors=(Sensor("carriage_position_m", "carriage", "position"),),
+)
+DATA = """
 [data]
 [data.columns]
 time_s = "t"
@@ -42,6 +45,12 @@ drive_force_n = "volts:35 N"
 [data.runs]
 lap_s = 3.0
 """
+
+
+def written(file, data=DATA, **changes):
+    """Write the file of the slide, or of one that differs from it, and return the file."""
+    file.write_text(to_toml(replace(SLIDE, **changes)) + data)
+    return file
 
 
 INERTIAS = [
@@ -75,23 +84,6 @@ mass_kg = "mass"
 scaled_arm_angle_rad = "mass_kg * 0.3**2 * arm_angle_rad"
 """
 
-GEARED_SLIDE = """
-[[axis]]
-name = "motor"
-unit = "rad"
-[[transmission]]
-name = "screw"
-input = "motor"
-output = "carriage"
-ratio = 500.0
-[[sensor]]
-name = "motor_angle_rad"
-axis = "motor"
-reads = "position"
-[data]"""
-MOTOR_COLUMN = 'motor_angle_rad = "x:rad"\n'
-"""A motor whose angle changes by 1000 rad per metre."""
-
 
 def slide_table(folder, runs=8):
     time_s = np.arange(0.0, 3.0 * runs, 2e-3)
@@ -111,9 +103,7 @@ def read_back(table):
 
 @pytest.fixture
 def slide(tmp_path):
-    file = tmp_path / "slide.toml"
-    file.write_text(SLIDE)
-    return file, slide_table(tmp_path)
+    return written(tmp_path / "slide.toml"), slide_table(tmp_path)
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))
@@ -181,16 +171,11 @@ def test_a_diagnosis_ends_with_the_replay_of_its_model(slide, tmp_path, said, mo
     assert "estimate against sensor" in said(command.removeprefix("rig "), "--speed 0").out
 
 
-LOADED = SLIDE.replace(
-    "[data]\n",
-    """[[sensor]]
-name = "belt_force_n"
-axis = "carriage"
-reads = "effort"
-[data]
-""",
-).replace('drive_force_n = "volts:35 N"', 'drive_force_n = "volts:35 N"\nbelt_force_n = "cell"')
-"""The slide with a force cell."""
+def loaded(folder, run_offsets):
+    """Write the file of the slide with a force cell."""
+    data = DATA.replace("[data.runs]", 'belt_force_n = "cell"\n[data.runs]')
+    sensors = (*SLIDE.sensors, Sensor("belt_force_n", "carriage", "effort"))
+    return written(folder / "slide.toml", data, sensors=sensors, run_offsets=run_offsets)
 
 
 @pytest.mark.parametrize("constant_n", [0.0, 60.0])
@@ -203,12 +188,11 @@ def test_a_load_that_differs_between_runs_and_is_left_out_is_reported(
     drive = 35.0 * volts + load + 8.0 * np.sign(np.gradient(x))
     cell = 0.9 * 35.0 * volts + load
     text_table(table, {"t": time_s, "x": x, "volts": drive / 35.0, "cell": cell})
-    file = tmp_path / "slide.toml"
-    for stated, reported in (("true", constant_n > 0), ("false", False)):
-        file.write_text(LOADED.replace("run_offsets = false", f"run_offsets = {stated}"))
+    for stated, reported in ((True, constant_n > 0), (False, False)):
+        file = loaded(tmp_path, run_offsets=stated)
         printed = said("machine check", file, table).out
         assert ("The fit ignores it (run_offsets = true)" in printed) == reported
-        if stated == "true":
+        if stated:
             notes = answered("diagnose --quick", table, "--machine", file)["notes"]
             assert any("State false if the zeros" in note for note in notes) == reported
 
@@ -220,24 +204,19 @@ def test_zeros_that_differ_between_runs_are_not_taken_for_a_load(tmp_path, said)
     zero = 60.0 * np.random.default_rng(3).normal(size=8)[(time_s / 3.0).astype(int)]
     drive, cell = 35.0 * volts + 8.0 * np.sign(np.gradient(x)), 0.9 * 35.0 * volts + zero
     text_table(table, {"t": time_s, "x": x, "volts": drive / 35.0, "cell": cell})
-    file = tmp_path / "slide.toml"
-    file.write_text(LOADED.replace("run_offsets = false", "run_offsets = true"))
-    printed = said("machine check", file, table).out
+    printed = said("machine check", loaded(tmp_path, run_offsets=True), table).out
     assert "zeros that differ from run to run, or a load that the equation does not read" in printed
     assert "State false" not in printed
 
 
 def test_without_a_drive_and_without_a_reading_of_effort_both_are_named(tmp_path, said):
-    file = tmp_path / "bare.toml"
-    head, _, rest = SLIDE.partition("[[actuator]]")
-    file.write_text(head + "[[sensor]]" + rest.partition("[[sensor]]")[2])
-    printed = said("machine check", file, code=1).out
+    printed = said("machine check", written(tmp_path / "bare.toml", actuators=()), code=1).out
     assert "An [[actuator]], or a [[sensor]] that reads an effort" in printed
 
 
 def test_a_faulty_machine_file_is_a_slip_in_every_command(slide, said):
     file, table = slide
-    file.write_text(SLIDE.replace('reads = "position"', 'reads = "position"\nstep = 3'))
+    file.write_text(file.read_text().replace('"position"', '"position"\nstep = 3'))
     for command in (
         ["machine check"],
         ["fit", table, "--machine"],
@@ -247,21 +226,9 @@ def test_a_faulty_machine_file_is_a_slip_in_every_command(slide, said):
 
 
 def test_what_equations_of_ones_own_identify_needs_no_actuator(tmp_path, said):
-    file = tmp_path / "own.toml"
-    own = """[[equation]]
-name = "carriage"
-target = "drive_force_n"
-[[equation.effects]]
-id = "friction.viscous"
-channels.speed = "carriage_velocity_m_s"
-[data]
-"""
-    drive = """[[actuator]]
-name = "drive_force_n"
-axis = "carriage"
-"""
-    assert drive in SLIDE
-    file.write_text(SLIDE.replace(drive, "").replace("[data]\n", own, 1))
+    friction = Part("friction.viscous", 1, {"speed": "carriage_velocity_m_s"})
+    own = (Written("carriage", "drive_force_n", (friction,)),)
+    file = written(tmp_path / "own.toml", actuators=(), equations=own)
     printed = said("machine check", file).out
     assert "friction.viscous, damping" in printed
     assert "Not identified" not in printed
@@ -287,10 +254,8 @@ def test_an_inertia_that_follows_a_condition_is_an_effect_of_the_scaled_angle(tm
 
 
 def test_a_temperature_that_causes_may_read_is_not_unused(tmp_path, said):
-    file = tmp_path / "warm.toml"
-    warm = '[[sensor]]\nname = "nut_temperature_k"\naxis = "carriage"\nreads = "temperature"\n'
-    file.write_text(SLIDE.replace("[data]\n", warm + "[data]\n", 1))
-    printed = said("machine check", file).out
+    warm = (*SLIDE.sensors, Sensor("nut_temperature_k", "carriage", "temperature"))
+    printed = said("machine check", written(tmp_path / "warm.toml", sensors=warm)).out
     assert "Read by no equation" not in printed
     assert "Read by causes of a diagnosis alone: nut_temperature_k." in printed
 
@@ -317,15 +282,14 @@ def test_an_acceleration_that_is_mostly_noise_is_reported_with_a_cutoff_that_hel
     (cutoff_hz,) = re.findall(
         r"of carriage_acceleration_m_s2 is noise of .* cutoff_hz = (\d+) under", printed
     )
-    text = SLIDE.replace("[machine]\n", f"[machine]\ncutoff_hz = {cutoff_hz}\n")
-    file.write_text(text)
+    written(file, cutoff_hz=float(cutoff_hz))
     assert "is noise of its reading" not in said("machine check", file, table).out
 
 
 def test_a_load_that_is_a_condition_is_named(slide, said):
     file, table = slide
-    text = SLIDE.replace("[data]", '[[load]]\nname = "weight_n"\naxis = "carriage"\n[data]', 1)
-    file.write_text(text + "[data.conditions]\nweight_n = { value = 3.0 }\n")
+    data = f"{DATA}[data.conditions]\nweight_n = {{ value = 3.0 }}\n"
+    written(file, data, loads=(Load("weight_n", "carriage"),))
     move = "weight_n is a condition: move its line from [data.conditions] to [data.columns]."
     printed = said("machine check", file, table, code=1).out
     assert f"weight_n was not recorded as a channel: {move}" in " ".join(printed.split())
@@ -355,10 +319,13 @@ def test_a_clipped_channel_is_asked_about_at_every_step(slide, tmp_path, said, a
 def test_counts_that_contradict_the_ratio_are_named_by_every_command(slide, said, answered):
     """A fit is then wrong by that factor, and its error may be as small as with the right one."""
     file, table = slide
-    text = SLIDE.replace("[data]", GEARED_SLIDE).replace(
-        "[data.runs]", f"{MOTOR_COLUMN}[data.runs]"
+    written(
+        file,
+        DATA.replace("[data.runs]", 'motor_angle_rad = "x:rad"\n[data.runs]'),
+        axes=(*SLIDE.axes, Axis("motor", "rad")),
+        transmissions=(Transmission("screw", "motor", "carriage", 500.0),),
+        sensors=(*SLIDE.sensors, Sensor("motor_angle_rad", "motor", "position")),
     )
-    file.write_text(text)
     wrong = "states the ratio 500 for screw, but motor_angle_rad changes 1000 times as much"
     assert wrong in " ".join(said("machine check", file, table, code=1).out.split())
     assert f"Check: the machine file {wrong}" in said("fit", table, "--machine", file).out
@@ -368,27 +335,17 @@ def test_counts_that_contradict_the_ratio_are_named_by_every_command(slide, said
 
 def test_a_column_that_was_not_recorded_is_named(slide, said):
     file, table = slide
-    file.write_text(SLIDE.replace('drive_force_n = "volts:35 N"', 'motor_force_n = "volts:35 N"'))
+    written(file, DATA.replace("drive_force_n", "motor_force_n"))
     printed = said("machine check", file, table, code=1).out
     assert "drive_force_n was not recorded. Did you mean 'motor_force_n'?" in printed
 
 
 def test_a_channel_that_the_file_does_not_state_is_refused_without_recordings(slide, said):
     file, _ = slide
-    own = """
-[[equation]]
-name = "belt"
-target = "drive_force_n"
-[[equation.effects]]
-id = "inertia.missing"
-channels.acceleration = "carriage_acceleration_m_s2"
-[[equation.effects]]
-id = "transmission.ratio"
-channels.load = "belt_frc_n"
-[data]"""
-    cell = 'belt_force_n = "cell"'
-    text = SLIDE.replace("[data.columns]", f"[data.columns]\n{cell}")
-    file.write_text(text.replace("[data]", own, 1))
+    inertia = Part("inertia.missing", 1, {"acceleration": "carriage_acceleration_m_s2"})
+    belt = Part("transmission.ratio", 1, {"load": "belt_frc_n"})
+    data = DATA.replace("[data.runs]", 'belt_force_n = "cell"\n[data.runs]')
+    written(file, data, equations=(Written("belt", "drive_force_n", (inertia, belt)),))
     printed = said("machine check", file, code=1).out
     assert "belt_frc_n is not among the channels of [data]. Did you mean 'belt_force_n'?" in printed
     file.write_text(file.read_text().replace("belt_frc_n", "belt_force_n"))
@@ -407,8 +364,7 @@ def test_a_table_without_a_machine_file_is_answered_with_the_option_that_reads_i
 
 
 def test_a_machine_without_any_equation_reports_what_is_needed(tmp_path, said):
-    file = tmp_path / "bare.toml"
-    file.write_text(SLIDE.split("[[sensor]]")[0])
+    file = written(tmp_path / "bare.toml", data="", sensors=())
     printed = said("machine check", file, code=1).out
     assert "No equation can be written for slide." in printed
     assert "Needed: A sensor of position or speed on one of carriage." in printed
@@ -425,13 +381,9 @@ def speed_read_slide(folder, asymmetry=0.0, noise_mm_s=0.0):
     speed += np.random.default_rng(4).normal(0.0, noise_mm_s, len(x))
     columns = {"t": time_s, "v": speed, "volts": force / 35.0}
     table = text_table(folder / "slide.csv", columns)
-    file = folder / "slide.toml"
-    words = {"position_m": "velocity_m_s", "x:mm": "v:mm/s", '"position"': '"speed"'}
-    text = SLIDE
-    for old, new in words.items():
-        text = text.replace(old, new)
-    file.write_text(text)
-    return file, table
+    data = DATA.replace('position_m = "x:mm"', 'velocity_m_s = "v:mm/s"')
+    sensors = (Sensor("carriage_velocity_m_s", "carriage", "speed"),)
+    return written(folder / "slide.toml", data, sensors=sensors), table
 
 
 def test_the_noise_of_a_sensor_of_speed_counts_as_noise(tmp_path, answered):
