@@ -11,6 +11,10 @@ import pytest
 
 import rig
 from estimation.campaign import Campaign
+from estimation.effects import effect
+from estimation.filters import LowPass
+from estimation.model import Model, Term
+from estimation.model_file import to_toml
 from estimation.recording import Recording
 from rig.log.convert import write_recording
 
@@ -26,20 +30,11 @@ def axis_run(name: str, phase: float, damping: float = 5.0, seed: int = 0) -> Re
     return Recording(name, TIME_S, {"axis_position_m": position, "drive_force_n": force})
 
 
-MODEL = """
-schema = "rig.model/1"
-name = "axis"
-balance = "motor"
-target = "drive_force_n"
-[processing]
-cutoff_hz = 20.0
-[[effects]]
-id = "inertia.missing"
-channels.acceleration = "axis_acceleration_m_s2"
-[[effects]]
-id = "friction.viscous"
-channels.speed = "axis_velocity_m_s"
-"""
+TERMS = (
+    Term(effect("inertia.missing"), 1, {"acceleration": "axis_acceleration_m_s2"}),
+    Term(effect("friction.viscous"), 1, {"speed": "axis_velocity_m_s"}),
+)
+MODEL = to_toml(Model("axis", "motor", "drive_force_n", TERMS, low_pass=LowPass(20.0)))
 
 
 @pytest.fixture
