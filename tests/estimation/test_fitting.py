@@ -10,8 +10,8 @@ from estimation.campaign import Campaign
 from estimation.cross_validation import held_out_error, live_half_width
 from estimation.effects import effect
 from estimation.estimators.model import Stream
-from estimation.fit_problem import FitError
 from estimation.filters import LowPass
+from estimation.fit_problem import FitError
 from estimation.fitting import fit
 from estimation.model import Estimate, Model, NotFittedError, Term, counted_error, predict
 from estimation.model_file import read
@@ -231,7 +231,7 @@ def test_a_period_that_is_shorter_than_those_searched_is_fitted_from_its_value(s
 
 
 def test_a_wave_that_is_partly_beyond_the_cutoff_has_its_whole_size() -> None:
-    """The filter removes most of it from the target where the axis is fast, not where it is slow."""
+    """The filter takes most of it off the target where the axis is fast, none where it is slow."""
     random, recordings = np.random.default_rng(3), []
     time_s = np.arange(4000) / 200
     for k in range(6):
