@@ -249,10 +249,11 @@ def _report_lines(report: "LogReport") -> Iterator[str]:
     for topic in report.topics:
         yield f"  {topic.topic}: {topic.received} of {topic.expected} samples"
         for gap in topic.gaps:
-            yield (
-                f"    gap at {gap.start_s:.4f} s, {gap.length_s * 1e3:.1f} ms: {gap.samples}"
-                f" samples, {gap.first_sequence} to {gap.last_sequence}"
-            )
+            lost = counted(gap.samples, "sample")
+            at = f"{gap.first_sequence}"
+            if gap.samples > 1:
+                at += f" to {gap.last_sequence}"
+            yield f"    gap at {gap.start_s:.4f} s, {gap.length_s * 1e3:.1f} ms: {lost}, {at}"
     for problem in report.problems:
         yield f"  {problem}"
     for damage in report.damage:

@@ -18,6 +18,7 @@ from rig.log.order import by_number
 from rig.log.reader import LogFile, Topic, read_log
 from rig.log.scan import Damage
 from rig.log.writer import PART_SUFFIX
+from rig.output.table import counted
 
 PLAN_TOLERANCE = 1e-3
 """Relative shortfall against the plan that two clocks explain."""
@@ -218,7 +219,8 @@ def _shortfalls(topic: TopicReport) -> list[str]:
     found = []
     if topic.gaps:
         lost = sum(gap.samples for gap in topic.gaps)
-        found.append(f"{name}: {lost} samples are missing in {len(topic.gaps)} gaps")
+        missing = f"{counted(lost, 'sample')} {'is' if lost == 1 else 'are'} missing"
+        found.append(f"{name}: {missing} in {counted(len(topic.gaps), 'gap')}")
     if topic.repeats:
         found.append(f"{name}: {topic.repeats} samples repeat or run back in sequence")
     if topic.time_steps_back:
