@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from estimation.derived import origin_of
+from estimation.derived import measured_channels, origin_of
 from estimation.recording import FloatArray, Recording
 from estimation.signals import Reading, Signals
 
@@ -44,7 +44,8 @@ def white_noise(recording: Recording, measured: Sequence[str], signals: Signals)
 
 def noise_of(channel: str, signals: Signals) -> str:
     """Return in words whose noise that of a derivative is."""
-    source = origin_of(channel)[0]
+    read = measured_channels([channel], signals)
+    source = read[0] if len(read) == 1 else origin_of(channel)[0]
     return f"noise of {signals.integrals.get(source, source)} in {channel}"
 
 

@@ -221,15 +221,6 @@ class Plant:
         """Return the first sensor of an axis' speed, or None."""
         return next((s for s in self.sensors if (s.axis, s.reads) == (axis, "speed")), None)
 
-    @property
-    def integrals(self) -> dict[str, str]:
-        """Positions that no sensor reads, to the speeds that they are the integrals of."""
-        return {
-            self.moved(axis.name, POSITION): speed.name
-            for axis in self.axes
-            if self.position(axis.name) is None and (speed := self.speed(axis.name)) is not None
-        }
-
     def effort(self, axis: str) -> Sensor | None:
         """Return the first sensor of what an axis passes on, or None."""
         return next((s for s in self.sensors if (s.axis, s.reads) == (axis, "effort")), None)

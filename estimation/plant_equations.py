@@ -19,11 +19,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from estimation import plant_positions as positions
 from estimation.channels import unit_of
 from estimation.plant import (
     ACCELERATION,
     EFFORT,
-    POSITION,
     SPEED,
     Actuator,
     Part,
@@ -114,36 +114,17 @@ def signals(plant: Plant) -> Signals:
     stated = {s.name: Reading(s.noise, s.step, s.rate_hz, s.delay_s) for s in plant.sensors}
     named = {s.name for s in plant.sensors if s.reads in ("temperature", "position")}
     readings = {name: one for name, one in stated.items() if one != Reading() or name in named}
-    joined = _joined(plant)
-    own = {*(s.name for s in plant.sensors), *plant.integrals, *(c.name for c in plant.derived)}
-    positions = (c for c in joined if c.name not in own)
-    derived = (*bends, *positions, *plant.derived)
+    joined, integrated = positions.joined(plant), integrals(plant)
+    own = {*(s.name for s in plant.sensors), *integrated, *(c.name for c in plant.derived)}
+    follow = (c for c in joined if c.name not in own)
+    derived = (*bends, *follow, *positions.speeds(plant, integrated), *plant.derived)
     loads, actuators = (tuple(part.name for part in of) for of in (plant.loads, plant.actuators))
-    return Signals(derived, rest, readings, joined, plant.integrals, loads, actuators)
+    return Signals(derived, rest, readings, joined, integrated, loads, actuators)
 
 
-def _joined(plant: Plant) -> tuple[Combination, ...]:
-    """Return the positions that follow from another axis' by the ratio of a transmission.
-
-    A shaft that a gear drives turns by the motor's angle over the ratio, but for the gear's bend.
-    The other way round the bend would count as many times as the ratio.
-    """
-    read = {axis.name: plant.moved(axis.name, POSITION) for axis in plant.axes}
-    shares = {axis: Share(name) for axis, name in read.items() if name}
-    found: dict[str, Combination] = {}
-    for joint in plant.transmissions * len(plant.transmissions):  # along a chain of any order
-        ways = [(joint.input, joint.output, joint.ratio)]
-        if joint.ratio and not joint.compliant:
-            ways.append((joint.output, joint.input, 1.0 / joint.ratio))
-        for near, far, ratio in ways:
-            if not ratio or near not in shares:
-                continue
-            share = replace(shares[near], over=shares[near].over * ratio)
-            name = read[far] or far + POSITION[plant.axis(far).unit]
-            if name not in (share.channel, *found):
-                shares.setdefault(far, share)
-                found[name] = Combination(name, (share,))
-    return tuple(found.values())
+def integrals(plant: Plant) -> dict[str, str]:
+    """Return the positions that are integrals of a measured speed, to that speed."""
+    return positions.integrals(plant, _read(plant))
 
 
 def chains(plant: Plant) -> Iterator[Chain]:
@@ -303,7 +284,10 @@ def missing(plant: Plant) -> Iterator[Missing]:
                 f"A sensor of position or speed on one of {axes}.",
             )
     axis_of = {sensor.name: sensor.axis for sensor in plant.sensors}
-    for position, speed in plant.integrals.items():
+    followed = positions.followers(plant)
+    for position, speed in integrals(plant).items():
+        if axis_of[speed] in followed:
+            continue
         yield Missing(
             f"{position} is the integral of {speed} and begins at 0 in each run: what depends on"
             " it cannot be compared between runs.",
@@ -332,11 +316,16 @@ def unused(plant: Plant) -> list[str]:
     """Return the channels that no equation reads."""
     from estimation.derived import measured_channels  # loads numba, which help must not
 
-    names = [
+    names = _read(plant)
+    read = {*names, *measured_channels(names, signals(plant))}
+    read |= {speed for position, speed in integrals(plant).items() if position in read}
+    return [s.name for s in plant.sensors if s.name not in read]
+
+
+def _read(plant: Plant) -> list[str]:
+    """Return the channels that the equations name."""
+    return [
         name
         for equation in equations(plant)
         for name in (equation.target, *(n for p in equation.parts for n in p.channels.values()))
     ]
-    read = {*names, *measured_channels(names, signals(plant))}
-    read |= {speed for position, speed in plant.integrals.items() if position in read}
-    return [s.name for s in plant.sensors if s.name not in read]

@@ -17,6 +17,7 @@ from estimation.fitting import fit
 from estimation.opposed import opposed
 from estimation.plant import Plant
 from estimation.plant_check import contradictions
+from estimation.plant_equations import integrals
 from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
 from estimation.turned import turned_runs
@@ -24,6 +25,7 @@ from estimation.zeros import moved_zeros
 from rig.importers.apart import in_another_unit, of_another_sign
 from rig.importers.clock import implausible_clocks
 from rig.importers.frozen import COMMAND, frozen
+from rig.importers.tachometers import of_speeds
 from rig.output.table import counted
 
 PLAUSIBLE: dict[str, tuple[float, str]] = {
@@ -67,13 +69,14 @@ def questions(recordings: Sequence[Recording], plant: Plant | None = None) -> li
     The machine states what is in front of a gear, and which channels were not read but follow from
     others; nothing is asked about those.
     """
-    derived = {} if plant is None else plant.integrals
+    derived = {} if plant is None else integrals(plant)
     names = dict.fromkeys(name for r in recordings for name in r.columns if name not in derived)
     limits = {} if plant is None else travels(plant)
     found = [
         f"{n}: {text}" for n in names for text in of_channel(n, recordings, limits.get(n, 0.0))
     ]
-    return [*found, *of_runs(recordings)]
+    speeds = () if plant is None else of_speeds(recordings, plant)
+    return [*found, *speeds, *of_runs(recordings)]
 
 
 def doubts(recordings: Sequence[Recording], plant: Plant | None) -> list[str]:

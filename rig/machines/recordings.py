@@ -13,6 +13,7 @@ from estimation.campaign import Campaign
 from estimation.derived import measured_channels
 from estimation.model import Model
 from estimation.plant import Plant
+from estimation.plant_equations import integrals
 from estimation.recording import Recording
 from rig.importers.log import IMPORTER as LOGS
 from rig.importers.registry import open_campaign
@@ -45,11 +46,11 @@ def open_recordings(
 
 
 def with_positions(campaign: Campaign, plant: Plant) -> Campaign:
-    """Return a campaign with the position of an axis whose speed alone is read, 0 at the start."""
-    if not plant.integrals:
+    """Return a campaign with the integrals of speeds that stand for positions, 0 at the start."""
+    if not (integrated := integrals(plant)):
         return campaign
     return Campaign(
-        tuple(replace(r, load=partial(_positioned, r.load, plant.integrals)) for r in campaign.runs)
+        tuple(replace(r, load=partial(_positioned, r.load, integrated)) for r in campaign.runs)
     )
 
 
@@ -76,7 +77,7 @@ def recorded_channels(machine: Path) -> list[str]:
         return []
     data = read_mapping(file, ()).data
     stated = [*data.columns, *data.formulas]
-    return [*stated, *(p for p, s in read_machine(file).integrals.items() if s in stated)]
+    return [*stated, *(p for p, s in integrals(read_machine(file)).items() if s in stated)]
 
 
 def has_data(file: Path) -> bool:

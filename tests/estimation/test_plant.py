@@ -25,7 +25,7 @@ from estimation.plant import (
     Written,
 )
 from estimation.plant_check import check
-from estimation.plant_equations import equations, missing, signals, unused
+from estimation.plant_equations import equations, integrals, missing, signals, unused
 from estimation.plant_file import PlantFileError, parse, shipped_plant, to_toml
 from estimation.plant_models import declared
 from estimation.recording import Recording
@@ -103,7 +103,7 @@ def test_a_machine_file_gives_the_machine_back(plant):
 @given(plants())
 def test_every_equation_is_one_that_the_sensors_can_feed(plant):
     known = {"time_s", "drive_a", *(part.name for part in (*plant.sensors, *plant.loads))}
-    known |= plant.integrals.keys()  # the recordings of such a machine are opened with them
+    known |= integrals(plant).keys()  # the recordings of such a machine are opened with them
     own = {equation.name for equation in plant.equations}
     for model in declared(plant):
         needed = measured_channels([*model.channels, model.target], model.signals)

@@ -15,6 +15,7 @@ from estimation.recording import FloatArray, Recording
 from rig.importers.derivatives import fault, pairs
 from rig.importers.questions import of_channel, of_equations, of_runs, travels
 from rig.importers.table.raw import Remark
+from rig.importers.tachometers import of_speeds
 from rig.output.table import counted
 
 GAP_PERIODS = 1.5
@@ -103,12 +104,14 @@ def preview(
     together = [
         (r.name, wrong) for r in recordings for pair in pairs(r) if (wrong := fault(r, *pair))
     ]
-    signs = () if plant is None else of_equations(recordings, plant)
+    of_plant = (
+        () if plant is None else (*of_speeds(recordings, plant), *of_equations(recordings, plant))
+    )
     return Preview(
         tuple(_run(recording) for recording in recordings),
         tuple(_channel(name, recordings, limits.get(name, 0.0)) for name in names),
         shown,
-        (*_grouped(together, "runs"), *of_runs(recordings), *signs),
+        (*_grouped(together, "runs"), *of_runs(recordings), *of_plant),
         tuple(_grouped(remarks, "files")),
     )
 
