@@ -2,8 +2,9 @@
 
 The test runs are chosen by a seed, stratified over the conditions: runs are sorted by what was held
 constant and one run of every stratum of neighbours becomes a test run, but not the last one of the
-least or greatest load, speed or other condition. Runs whose conditions nobody stated are sorted by
-how much their channels vary.
+least or greatest load, speed or other condition. Where a level of another condition is then missing
+among the training or the test runs, runs are exchanged, see `estimation.diagnosis.balanced`. Runs
+whose conditions nobody stated are sorted by how much their channels vary.
 
 Of few recordings, pieces stand for runs. Of two paths that repeat themselves, the periods of one
 train and those of the other test. Other recordings of too small a number are cut into equal parts.
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.causes.numbers import DEFAULT
+from estimation.diagnosis.balanced import Levels, shared
 from estimation.errors import EstimationError
 from estimation.recording import FloatArray, Recording, shared_columns
 
@@ -83,7 +85,7 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
     The training runs keep the least and the greatest value of every condition: a model is not
     judged beyond its conditions. Where there are enough new runs besides those that an earlier
     diagnosis has seen, only new ones become test runs: a run confirms once. The seed chooses inside
-    each stratum.
+    each stratum. Each part has runs of every level of which there are enough.
 
     Raises:
         SplitError: Fewer than three runs, or runs of different rigs or instruments.
@@ -107,6 +109,12 @@ def split(recordings: Sequence[Recording], seed: int = 0, seen: Collection[str] 
         stratum = [ordered[start + int(k)].name for k in random.permutation(share)]
         inside = (n for n in stratum if _spans_all(levels, {*confirm, n}))
         confirm.add(next(inside, stratum[0]))
+    confirm = shared(
+        {recording.name: levels[recording.name] for recording in ordered},
+        confirm,
+        share,
+        lambda held: _spans_all(levels, held) or not _spans_all(levels, confirm),
+    )
     return _sealed(recordings, [recording.name for recording in recordings], confirm, seed)
 
 
@@ -239,10 +247,6 @@ def _pieces(path: Recording, places: Iterable[NDArray[np.intp]], mark: str) -> l
     ]
 
 
-Levels = Mapping[str, str | float]
-"""What was held constant in a run: condition to value."""
-
-
 def _levels(recordings: Sequence[Recording]) -> dict[str, Levels]:
     """Return each run's conditions; where these are alike, how much its channels vary."""
     stated = {r.name: r.conditions for r in recordings}
@@ -308,9 +312,9 @@ def data_hash(recordings: Sequence[Recording]) -> str:
     return _hash(*(part for r in ordered for part in (r.name, samples_hash(r))))
 
 
-def samples_hash(recording: Recording) -> str:
-    """Return SHA-256 over one run's samples, whatever the run is called."""
-    digest = hashlib.sha256(recording.time_s.tobytes())
+def samples_hash(recording: Recording, of_clock: bool = True) -> str:
+    """Return SHA-256 over one run's samples, and its clock, whatever the run is called."""
+    digest = hashlib.sha256(recording.time_s.tobytes() if of_clock else b"")
     digest.update(recording.flags.tobytes())
     for name in sorted(recording.columns):
         digest.update(name.encode())

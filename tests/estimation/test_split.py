@@ -203,3 +203,63 @@ def test_enough_or_too_short_recordings_stay_whole() -> None:
         assert claim(sealed) is None
     with pytest.raises(SplitError, match="too few"):
         cut_and_split([path("one", seconds=9.0)])
+
+
+def held_at(conditions: list[dict[str, float | str]]) -> list[Recording]:
+    """Return short runs under these conditions."""
+    time_s = np.arange(100) * 1e-2
+    angle = {"motor_angle_rad": np.sin(time_s)}
+    return [
+        Recording(f"run{k:02d}", time_s, angle, conditions=own) for k, own in enumerate(conditions)
+    ]
+
+
+def levels_tested(recordings: list[Recording], seed: int, name: str) -> set[float | str]:
+    """Return the levels of a condition that the test runs have."""
+    confirm = split(recordings, seed).confirm
+    return {r.conditions[name] for r in recordings if r.name in confirm}
+
+
+SPEEDS, FORCES = (0.25, 0.4, 0.7, 1.0), (0.0, 60.0, 120.0, 180.0)
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("turns", [1, 3])
+def test_every_level_of_every_condition_is_trained_and_tested(seed, turns):
+    """Each force comes with three of four speeds; by the name, force is the first condition."""
+    held = [
+        {"force_n": force, "speed_hz": SPEEDS[(turns * k + j) % 4]}
+        for k, force in enumerate(FORCES)
+        for j in range(3)
+    ]
+    recordings = held_at(held)
+    sealed = split(recordings, seed)
+    assert len(sealed.confirm) == 4
+    for name, levels in (("force_n", FORCES), ("speed_hz", SPEEDS)):
+        assert levels_tested(recordings, seed, name) == {*levels}
+        kept = {r.conditions[name] for r in recordings if r.name in sealed.discover}
+        assert kept == {*levels}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_condition_of_which_each_run_has_its_own_level_is_tested_low_and_high(seed):
+    random = np.random.default_rng(seed)
+    warmth = random.permutation(15)
+    recordings = held_at([{"load": float(k % 3), "warmth": float(w)} for k, w in enumerate(warmth)])
+    found = levels_tested(recordings, seed, "warmth")
+    assert min(found) < 5
+    assert max(found) >= 10
+    assert not {0.0, 14.0} & found
+
+
+def test_what_no_earlier_diagnosis_has_seen_is_tested_although_a_level_is_then_missing():
+    recordings = held_at([{"a": float(k % 2), "b": float(k // 6)} for k in range(12)])
+    seen = {r.name for r in recordings if r.conditions["b"] == 1.0}
+    assert not seen & {*split(recordings, 0, seen).confirm}
+
+
+def test_runs_whose_first_condition_alone_differs_keep_the_test_runs_of_their_strata():
+    recordings = held_at([{"a": 0.1 * k, "b": "same"} for k in range(12)])
+    confirm = split(recordings, 5).confirm
+    strata = [[r.name for r in recordings[k : k + 3]] for k in range(0, 12, 3)]
+    assert [len({*stratum} & {*confirm}) for stratum in strata] == [1, 1, 1, 1]
