@@ -6,23 +6,34 @@ confirm what was fitted on the original.
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from estimation.campaign import Campaign, Run
 from estimation.diagnosis.split import samples_hash
 from estimation.errors import ExplainedError
-from estimation.recording import Recording
+from estimation.recording import FloatArray, Recording
+
+SAME_S = 1e-6
+"""Difference of two clocks that is the rounding of their times, s."""
 
 
 def copies(recordings: Iterable[Recording]) -> dict[str, str]:
     """Return the runs with the samples of an earlier one, each with the name of the first.
 
-    Runs of two rigs or instruments are not copies: such runs do not make one campaign.
+    Runs of two rigs or instruments are not copies: such runs do not make one campaign. The clock of
+    a copy may begin at another time.
     """
-    first: dict[tuple[object, ...], str] = {}
-    named = [
-        (r.name, first.setdefault((samples_hash(r), r.rig, r.instrument), r.name))
-        for r in recordings
-    ]
-    return {name: original for name, original in named if name != original}
+    found: dict[str, str] = {}
+    known: dict[tuple[object, ...], list[tuple[str, FloatArray]]] = {}
+    for run in recordings:
+        since = run.time_s - run.time_s[:1]
+        alike = known.setdefault((samples_hash(run, of_clock=False), run.rig, run.instrument), [])
+        first = next((n for n, own in alike if np.allclose(own, since, rtol=0, atol=SAME_S)), None)
+        if first is None:
+            alike.append((run.name, since))
+        else:
+            found[run.name] = first
+    return found
 
 
 def without_copies(campaign: Campaign) -> Campaign:

@@ -56,6 +56,9 @@ PLATEAU = 3
 CLIPPED = 0.005
 """Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
 
+ROUNDING = 1e-9
+"""Share of its range by which values of a channel differ in their rounding alone."""
+
 MOST_NAMED = 6
 """Most runs that a question about a channel names."""
 
@@ -267,10 +270,14 @@ def _clipped(
     moving = steps[steps > 0]
     usual = float(np.median(moving)) if moving.size else 0.0
     values = np.concatenate(parts)
-    if len(np.unique(values[np.isfinite(values)])) <= PLATEAU:  # a switch
+    levels = np.unique(values[np.isfinite(values)])
+    if len(levels) <= PLATEAU:  # a switch
         return
+    apart = np.diff(levels)
+    count = float(apart[apart > ROUNDING * (greatest - least)].min())
+    abrupt = max(usual / 2, 1.5 * count)  # a slow reading in whole counts moves by one of them
     for end, word in ((least, "least"), (greatest, "greatest")):
-        held = {name: _held(part, end, usual / 2) for name, part in runs.items()}
+        held = {name: _held(part, end, abrupt) for name, part in runs.items()}
         share = sum(held.values()) / len(values)
         if share > CLIPPED:
             places = [name for name, count in held.items() if count]

@@ -136,6 +136,24 @@ def test_a_channel_that_is_clipped_in_some_runs_is_named_with_them(tmp_path):
     assert "held at the greatest value, 0.8 N in run2; is it clipped?" in found
 
 
+def test_a_temperature_that_is_read_in_whole_degrees_is_not_clipped(tmp_path):
+    random = np.random.default_rng(0)
+    for number in range(4):
+        warm = 293.4 + 0.8 * number + 0.1 * TIME + random.normal(0, 0.1, TIME.size)
+        columns = {"time_s": TIME, "case_temperature_k": np.round(warm), "motor_angle_rad": WAVE}
+        text_table(tmp_path / f"run{number}.csv", columns)
+    assert not any("clipped" in question for question in asked(tmp_path))
+
+
+def test_a_copy_of_a_run_with_another_clock_is_asked_about_and_counts_once(tmp_path):
+    for name, start in (("a", 0.0), ("b", 0.0), ("c", 5.25)):
+        factor = 1.1 if name == "b" else 1.0
+        columns = {"time_s": start + TIME, "motor_angle_rad": factor * WAVE}
+        text_table(tmp_path / f"{name}.csv", columns)
+    assert any(q.startswith("a, c: these runs are the same, sample by") for q in asked(tmp_path))
+    assert open_table(tmp_path, read_mapping(None, [])).evidence.names == ("a", "b")
+
+
 SCREW = Plant(
     name="lift",
     axes=(Axis("motor", "rad"), Axis("slide", "m")),
