@@ -173,13 +173,16 @@ def new(
     Without a terminal nothing is asked: what is not stated is not in the file.
     """
     from estimation.plant_file import write
-    from rig.cli.machine_new import UNMAPPED, asked, data_text, plant_of
+    from rig.cli.machine_new import UNMAPPED, asked, data_text, example_of, filtered, plant_of
 
     require_new(out)
     words = {"axis": axis, "transmission": transmission, "actuator": actuator, "sensor": sensor}
     stated = {kind: given or [] for kind, given in words.items()}
     plant = plant_of(name or out.stem, stated if any(stated.values()) else asked(from_))
-    data = data_text(from_, plant) if from_ else ""
+    data = ""
+    if from_:
+        raw, side = example_of(from_)
+        plant, data = filtered(plant, raw), data_text(raw, side, plant)
     write(plant, out, data)
     step = f"rig machine check {out} {from_ or 'DATA'}"
     if UNMAPPED in data:

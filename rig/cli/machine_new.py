@@ -2,6 +2,8 @@
 
 import sys
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,10 +13,10 @@ import typer
 from estimation.channels import UnknownUnitError, unit_of
 from estimation.plant import Actuator, Axis, Plant, PlantError, Reads, Sensor, Transmission
 from estimation.toml_table import value_text
-from rig.errors import UsageError
+from rig.errors import DataError, UsageError
 
 if TYPE_CHECKING:
-    from rig.importers.table.raw import Values
+    from rig.importers.table.raw import Raw, Values
 
 MOST_REMARK = 100
 """Characters of a remark on a column."""
@@ -116,15 +118,40 @@ SIDE_FILE = '# side_file = "about.csv"  # columns: file, and one for each single
 CONDITIONS = ("# [data.conditions]  # constant in a run", '# load_mass_kg = "load:g"')
 
 
-def data_text(table: Path, plant: Plant) -> str:
-    """Return `[data]` for a table: a line for each channel, and the table's columns as remarks."""
+def example_of(table: Path) -> tuple["Raw", str]:
+    """Return the first file of a table that has the columns of its largest, and its side file."""
     from rig.importers.table.data import Data
     from rig.importers.table.mapping import ColumnMapping
-    from rig.importers.table.open import read_largest, read_raw, side_file_of
+    from rig.importers.table.open import files_at, read_largest, read_raw, side_file_of
 
-    raw = read_largest(table, ColumnMapping(Data()))
+    plain = ColumnMapping(Data())
+    raw = read_largest(table, plain)
+    for file in files_at(table, plain):
+        if file == raw.path:
+            break
+        with suppress(DataError):  # of another kind, such as a side table without a head
+            if [*(first := read_raw(file, plain)).columns] == [*raw.columns]:
+                raw = first
+                break
     if side := side_file_of(raw.path):
         raw = read_raw(raw.path, ColumnMapping(Data(side_file=side)))
+    return raw, side
+
+
+def filtered(plant: Plant, raw: "Raw") -> Plant:
+    """Return a machine with a cutoff that its filter can have at the sample rate of a table."""
+    from estimation.filters import LowPass
+    from rig.importers.table.rate import likely_rate_hz
+
+    rate_hz = likely_rate_hz(raw)
+    if rate_hz is None:
+        return plant
+    cutoff_hz = LowPass(plant.cutoff_hz, plant.order).for_rate(rate_hz).cutoff_hz
+    return replace(plant, cutoff_hz=float(f"{cutoff_hz:.2g}"))
+
+
+def data_text(raw: "Raw", side: str, plant: Plant) -> str:
+    """Return `[data]` for a file of a table: a line for each channel, its columns as remarks."""
     channels = [*(a.name for a in plant.actuators), *(s.name for s in plant.sensors)]
     lines = ["", f"# Columns of {raw.path.name}, with the first sample:"]
     lines += [f"#   {_line(name, x[0])}" for name, x in raw.columns.items() if len(x)]

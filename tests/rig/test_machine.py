@@ -456,6 +456,40 @@ def test_the_columns_of_the_data_are_shown_and_not_those_of_a_side_table(tmp_pat
     assert "Weg [mm]" in printed
 
 
+def hundred_hertz(folder):
+    """Write a side file and two tables at 100 Hz, the second the longer one."""
+    folder.mkdir()
+    for number in (1, 2):
+        times = np.arange(500 + 100 * number) / 100
+        rows = "".join(f"{1e3 * t:.1f},{0.1 * number + 0.05 * np.sin(2 * t):.6f}\n" for t in times)
+        (folder / f"run_{number}.csv").write_text(f"t (ms),x\n{rows}")
+    (folder / "about.csv").write_text("file,load\nrun_1,0.1\nrun_2,0.2\n")
+
+
+def test_a_side_file_that_the_pattern_of_the_data_matches_is_not_a_run(tmp_path, said):
+    hundred_hertz(tmp_path / "runs")
+    out = tmp_path / "m.toml"
+    said("machine new", out, "--axis a:m --sensor a:a_position_m --from", tmp_path / "runs")
+    text = out.read_text().replace("# files =", "files =")
+    for name, column in {"time_s": "t (ms):ms", "a_position_m": "x:m"}.items():
+        text = text.replace(f'# {name} = "COLUMN:UNIT"', f'{name} = "{column}"')
+    out.write_text(text)
+    assert 'files = "*.csv"' in text
+    assert 'side_file = "about.csv"' in text
+    printed = said("import", tmp_path / "runs", "--machine", out, "--preview").out
+    assert "run_2" in printed
+    assert "│ about" not in printed
+
+
+def test_a_new_file_shows_the_first_file_and_has_a_cutoff_that_suits_its_rate(tmp_path, said):
+    hundred_hertz(tmp_path / "runs")
+    out = tmp_path / "m.toml"
+    said("machine new", out, "--axis a:m --sensor a:a_position_m --from", tmp_path / "runs")
+    text = out.read_text()
+    assert "# Columns of run_1.csv, with the first sample:\n#   t (ms): 0.0\n#   x: 0.1\n" in text
+    assert "cutoff_hz = 20.0" in text
+
+
 def test_a_new_file_names_the_side_file_and_how_several_runs_in_a_file_are_cut(tmp_path, said):
     folder, out, words = (
         tmp_path / "runs",

@@ -152,7 +152,7 @@ def _not_numbers(raw: Raw, where: str, name: str, source: Source, cell: str) -> 
     what, fix = cell, "Correct the file, or map another column."
     if source.column in raw.columns:
         what, fix = bad_cell(raw, source.column)
-    if name == TIME and _date(cell) is not None:
+    if name == TIME and date_of(cell) is not None:
         fix = f"Write {TIME} = '{source.column}:{DATE}'."
     return DataError(
         f"{where}: column {source.column!r} of {raw.path.name} is not numbers: {what}.", fix=fix
@@ -228,7 +228,7 @@ def _condition(raw: Raw, where: str, name: str, source: Source) -> float | str |
 def _dates(raw: Raw, where: str, source: Source) -> tuple[FloatArray, int | None, tuple[str, ...]]:
     cells = find(raw, where, TIME, source.column)
     assert isinstance(cells, np.ndarray)  # noqa: S101  a single value has no clock
-    read = [_date(str(cell)) for cell in cells]
+    read = [date_of(str(cell)) for cell in cells]
     at = [one for one in read if one is not None]
     if len(at) < len(read):
         index = read.index(None)
@@ -244,7 +244,7 @@ def _dates(raw: Raw, where: str, source: Source) -> tuple[FloatArray, int | None
     return since, round(at[0].timestamp() * 1e6) * 1000, remarks
 
 
-def _date(cell: str) -> datetime | None:
+def date_of(cell: str) -> datetime | None:
     """Return a date, or a time of the day on the date of none; None for anything else."""
     for text in (cell, f"{NO_DATE}T{cell}"):
         try:

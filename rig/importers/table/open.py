@@ -182,11 +182,11 @@ def files_at(path: Path, mapping: ColumnMapping) -> list[Path]:
         raise UsageError(f"There is no file or folder {path}.", fix="Check the path.")
     if path.is_file():
         return [path]
+    side = Path(mapping.data.side_file).name
     if pattern := mapping.data.files:
-        found = [file for file in path.glob(pattern) if file.is_file()]
+        found = [file for file in path.glob(pattern) if file.is_file() and file.name != side]
         why = f"The pattern is files, {mapping.where('files')}."
     else:
-        side = Path(mapping.data.side_file).name
         known = [file for file in path.iterdir() if file.suffix.lower() in READERS]
         found = [file for file in known if file.name != side]
         why = f"Known kinds are {', '.join(READERS)}."
