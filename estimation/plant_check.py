@@ -29,6 +29,7 @@ from estimation.separable import inseparable
 from estimation.signals import Reading
 from estimation.travel import FOLLOWS, other_ratio, slope
 from estimation.turned import turned_runs
+from estimation.unit_factors import off_by, unit_factor
 
 ALIKE = 3.0
 """Factor between a noise that is stated and that of the recordings."""
@@ -255,8 +256,8 @@ def contradictions(
             if change is not None and abs(change - 1.0) > FOLLOWS:
                 yield (
                     f"{first} and {second} both read the position of {axis.name}, but {second}"
-                    f" changes {change:.4g} times as much. Correct its unit, gain or sign, or its"
-                    f" axis, in {file}."
+                    f" changes {change:.4g} times as much.{off_by(change)} Correct its unit,"
+                    f" gain or sign, or its axis, in {file}."
                 )
     for sensor in plant.sensors:
         shown = [
@@ -286,6 +287,8 @@ def contradictions(
         if change is not None and abs(change / joint.ratio - 1.0) > FOLLOWS:
             yield (
                 f"{file} states the ratio {joint.ratio:g} for {joint.name}, but {driving.name}"
-                f" changes {change:.4g} times as much as {driven.name}. Correct the ratio, or the"
-                " counts of one of the sensors."
+                f" changes {change:.4g} times as much as {driven.name}."
+                f"{off_by(change / joint.ratio)} Correct the ratio, or the"
+                f" {'unit' if unit_factor(change / joint.ratio) else 'counts'} of one of the"
+                " sensors."
             )

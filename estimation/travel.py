@@ -11,6 +11,7 @@ from estimation.filters import FilterError, LowPass
 from estimation.model import Model
 from estimation.recording import Recording
 from estimation.signals import Signals
+from estimation.unit_factors import off_by
 
 FOLLOWS = 0.02
 """Share by which two readings of one travel may differ."""
@@ -110,5 +111,5 @@ def off_ratio(model: Model, recordings: Sequence[Recording]) -> str:
         return ""
     return (
         f"{driving.channel} changes {found:.4g} times as much as {driven.channel}, but the machine"
-        f" states the ratio {stated:g}."
+        f" states the ratio {stated:g}.{off_by(found / stated)}"
     )

@@ -333,6 +333,25 @@ def test_counts_that_contradict_the_ratio_are_named_by_every_command(slide, said
     assert any(note.startswith(f"Check: the machine file {wrong}") for note in notes)
 
 
+@pytest.mark.parametrize(
+    ("ratio", "words"),
+    [
+        (1000.0 * 57.3, "off by 57.3, the degrees of a radian. Correct the ratio, or the unit of"),
+        (1000.0 / 57.3, "off by 57.3, the degrees of a radian. Correct the ratio, or the unit of"),
+        (1e6, "off by 1e+03, the step from milli. Correct the ratio, or the unit of"),
+        (1000.0 * 13.7, "as carriage_position_m. Correct the ratio, or the counts of"),
+    ],
+)
+def test_a_ratio_that_is_off_by_the_factor_of_a_unit_is_answered_with_it(slide, said, ratio, words):
+    """The motor turns a thousand times as far as the carriage moves."""
+    file, table = slide
+    geared = GEARED_SLIDE.replace("ratio = 500.0", f"ratio = {ratio}")
+    assert geared != GEARED_SLIDE
+    text = SLIDE.replace("[data]", geared).replace("[data.runs]", f"{MOTOR_COLUMN}[data.runs]")
+    file.write_text(text)
+    assert words in " ".join(said("machine check", file, table, code=1).out.split())
+
+
 def test_a_column_that_was_not_recorded_is_named(slide, said):
     file, table = slide
     written(file, DATA.replace("drive_force_n", "motor_force_n"))

@@ -1,0 +1,31 @@
+"""The factors between units that are confused, in words."""
+
+import math
+
+FACTORS = {
+    math.degrees(1.0): "the degrees of a radian",
+    2.0 * math.pi: "the radians of a turn",
+    360.0: "the degrees of a turn",
+    60.0: "the seconds of a minute",
+    25.4: "the millimetres of an inch",
+    100.0: "the step from centi, or per cent",
+    1e3: "the step from milli",
+    1e6: "the step from micro",
+}
+"""Factor between two units to what it is."""
+
+NEAR = 0.03
+"""Share by which a factor may differ from that of two units."""
+
+
+def unit_factor(factor: float) -> str:
+    """Return the two units whose factor, or its inverse, a factor is, in words; else nothing."""
+    size = math.exp(abs(math.log(abs(factor)))) if factor else 0.0
+    near = min(FACTORS, key=lambda one: abs(size / one - 1.0))
+    return FACTORS[near] if abs(size / near - 1.0) < NEAR else ""
+
+
+def off_by(factor: float) -> str:
+    """Return which units have a factor, a sentence after a space; empty where none have it."""
+    words = unit_factor(factor)
+    return f" That is off by {max(abs(factor), 1.0 / abs(factor)):.3g}, {words}." if words else ""
