@@ -26,6 +26,10 @@ share of runs that are fewer. Where the equation lacks an effect, its share of a
 appears as a factor."""
 
 
+DEGREES, OF_A_UNIT = math.degrees(1.0), 1.1
+"""Degrees of a radian, and the factor within which that of a run is the factor of a unit."""
+
+
 class Apart(NamedTuple):
     """A channel of a run that is a factor times what the other runs predict for it.
 
@@ -99,28 +103,44 @@ def apart(joint: Joint) -> list[Apart]:
         costs = {k: _cost(joint, [*out, k]) for k in sorted(found)}
         out.append(min(costs, key=costs.__getitem__))
     apart = [one for k, one in _found(joint, out) if k in out]
-    return list(dict.fromkeys(apart))
+    return _of_readings(list(dict.fromkeys(apart)), joint.layout)
 
 
-def reversed_runs(layout: Layout, sealed: Sealed, numbers: Numbers) -> list[Apart]:
-    """Return the runs in which a channel has the opposite sign, before the search.
+def _of_readings(found: Sequence[Apart], layout: Layout) -> list[Apart]:
+    """Return the channels that are apart, without combinations where a reading explains the run.
+
+    A difference of two angles appears reversed where the torque that it is compared with is.
+    """
+    read = {one.run for one in found if one.channel in layout.measured}
+    return [one for one in found if one.channel in layout.measured or one.run not in read]
+
+
+def wrong_runs(layout: Layout, sealed: Sealed, numbers: Numbers) -> list[Apart]:
+    """Return the runs in which a channel has the opposite sign or another unit, before the search.
 
     Such a run spoils what is found in all others. The training runs are compared with one another,
     then the test runs with them.
     """
-    train = [*filter(_is_reversed, apart(_joint(layout, sealed.discover, numbers)))]
+    train = [*filter(_is_wrong, apart(_joint(layout, sealed.discover, numbers)))]
     wrong = {one.run for one in train}
     rest = [name for name in (*sealed.discover, *sealed.confirm) if name not in wrong]
-    found = filter(_is_reversed, apart(_joint(layout, rest, numbers)))
+    found = filter(_is_wrong, apart(_joint(layout, rest, numbers)))
     return train + [one for one in found if one.run in sealed.confirm]
 
 
-def _is_reversed(one: Apart) -> bool:
-    """Whether minus one explains the run: with another factor, or less well, it has other causes.
+def _is_wrong(one: Apart) -> bool:
+    """Whether minus one or a unit explains the run: with another factor it has other causes.
 
     A run of an arm whose equation lacks the motion of the other joints may appear reversed.
     """
-    return 1.0 / FACTOR < -one.factor < FACTOR
+    return 1.0 / FACTOR < -one.factor < FACTOR or _is_of_a_unit(one.factor)
+
+
+def _is_of_a_unit(factor: float) -> bool:
+    """Whether a factor is about a power of ten, or the degrees of a radian; none is so near one."""
+    size = abs(math.log(factor)) if factor > 0.0 else 0.0
+    tens = math.log(10.0) * max(round(size / math.log(10.0)), 1)
+    return any(abs(size - whole) < math.log(OF_A_UNIT) for whole in (tens, math.log(DEGREES)))
 
 
 def _joint(layout: Layout, names: Sequence[str], numbers: Numbers) -> Joint:

@@ -30,8 +30,9 @@ from estimation.signals import Signals
 def apart(found: Iterable[Apart], is_left_out: bool = False) -> Iterator[str]:
     """Yield the runs of which a channel is in another sign or unit than the others predict."""
     for one in found:
+        wrong = "sign" if one.factor < 0.0 else "unit"
         what = (
-            "The run is left out; correct the sign in it to use it."
+            f"The run is left out; correct the {wrong} in it to use it."
             if is_left_out
             else f"Check its sign and unit in this run, or exclude the run: --exclude {one.run}."
         )

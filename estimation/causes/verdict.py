@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from estimation.causes import remarks
 from estimation.causes.acting import Moved
 from estimation.causes.angles import signals_of
-from estimation.causes.apart import Apart, reversed_runs
+from estimation.causes.apart import Apart, wrong_runs
 from estimation.causes.candidates import Candidate
 from estimation.causes.findings import (
     Kept,
@@ -144,9 +144,9 @@ def answer(
 def _of_one_sign(
     models: Sequence[Model], recordings: Sequence[Recording], sealed: Sealed, numbers: Numbers
 ) -> tuple[Layout, Sealed, list[Apart]]:
-    """Return the equations on the runs that are not reversed, their split, and those that are."""
+    """Return the equations on the runs of usual signs and units, their split, and the others."""
     layout, kept = _laid_out(models, recordings, sealed, numbers)
-    wrong = reversed_runs(layout, kept, numbers)
+    wrong = wrong_runs(layout, kept, numbers)
     if wrong:
         names = {one.run for one in wrong}
         rest = [r for r in recordings if r.name not in names]

@@ -116,11 +116,13 @@ def of_equations(recordings: Sequence[Recording], plant: Plant) -> Iterator[str]
     A preview asks so; the commands that fit the equations do so themselves.
     """
     campaign = Campaign.of(recordings)
+    found: list[str] = []
     for model in declared(plant):
         with suppress(EstimationError):
             fitted = fit(model, campaign, bootstrap=0)
             if not opposed(fitted, campaign):
-                yield from turned_runs(fitted, campaign)
+                found += turned_runs(fitted, campaign)
+    yield from dict.fromkeys(found)  # a channel is in several equations
 
 
 def travels(plant: Plant) -> dict[str, float]:

@@ -12,7 +12,16 @@ from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
 from estimation.signals import Combination, Share, Signals
-from tests.estimation.causes.synthetic import axis, hoist, hoisted, motor, recordings, turning
+from tests.estimation.causes.synthetic import (
+    axis,
+    gearbox,
+    geared,
+    hoist,
+    hoisted,
+    motor,
+    recordings,
+    turning,
+)
 
 REMARK = "times what the other runs predict"
 
@@ -48,6 +57,33 @@ def test_a_run_with_a_swapped_sign_is_the_first_note_and_takes_no_part(place: in
     alone = diagnose(kept, [axis()], without.without({wrong.name}))
     assert found.errors == alone.errors
     assert found.findings == alone.findings == ()
+
+
+@pytest.mark.parametrize("factor", [1000.0, 0.001, 57.3])
+def test_a_run_in_another_unit_takes_no_part_as_one_with_a_swapped_sign(factor: float) -> None:
+    runs = turning(lambda angle, speed, acceleration: 0.0 * speed)[:8]
+    runs[3] = runs[3].with_columns(crank_torque_n_m=factor * runs[3]["crank_torque_n_m"])
+    found = diagnose(runs, [axis()], split(runs))
+    assert found.notes[0].startswith(f"{runs[3].name}: crank_torque_n_m is ")
+    assert found.notes[0].endswith("The run is left out; correct the unit in it to use it.")
+    assert runs[3].name not in (*found.sealed.discover, *found.sealed.confirm)
+    assert found.findings == ()
+
+
+def test_a_factor_that_is_of_no_unit_is_remarked_on_and_the_run_stays() -> None:
+    runs = turning(lambda angle, speed, acceleration: 0.0 * speed)[:8]
+    runs[3] = runs[3].with_columns(crank_torque_n_m=4.448 * runs[3]["crank_torque_n_m"])
+    found = diagnose(runs, [axis()], split(runs))
+    assert runs[3].name in (*found.sealed.discover, *found.sealed.confirm)
+
+
+def test_a_reversed_torque_is_named_and_not_the_deflection_that_is_compared_with_it() -> None:
+    runs = geared()
+    turned = -runs[4]["proximal_torque_n_m"]
+    runs[4] = runs[4].with_columns(proximal_torque_n_m=turned)
+    found = diagnose(runs, [motor(), gearbox()], split(runs))
+    (note,) = [n for n in found.notes if REMARK in n]
+    assert note.startswith(f"{runs[4].name}: proximal_torque_n_m is -")
 
 
 @pytest.mark.parametrize(
