@@ -15,9 +15,9 @@ from estimation.causes.instruments import noise_share
 from estimation.causes.laid import TINY
 from estimation.causes.layout import Layout
 from estimation.causes.numbers import DEFAULT
-from estimation.causes.run_signals import EFFORTS
+from estimation.causes.run_signals import ANGLES, EFFORTS
 from estimation.causes.sources import Source
-from estimation.derived import CAMPAIGN_TIME, origin_of
+from estimation.derived import CAMPAIGN_TIME, CLOCKS, origin_of
 from estimation.diagnosis.audit import audit
 from estimation.diagnosis.result import Finding, is_unexplained
 from estimation.diagnosis.split import Sealed
@@ -89,10 +89,13 @@ def left(
             yield f"{name}: most of that error is {whose}. {_remedy(equation)}"
 
 
-def far(layout: Layout, sizes: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
+def far(
+    layout: Layout, sizes: Mapping[str, Mapping[str, float]], recordings: Sequence[Recording]
+) -> Iterator[str]:
     """Yield the run of which an equation's error is far larger than that of all others.
 
-    `sizes` has the error of each equation in each run, in the unit of the target.
+    A run at an end of what was recorded may be the one that shows an effect. `sizes` has the error
+    of each equation in each run, in the unit of the target.
     """
     several = {name: found for name, found in sizes.items() if len(found) > 1}
     ratios = over_noise(layout, {name: max(found.values()) for name, found in several.items()})
@@ -101,10 +104,39 @@ def far(layout: Layout, sizes: Mapping[str, Mapping[str, float]]) -> Iterator[st
         is_far = found[largest] > LARGER * found[second]
         if is_far and is_unexplained(ratios.get(name, math.inf)):
             factor = f"{found[largest] / max(found[second], TINY):.2g}"
-            yield (
-                f"{name}: the error in {largest} is {factor} times that in any other run. Check"
-                f" what happened in it, or exclude the run: --exclude {largest}."
-            )
+            text = f"{name}: the error in {largest} is {factor} times that in any other run."
+            fault = f"Check what happened in it, or exclude the run: --exclude {largest}."
+            if end := _end(layout, layout.equations[name], largest, recordings):
+                fault = (
+                    f"It has {end} of all runs: either an effect that the equation lacks shows"
+                    " there, and more such runs would identify it, or something happened in it, and"
+                    f" it is to be excluded: --exclude {largest}."
+                )
+            yield f"{text} {fault}"
+
+
+def _end(layout: Layout, equation: Equation, run: str, recordings: Sequence[Recording]) -> str:
+    """Return the condition, or the channel of an equation, of which a run has an end; else nothing.
+
+    Of a speed or a load only the largest size counts.
+    """
+    stated = {r.name: r.conditions for r in recordings}
+    for key in stated.get(run, {}):
+        values = {name: own[key] for name, own in stated.items() if key in own}
+        if len({*values.values()}) < 2 or not all(
+            isinstance(x, int | float) for x in values.values()
+        ):
+            continue
+        for word, end in (("least", min), ("largest", max)):
+            if values[run] == end(values.values()):
+                return f"the {word} {key}"
+    for channel in equation.model.channels:
+        if channel.endswith(ANGLES) or channel in CLOCKS or origin_of(channel)[1] > 1:
+            continue
+        peaks = {r.name: float(np.abs(r.on_grid(channel)).max()) for r in layout.runs}
+        if run == max(peaks, key=peaks.__getitem__):
+            return f"the largest {channel}"
+    return ""
 
 
 def _loudest(equation: Equation, layout: Layout) -> tuple[str, float]:

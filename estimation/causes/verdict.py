@@ -120,7 +120,7 @@ def answer(
         *filter(None, [claim(sealed)]),
         *remarks.late(found.noticed, signals_of(layout)),
         *remarks.left(layout, left, over_noise, explained),
-        *remarks.far(layout, {name: refits.sizes(name) for name in layout.equations}),
+        *remarks.far(layout, {name: refits.sizes(name) for name in layout.equations}, timed),
         *remarks.at_bounds(written),
         *remarks.pauses(timed, (kept.scored.candidate.cause for kept, _ in judged)),
         *remarks.limits(timed, layout, sealed, read),

@@ -115,6 +115,31 @@ def test_a_run_with_a_far_larger_error_is_named(knocked: int | None) -> None:
     assert named == ([] if knocked is None else [runs[knocked].name])
 
 
+@pytest.mark.parametrize(
+    ("warmth", "words"),
+    [
+        (40.0, "It has the largest warmth of all runs: either an effect that the equation lacks"),
+        (20.5, "Check what happened in it, or exclude the run: --exclude"),
+    ],
+)
+def test_a_run_at_an_end_of_a_condition_is_not_only_to_be_excluded(
+    warmth: float, words: str
+) -> None:
+    runs = turning(lambda angle, speed, acceleration: 0.0 * speed)[:8]
+    peaks = [float(np.abs(np.gradient(run["crank_angle_rad"])).max()) for run in runs]
+    odd = int(np.argsort(peaks)[3])
+    torque = runs[odd]["crank_torque_n_m"].copy()
+    torque[len(torque) // 2 :] += 10.0 * np.std(torque)
+    runs = [
+        replace(run, conditions={"warmth": warmth if k == odd else 20.0 + k / 7})
+        for k, run in enumerate(runs)
+    ]
+    runs[odd] = runs[odd].with_columns(crank_torque_n_m=torque)
+    found = diagnose(runs, [axis()], split(runs))
+    (note,) = [one for one in found.notes if "times that in any other run" in one]
+    assert words in note
+
+
 def test_a_slow_run_in_another_unit_shows_in_its_mean() -> None:
     runs = hoisted()
     runs[5] = runs[5].with_columns(rope_force_n=10.0 * runs[5]["rope_force_n"])
