@@ -36,13 +36,13 @@ ALIKE = 3.0
 
 OFFSETS_IGNORED = "The fit ignores it (run_offsets = true)"
 OF_A_LOAD = (
-    "; with false it would explain most of it. State false if the zeros of the sensors can be"
-    " trusted: without the differences of a load from run to run, gain and friction may be"
-    " confused."
+    "; with run_offsets = false it would explain most of it. State false if the zeros of the"
+    " sensors can be trusted: without the differences of a load from run to run, gain and friction"
+    " may be confused."
 )
 OF_ZEROS = (
-    ", and with false it would not explain it: zeros that differ from run to run, or a load that"
-    " the equation does not read."
+    ", and with run_offsets = false it would not explain it either. The cause is zeros that differ"
+    " from run to run, or a load that the equation does not read."
 )
 
 EXPLAINED = 0.5

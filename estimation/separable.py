@@ -1,5 +1,6 @@
 """Amplitudes that recordings do not separate, because their columns differ by noise only."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,7 +25,7 @@ def inseparable(fitted: Model, campaign: Campaign) -> str:
     if any(t.effect.start() or CAMPAIGN_TIME in t.channels.values() for t in terms):
         return ""  # such a column needs more than the samples that count
     columns, noise = _products(fitted, terms, campaign)
-    amplitudes = [f"{t.effect.id} {p.name}" for t in terms for p in t.effect.amplitudes]
+    amplitudes = _labels(terms)
     shown = np.flatnonzero(np.diag(columns) > 0.0)
     named = []
     for k in shown:
@@ -37,10 +38,22 @@ def inseparable(fitted: Model, campaign: Campaign) -> str:
     if len(named) < 2:  # a channel that is itself mostly noise is stated as such
         return ""
     return (
-        f"{', '.join(named)}: in these runs one column follows from the others, but for noise of"
-        " the readings. The values are not identified, though their intervals may be narrow. Record"
-        f" runs under other loads or on other paths, too.{_same(list(campaign.evidence))}"
+        f"{', '.join(named)}: in these runs one of these terms follows from the others, but for"
+        " noise of the readings. The values are not identified, though their intervals may be"
+        " narrow. Record runs under other loads or on other paths, too."
+        f"{_same(list(campaign.evidence))}"
     )
+
+
+def _labels(terms: Sequence[Term]) -> list[str]:
+    """Return the name of each amplitude, with its channels where two terms share it."""
+    amplitudes = [(t, p.name) for t in terms for p in t.effect.amplitudes]
+    count = Counter((t.effect.id, name) for t, name in amplitudes)
+    return [
+        f"{t.effect.id} {name}"
+        + f" ({', '.join(t.channels.values())})" * (count[t.effect.id, name] > 1)
+        for t, name in amplitudes
+    ]
 
 
 def _same(runs: Sequence[Recording]) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Sequence, Set
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.derived import CLOCKS
 from estimation.recording import FloatArray, Recording, shared_columns
 
 MANY, MOST_NAMED = 0.01, 6
@@ -60,7 +61,7 @@ def audit(recordings: Sequence[Recording], read: Set[str] = frozenset()) -> list
     What an effect that was found reads is not a limit: between runs it was decided.
     """
     said = _skipping(recordings)
-    others = [name for name in shared_columns(recordings) if name not in read]
+    others = [name for name in shared_columns(recordings) if name not in {*read, *CLOCKS}]
     return said + [line for name in others if (line := _held(name, recordings))]
 
 
@@ -88,5 +89,9 @@ def _held(name: str, recordings: Sequence[Recording], steady: float = 1e-3) -> s
     if not np.isfinite(spans).all() or max(spans) > steady * size:
         return ""
     levels = {round(float(np.mean(r[name])) / max(size, 1e-300), 3) for r in recordings}
-    held = "never varies" if len(levels) == 1 else "is held within each run"
-    return f"{name} {held}: an effect that depends on it is not decided within a run."
+    if len(levels) == 1:
+        return f"{name} never varies: these runs do not show an effect that depends on it."
+    return (
+        f"{name} is held within each run: an effect that depends on it shows between runs alone,"
+        " where all else that differs between them shows, too."
+    )

@@ -97,8 +97,9 @@ def sentences(plan: Plan) -> list[str]:
     ]
     if vague:
         lines.append(
-            "One of several: each effect that acts, the probability that it would be named, and"
-            " those of what would be named in its place (nothing: no finding); its place."
+            "One of several. Each line has an effect, the probability that it would be named, then"
+            " the names that it would be given instead with theirs ('nothing': without a finding),"
+            " and in brackets where it acts."
         )
     for one in vague:
         others = ", ".join(f"{name} {p:.2f}" for name, p in _listed(one).items())

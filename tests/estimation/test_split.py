@@ -43,6 +43,8 @@ def test_skips_and_held_channels_are_reported():
     assert any(s.startswith("motor_current_a never varies") for s in said)
     assert not any("skips" in s for s in audit(whole))
     assert not any("load_command_a" in s for s in audit(whole, {"load_command_a"}))
+    clocked = [r.with_columns(campaign_time_s=1e6 + r.time_s) for r in whole]
+    assert not any("campaign_time_s" in s for s in audit(clocked))
 
 
 def test_a_run_that_jumps_is_left_out_and_one_that_skips_or_is_flagged_is_kept():
