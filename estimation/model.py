@@ -158,7 +158,7 @@ class Term:
     def passed(
         self, channels: Mapping[str, Any] | Recording, shape: Sequence[float], low_pass: LowPass
     ) -> list[Any]:
-        """Return what the filter passes of each column of a wave; empty of another effect."""
+        """Return the filter's gain on each column of a wave; empty of another effect."""
         if not isinstance(self.effect, Waves):
             return []
         speed = channels[self.reads[-1]]

@@ -1,7 +1,7 @@
 """The share of a wave that the low-pass filter of the channels passes.
 
 A target is filtered, and with it what repeats along a turn: the faster the shaft turns, the less is
-left of the wave. Its columns follow from an angle, which the filter leaves as it is, so each is
+left of the wave. Its columns follow from an angle, which the filter barely changes, so each is
 multiplied by the filter's gain at the frequency that the wave has at that sample.
 """
 

@@ -33,7 +33,7 @@ class _NextTo(Generic[Kept]):
         self._of: list[tuple[list[tuple[object, object]], Kept]] = []
 
     def next_to(self, causes: Sequence[Scored]) -> Kept | None:
-        """Return what is known next to causes; None where nothing is."""
+        """Return the result next to causes; None where there is none yet."""
         claims = [(one.candidate.cause, one.candidate.acts) for one in causes]
         for known, kept in self._of:
             if len(known) == len(claims) and all(claim in known for claim in claims):
@@ -50,7 +50,7 @@ class Ranking:
 
     `rank` ranks the candidates next to a regression's base, the best of each name. Without it all
     compete. A candidate is surveyed again where a cause is new that shares an equation with it;
-    what lies elsewhere hardly matters to it, and of those that were surveyed before only the best
+    what lies elsewhere barely matters to it, and of those that were surveyed before only the best
     are judged again.
     """
 
