@@ -316,16 +316,21 @@ def test_a_clipped_channel_is_asked_about_at_every_step(slide, tmp_path, said, a
     assert "clipped" not in said("machine check", file, table).out
 
 
-def test_counts_that_contradict_the_ratio_are_named_by_every_command(slide, said, answered):
-    """A fit is then wrong by that factor, and its error may be as small as with the right one."""
-    file, table = slide
+def screw(file, ratio: float) -> None:
+    """Write the slide with a motor and a screw of a ratio; the motor's angle is x in rad."""
     written(
         file,
         DATA.replace("[data.runs]", 'motor_angle_rad = "x:rad"\n[data.runs]'),
         axes=(*SLIDE.axes, Axis("motor", "rad")),
-        transmissions=(Transmission("screw", "motor", "carriage", 500.0),),
+        transmissions=(Transmission("screw", "motor", "carriage", ratio),),
         sensors=(*SLIDE.sensors, Sensor("motor_angle_rad", "motor", "position")),
     )
+
+
+def test_counts_that_contradict_the_ratio_are_named_by_every_command(slide, said, answered):
+    """A fit is then wrong by that factor, and its error may be as small as with the right one."""
+    file, table = slide
+    screw(file, 500.0)
     wrong = "states the ratio 500 for screw, but motor_angle_rad changes 1000 times as much"
     assert wrong in " ".join(said("machine check", file, table, code=1).out.split())
     assert f"Check: the machine file {wrong}" in said("fit", table, "--machine", file).out
@@ -345,10 +350,7 @@ def test_counts_that_contradict_the_ratio_are_named_by_every_command(slide, said
 def test_a_ratio_that_is_off_by_the_factor_of_a_unit_is_answered_with_it(slide, said, ratio, words):
     """The motor turns a thousand times as far as the carriage moves."""
     file, table = slide
-    geared = GEARED_SLIDE.replace("ratio = 500.0", f"ratio = {ratio}")
-    assert geared != GEARED_SLIDE
-    text = SLIDE.replace("[data]", geared).replace("[data.runs]", f"{MOTOR_COLUMN}[data.runs]")
-    file.write_text(text)
+    screw(file, ratio)
     assert words in " ".join(said("machine check", file, table, code=1).out.split())
 
 
