@@ -58,7 +58,7 @@ def axis(
 RELATIVE: Mapping[object, Sequence[float]] = {
     "fall": tuple(np.geomspace(0.03, 0.7, 7)),
     "reach": tuple(np.geomspace(0.002, 0.3, 9)),
-    "knee": tuple(np.geomspace(0.25, 1.0, 4)),
+    "knee": tuple(np.geomspace(0.1, 1.0, 5)),
     "width": tuple(np.geomspace(0.005, 0.05, 3)),
     "time": (0.15, 0.5, 1.5),
     "time_constant": (0.15, 0.5, 1.5),
