@@ -15,6 +15,9 @@ NO_NEXT = "None is proposed: no named hypotheses compete."
 PART_OF_THE_NAME = "half the ", "share of a load of "
 """What the description of a parameter begins with whose number is misread without it."""
 
+SETTLING = {"sensor.drift.exponential": "time_constant", "sensor.drift.campaign": "time"}
+"""Form of a drift that settles to the parameter that is the time of it."""
+
 MEANS = ", the mean of each run included"
 """What errors are of, where the means of runs count."""
 
@@ -190,6 +193,12 @@ def sizes_of(finding: Finding) -> dict[str, str]:
             sizes[f"amplitude{harmonic}"] = size
     for name, known in left.items():
         sizes[label(finding.form or finding.family, name)] = _measured(known.value, known.unit)
+    if (settling := SETTLING.get(finding.form, "")) in left:
+        # a time far above that of a run is known by this quotient alone
+        drift = left["drift"]
+        rate = drift.value / left[settling].value
+        scale, shown = display(drift.unit, rate)
+        sizes["at first"] = f"{scale * rate:.3g} {shown}/s"
     if "order" in left:
         del sizes["order"]
         sizes |= wave(left["order"].value, finding.depends_on)

@@ -151,6 +151,23 @@ def test_sizes_are_those_of_the_wave_and_in_readable_units(along, repeats):
     assert "lead of the screw, the pitch of the belt" in check_of(finding)
 
 
+def test_a_zero_that_settles_far_beyond_a_run_is_stated_with_the_rate_at_which_it_begins():
+    """Of short runs the size and the time are known by their quotient alone."""
+    finding = Finding(
+        balance="motor",
+        error_of="motor",
+        place="sensor jaw_torque_n_m",
+        family="sensor.drift",
+        form="sensor.drift.exponential",
+        verdict="identified",
+        parameters={
+            "drift": Value(0.08, "N m", None),
+            "time_constant": Value(100.0, "s", None),
+        },
+    )
+    assert sizes_of(finding)["at first"] == "0.8 mN m/s"
+
+
 @pytest.mark.parametrize("form", ["", "transmission.backlash.play"])
 def test_a_parameter_that_is_half_of_a_size_is_labelled_so(form):
     """Wherever it is printed: a part may be ordered by it."""
