@@ -7,7 +7,7 @@ import numpy as np
 from estimation.causes.equations import Equation
 from estimation.causes.layout import Layout
 from estimation.causes.run_signals import ANGLES
-from estimation.derived import measured_channels
+from estimation.derived import measured_channels, origin_of
 from estimation.signals import Combination, Signals
 
 MOST_BEND = 0.1
@@ -30,7 +30,8 @@ def angles_of(layout: Layout) -> list[str]:
     if not any(name.endswith(ANGLES) for name in read):
         read |= {*signals_of(layout).readings}
     agreeing = [_ends(one) for one in signals_of(layout).joined if _agrees(layout, one)]
-    names = _grown(read.intersection(layout.measured), agreeing)
+    known = {*layout.measured, *(name for ends in agreeing for name in ends)}
+    names = _grown(read & known, agreeing)
     angles = [name for name in names if name.endswith(ANGLES)]
     return sorted(angles, key=lambda name: (-travel_of(layout, name), name))  # a set has no order
 
@@ -93,8 +94,17 @@ def _ends(joined: Combination) -> set[str]:
 
 
 def _read(equation: Equation) -> set[str]:
-    model = equation.model
-    return {*measured_channels([equation.target, *model.channels], model.signals)}
+    """Return the readings of an equation, and the positions of the speeds that a tachometer reads.
+
+    The integral of such a speed is not a position of the shaft: a neighbour's encoder gives it.
+    """
+    model, read = equation.model, set[str]()
+    joined = {one.name for one in model.signals.joined}
+    for name in (equation.target, *model.channels):
+        position = origin_of(name)[0]
+        is_followed = position in joined and model.signals.combination(name) is not None
+        read |= {position} if is_followed else {*measured_channels([name], model.signals)}
+    return read
 
 
 def signals_of(layout: Layout) -> Signals:

@@ -103,6 +103,24 @@ def test_a_cogging_of_the_motor_is_found_at_the_motor_although_a_tachometer_read
     assert "ripple.motor" in (finding["family"], *finding["alternatives"])
 
 
+def test_with_a_sensor_of_torque_the_angle_is_not_the_integral_of_the_tachometer_either(
+    tmp_path, answered
+):
+    """The friction is that of the tachometer's speed, and the cogging that of the shaft's angle."""
+    rows = crank_runs(cogging=0.15)
+    table, file = crank(tmp_path, rows)
+    torque = 0.5 + 0.3 * np.sin(1.7 * rows[:, 1] + rows[:, 0])
+    supply = rows[:, 2] + torque / 0.4
+    noise = np.random.default_rng(5).normal(0.0, 0.002, len(rows))
+    rows = np.column_stack([rows[:, :2], supply, rows[:, 3:], torque + noise])
+    head = "run,t,u,speed,angle,torque"
+    np.savetxt(table, rows, delimiter=",", header=head, comments="", fmt="%.7g")
+    data = DATA.replace("[data.runs]", 'motor_torque_n_m = "torque"\n[data.runs]')
+    file.write_text(CRANK + TORQUE + data)
+    (finding,) = answered("diagnose --quick", table, "--machine", file)["findings"]
+    assert "ripple.motor" in (finding["family"], *finding["alternatives"])
+
+
 def test_a_check_asks_for_no_encoder_where_a_neighbours_gives_the_angle(tmp_path, said):
     table, file = crank(tmp_path, crank_runs())
     printed = said("machine check", file, table).out
