@@ -28,11 +28,13 @@ def of_speeds(recordings: Sequence[Recording], plant: Plant) -> Iterator[str]:
         if not off:
             continue
         sizes = sorted(1.0 / one.ratio for one in off.values())
-        where = "every run" if len(off) == len(recordings) else ", ".join(off)
+        is_whole = len(off) == len(recordings)
+        where = "every run" if is_whole else ", ".join(off)
         source = share.channel if share.gain == 1.0 else f"{share.channel} times {share.gain:.4g}"
         yield (
             f"{speed}: it is {sizes[len(sizes) // 2]:.3g} times the speed of {source} in {where};"
-            f" are its unit, gain and sign{' and the ratio' * (share.gain != 1.0)} right there?"
+            f" are its unit, gain and sign{', and the ratio,' * (is_whole and share.gain != 1.0)}"
+            " right there?"
         )
 
 

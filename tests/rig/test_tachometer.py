@@ -169,3 +169,14 @@ def test_an_equation_that_reads_the_speed_of_a_tachometer_reads_the_tachometer()
     slope = 2.0 * np.cos(2.0 * time)[inside]
     assert found["motor_acceleration_rad_s2"][inside] == pytest.approx(slope, abs=0.02)
     assert found["motor_angle_rad"] == pytest.approx(0.0 * time)
+
+
+def test_the_ratio_is_asked_about_only_where_every_run_contradicts_it(tmp_path, said):
+    rows = crank_runs(of_speed=1.45)
+    table, file = crank(tmp_path, rows)
+    assert "gain and sign right there?" in said("machine check", file, table).out
+    rows[:, 3] = 0.5 * crank_runs()[:, 3]
+    table, file = crank(tmp_path, rows)
+    line = "it is 0.5 times the speed of crank_angle_rad times 3 in every run;"
+    printed = said("machine check", file, table).out
+    assert f"{line} are its unit, gain and sign, and the ratio, right there?" in printed
