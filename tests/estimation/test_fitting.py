@@ -203,28 +203,33 @@ def test_a_width_that_no_friction_has_is_no_place_to_start(width: float):
 PERIOD_M = 0.005
 
 
-@pytest.mark.parametrize("start_m", [0.00508, 0.00492])
-def test_a_period_that_is_shorter_than_those_searched_is_fitted_from_its_value(start_m: float):
-    random = np.random.default_rng(3)
+def screw(order: float) -> Term:
+    """Return a wave along the carriage's position."""
+    channels = {"motor_angle": "carriage_position_m"}
+    return Term(effect("ripple.motor"), channels=channels, values={"order": Estimate(order)})
+
+
+def faster_and_faster(friction_n: float, noise_n: float) -> Campaign:
+    """Return six runs of a carriage with a wave of 6 N along its screw."""
+    random, recordings = np.random.default_rng(3), []
     time_s = np.arange(4000) / 200
-    recordings = []
     for k in range(6):
         position_m = 0.012 * np.sin(2 * np.pi * (0.1 + 0.05 * k) * time_s)
-        speed_m_s = np.gradient(position_m, time_s)
-        force_n = 20 * np.tanh(speed_m_s / 0.001) + 6 * np.sin(2 * np.pi * position_m / PERIOD_M)
+        force_n = 6 * np.sin(2 * np.pi * position_m / PERIOD_M)
+        force_n += friction_n * np.tanh(np.gradient(position_m, time_s) / 0.001)
         columns = {
             "carriage_position_m": position_m,
-            "drive_force_n": force_n + random.normal(0.0, 2.0, len(time_s)),
+            "drive_force_n": force_n + random.normal(0.0, noise_n, len(time_s)),
         }
         recordings.append(Recording(f"{k}", time_s, columns))
+    return Campaign.of(recordings)
+
+
+@pytest.mark.parametrize("start_m", [0.00508, 0.00492])
+def test_a_period_that_is_shorter_than_those_searched_is_fitted_from_its_value(start_m: float):
     (model,) = declared(SLIDE)
-    wave = Term(
-        effect("ripple.motor"),
-        channels={"motor_angle": "carriage_position_m"},
-        values={"order": Estimate(2 * np.pi / start_m)},
-    )
-    model = replace(model, terms=(*model.terms, wave))
-    found = fit(model, Campaign.of(recordings)).terms[-1].values["order"]
+    model = replace(model, terms=(*model.terms, screw(2 * np.pi / start_m)))
+    found = fit(model, faster_and_faster(20.0, 2.0)).terms[-1].values["order"]
     low, high = found.ci95
     assert found.value == pytest.approx(2 * np.pi / PERIOD_M, rel=2e-3)
     assert low < 2 * np.pi / PERIOD_M < high < 1.01 * low
@@ -232,21 +237,10 @@ def test_a_period_that_is_shorter_than_those_searched_is_fitted_from_its_value(s
 
 def test_a_wave_that_is_partly_beyond_the_cutoff_has_its_whole_size() -> None:
     """The filter takes most of it off the target where the axis is fast, none where it is slow."""
-    random, recordings = np.random.default_rng(3), []
-    time_s = np.arange(4000) / 200
-    for k in range(6):
-        position_m = 0.012 * np.sin(2 * np.pi * (0.1 + 0.05 * k) * time_s)
-        force_n = 6 * np.sin(2 * np.pi * position_m / PERIOD_M) + random.normal(0.0, 0.5, 4000)
-        columns = {"carriage_position_m": position_m, "drive_force_n": force_n}
-        recordings.append(Recording(f"{k}", time_s, columns))
     (model,) = declared(SLIDE)
-    wave = Term(
-        effect("ripple.motor"),
-        channels={"motor_angle": "carriage_position_m"},
-        values={"order": Estimate(2 * np.pi / PERIOD_M)},
-    )
+    wave = screw(2 * np.pi / PERIOD_M)
     model = replace(model, terms=(wave,), low_pass=LowPass(4.0), run_offsets=False)
-    found = fit(model, Campaign.of(recordings), bootstrap=0, shapes="keep")
+    found = fit(model, faster_and_faster(0.0, 0.5), bootstrap=0, shapes="keep")
     assert numbers(found)["sine"] == pytest.approx(6.0, rel=0.03)
     assert found.evidence.rmse < 0.3  # 1.0 with the wave as the axis is, unfiltered
 
