@@ -99,6 +99,19 @@ class Refits:
         own_offsets = self.layout.equations[name].model.run_offsets
         return (found if own_offsets else found.with_means()).by_run
 
+    def fall(self, before: Errors, after: Errors, name: str) -> float:
+        """Return by how much the logarithm of an equation's error on the test runs falls.
+
+        With each run's mean removed or left in: the larger fall; zero where the other one rises by
+        more. Where runs have offsets of their own, that with the means counts less, as in the
+        search.
+        """
+        pairs = ((before.rmse, after.rmse), (before.rmse_with_means, after.rmse_with_means))
+        falls = [math.log(old / new) if new else (math.inf if old else 0.0) for old, new in pairs]
+        own_offsets = self.layout.equations[name].model.run_offsets
+        of_means = self.numbers.between if own_offsets else 1.0
+        return max(falls) if falls[0] + of_means * falls[1] > 0.0 else min(0.0, *falls)
+
     def models(self) -> list[Model]:
         """Return the models with the causes that a file can hold; see `Refit.written`."""
         return [self.of[name].written(self.parts[name]) for name in self.of]

@@ -28,7 +28,7 @@ from estimation.causes.instruments import add_instruments
 from estimation.causes.layout import Layout, lay_out, on_one_clock
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.refit import Addition, Errors, that_falls
+from estimation.causes.refit import Addition, that_falls
 from estimation.causes.refits import Refits
 from estimation.causes.scoring import DIGITS, probabilities
 from estimation.causes.search import Found, search
@@ -233,7 +233,7 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
     before = {name: refits.test_errors(name) for name in place.equations}
     added = refits.add(candidate, acts_in)
     after = {name: refits.test_errors(name) for name in place.equations}
-    falls = {name: _fall(before[name], after[name], refits, name) for name in place.equations}
+    falls = {name: refits.fall(before[name], after[name], name) for name in place.equations}
     stated, least = place.home, -0.5 * math.log1p(-refits.numbers.form_floor)
     if falls[stated] < least:
         stated = max(falls, key=falls.__getitem__)
@@ -265,7 +265,7 @@ def _shown(one: _Opened, refits: Refits) -> float:
     measured error shows.
     """
     falls = [
-        _fall(refits.test_errors(name, without=part), refits.test_errors(name), refits, name)
+        refits.fall(refits.test_errors(name, without=part), refits.test_errors(name), name)
         for name, part in one.parts.items()
     ]
     return max(one.fall, *falls) / max(one.kept.likely[0].gain, np.finfo(float).tiny)
@@ -324,19 +324,6 @@ def _tested(one: Kept, others: Sequence[Candidate], held_out: HeldOut) -> tuple[
         key=lambda p: -p.share,
     )
     return replace(one, scored=found[0].best, likely=found), total
-
-
-def _fall(before: Errors, after: Errors, refits: Refits, equation: str) -> float:
-    """Return by how much the logarithm of an equation's error on the test runs falls.
-
-    With each run's mean removed or left in: the larger fall; zero where the other one rises by
-    more. Where runs have offsets of their own, that with the means counts less, as in the search.
-    """
-    pairs = ((before.rmse, after.rmse), (before.rmse_with_means, after.rmse_with_means))
-    falls = [math.log(old / new) if new else (math.inf if old else 0.0) for old, new in pairs]
-    own_offsets = refits.layout.equations[equation].model.run_offsets
-    of_means = refits.numbers.between if own_offsets else 1.0
-    return max(falls) if falls[0] + of_means * falls[1] > 0.0 else min(0.0, *falls)
 
 
 def _moved(before: Model, after: Model) -> dict[str, dict[str, float]]:
