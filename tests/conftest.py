@@ -74,5 +74,8 @@ def no_thread_is_left_behind() -> Iterator[None]:
     """Fail a test that leaves a thread of its own running."""
     before = set(threading.enumerate())
     yield
-    left = [t for t in threading.enumerate() if t not in before and t.is_alive() and not t.daemon]
+    others = [t for t in threading.enumerate() if t not in before and not t.daemon]
+    for thread in others:
+        thread.join(1.0)  # one that was asked to end is about to
+    left = [t for t in others if t.is_alive()]
     assert not left, f"threads still running: {left}"
