@@ -20,7 +20,7 @@ NEAR = 0.03
 
 def unit_factor(factor: float) -> str:
     """Return the two units whose factor, or its inverse, a factor is, in words; else nothing."""
-    size = math.exp(abs(math.log(abs(factor)))) if factor else 0.0
+    size = _size(factor)
     near = min(FACTORS, key=lambda one: abs(size / one - 1.0))
     return FACTORS[near] if abs(size / near - 1.0) < NEAR else ""
 
@@ -28,4 +28,9 @@ def unit_factor(factor: float) -> str:
 def off_by(factor: float) -> str:
     """Return which units have a factor, a sentence after a space; empty where none have it."""
     words = unit_factor(factor)
-    return f" That is off by {max(abs(factor), 1.0 / abs(factor)):.3g}, {words}." if words else ""
+    return f" That is off by {_size(factor):.3g}, {words}." if words else ""
+
+
+def _size(factor: float) -> float:
+    """Return a factor or its inverse, whichever is larger, without sign; zero stays zero."""
+    return max(abs(factor), 1.0 / abs(factor)) if factor else 0.0

@@ -31,6 +31,7 @@ KNOTS_OF_BEND, BENT = 5, 24
 """Hat functions of a form's deviation from its equation, and families that are given one."""
 
 Equations = frozenset[str]
+"""Names of the equations that a candidate enters."""
 
 REFINED = 8
 """Names whose shapes are refined after the grid, and those whose choices of runs are."""
@@ -83,6 +84,7 @@ def together(surveys: Iterable[Survey]) -> Survey:
 
 def refined(joint: Joint, pool: Sequence[Group], folds: Folds, survey: Survey) -> list[Scored]:
     """Return the best of each name: of a survey, on some of the runs, refined, and relaxed."""
+    # a declared term is one of the forms, as each effect is at a single point
     forms = min((c.choices for group in pool for c in group.candidates), default=1)
     chosen = [
         Claim(p.claim.cause, tuple(p.acts.tolist()), max(p.claim.choices, forms))

@@ -30,11 +30,11 @@ class _NextTo(Generic[Kept]):
     """What was worked out next to sets of causes, in whatever order these were found."""
 
     def __init__(self) -> None:
-        self._of: list[tuple[list[tuple[object, object]], Kept]] = []
+        self._of: list[tuple[list[object], Kept]] = []
 
     def next_to(self, causes: Sequence[Scored]) -> Kept | None:
         """Return the result next to causes; None where there is none yet."""
-        claims = [(one.candidate.cause, one.candidate.acts) for one in causes]
+        claims = _claims(causes)
         for known, kept in self._of:
             if len(known) == len(claims) and all(claim in known for claim in claims):
                 return kept
@@ -42,7 +42,12 @@ class _NextTo(Generic[Kept]):
 
     def add(self, causes: Sequence[Scored], kept: Kept) -> None:
         """Keep what was worked out next to causes."""
-        self._of.append(([(one.candidate.cause, one.candidate.acts) for one in causes], kept))
+        self._of.append((_claims(causes), kept))
+
+
+def _claims(causes: Sequence[Scored]) -> list[object]:
+    """Return the causes and the runs in which they act."""
+    return [(one.candidate.cause, one.candidate.acts) for one in causes]
 
 
 class Ranking:

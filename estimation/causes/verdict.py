@@ -86,7 +86,7 @@ def answer(
     began = time.perf_counter()
     on_stage("fitting the declared equations")
     timed = on_one_clock(recordings)
-    layout, sealed, wrong = _of_one_sign(models, timed, sealed, numbers)
+    layout, sealed, wrong = _without_wrong_runs(models, timed, sealed, numbers)
     kept_names = {run.name for run in layout.runs}
     timed = [r for r in timed if r.name in kept_names]
     on_stage("searching the training runs for what they lack")
@@ -141,7 +141,7 @@ def answer(
     return Answer(diagnosis, layout, found, tuple(k for k, _ in judged), refits, tuple(written))
 
 
-def _of_one_sign(
+def _without_wrong_runs(
     models: Sequence[Model], recordings: Sequence[Recording], sealed: Sealed, numbers: Numbers
 ) -> tuple[Layout, Sealed, list[Apart]]:
     """Return the equations on the runs of usual signs and units, their split, and the others."""

@@ -35,6 +35,7 @@ class Stream(Stepper):
         self.model = model
         self._weights = [np.array(term.weights) for term in model.terms]
         self._shapes = [term.numbers(term.effect.shape) for term in model.terms]
+        self._waves = [bool(term.turning) for term in model.terms]
         self._states = [term.effect.start() for term in model.terms]
         self._rest = rest_speeds(model)
         self.half_width = usual_half_width(model)
@@ -56,13 +57,14 @@ class Stream(Stepper):
     def _one(self, row: list[float]) -> float:
         sample = dict(zip(self.model.channels, row, strict=True))
         total = 0.0
-        for term, weights, shape, state in zip(
-            self.model.terms, self._weights, self._shapes, self._states, strict=True
+        for term, weights, shape, is_wave, state in zip(
+            self.model.terms, self._weights, self._shapes, self._waves, self._states, strict=True
         ):
             inputs = {role: sample[channel] for role, channel in term.channels.items()}
             values = term.effect.step(inputs, shape, state)
-            gains = term.passed(sample, shape, self.model.low_pass)
-            values = [v * gain for v, gain in zip(values, gains, strict=True)] if gains else values
+            if is_wave:
+                gains = term.passed(sample, shape, self.model.low_pass)
+                values = [v * gain for v, gain in zip(values, gains, strict=True)]
             total += sum(w * v for w, v in zip(weights, values, strict=True))
         return float(total)
 
