@@ -133,25 +133,15 @@ def pool_of(joint: Joint, claims: Iterable[Claim]) -> list[Group]:
     for run in (*train.runs, *train.shaken):
         run.memo.clear()  # columns of the whole run, many times as large as those on the grid
     causes = [c.cause for group in pool for c in group.candidates]
-    count = Counter(_form(cause) for cause in causes if not _tried(cause))
+    points = Counter(_form(cause) for cause in causes if not _tried(cause))
     return [
         replace(
             group,
-            candidates=[replace(c, choices=_choices(c.cause, count)) for c in group.candidates],
+            candidates=[replace(c, choices=_choices(c.cause, points)) for c in group.candidates],
             block=block_of(joint, group.laid),
         )
         for group in pool
     ]
-
-
-def _form(cause: Source | Function) -> tuple[str, str]:
-    """Return the key of one prior probability: a form of an effect, or functions of one variable.
-
-    Functions of several variables share that of the functions at their place.
-    """
-    if not isinstance(cause, Function):
-        return cause.place.name, cause.effect.id
-    return cause.place.name, "" if len(cause.variables) == 1 else "several"
 
 
 def _tried(cause: Source | Function) -> int:
@@ -159,17 +149,26 @@ def _tried(cause: Source | Function) -> int:
     return cause.tried if isinstance(cause, Source) else 0
 
 
-def _choices(cause: Source | Function, count: Mapping[tuple[str, str], int]) -> int:
+def _form(cause: Source | Function) -> tuple[str, object]:
+    """Return the place of a cause, and its effect or variables: it is one at several points."""
+    form = cause.variables if isinstance(cause, Function) else cause.effect.id
+    return cause.place.name, form
+
+
+def _choices(cause: Source | Function, points: Mapping[tuple[str, object], int]) -> int:
     """Return the number of choices that a cause is one of: of forms, and within its form.
 
-    Within a form these are the points of its grid, or those that it was chosen from. Of smooth
-    functions these are the numbers of variables, and the sets of so many.
+    Within a form these are the points of its grid, or those that it was chosen from. The smooth
+    functions of a place are one form; within it these are the numbers of variables, the sets of so
+    many, and the points of their grid.
     """
-    forms = sum(effect != "several" for _, effect in count)
+    variables = Counter(place for place, of in points if isinstance(of, tuple) and len(of) == 1)
+    forms = sum(isinstance(of, str) for _, of in points) + len(variables)
+    own = points[_form(cause)]
     if not isinstance(cause, Function):
-        return forms * (_tried(cause) or count[_form(cause)])
-    sets = max(1, math.comb(count[cause.place.name, ""], len(cause.variables)))
-    return forms * MOST_VARIABLES * sets
+        return forms * (cause.tried or own)
+    sets = max(1, math.comb(variables[cause.place.name], len(cause.variables)))
+    return forms * MOST_VARIABLES * sets * own
 
 
 def groups_of(joint: Joint, wanted: Iterable[Claim]) -> list[Group]:

@@ -17,8 +17,8 @@ from estimation.causes.blocks import Products, block_of, errors_of
 from estimation.causes.candidates import Candidate, Claim, Group, as_read, groups_of
 from estimation.causes.criterion import gained
 from estimation.causes.folds import Folds
-from estimation.causes.functions import LOOSE_PLACES, Function
-from estimation.causes.grids import RELATIVE, least_order, order_step
+from estimation.causes.functions import LOOSE_PLACES, Function, at_other_contacts
+from estimation.causes.grids import RELATIVE, between, least_order, order_step
 from estimation.causes.instruments import stands_for_itself
 from estimation.causes.joint import Joint
 from estimation.causes.layout import Layout
@@ -100,12 +100,18 @@ def refined(joint: Joint, pool: Sequence[Group], folds: Folds, survey: Survey) -
         some = best_of_each([*some, *climbing])
     spoilt = assessed(joint, groups_of(joint, reweighted(joint, pool, folds)), folds)
     best = best_of_each([*survey.best, *some, *spoilt])
-    near = [
-        c for s in best[:REFINED] for c in (*_neighbours(joint.layout, s.candidate), *_as_late(s))
-    ]
     # late by more than a whole reading at every point of the grid: between two of them by one
-    near += [c for s in survey.beyond for c in _as_late(s)]
-    best = best_of_each([*best, *assessed(joint, groups_of(joint, near), folds)])
+    near = [c for s in (*best[:REFINED], *survey.beyond) for c in _as_late(s)]
+    near += [c for s in best[:REFINED] for c in _neighbours(joint.layout, s.candidate)]
+    while near:
+        before = {s.candidate.name: s.score for s in best}
+        found = best_of_each(assessed(joint, groups_of(joint, near), folds))
+        best = best_of_each([*best, *found])
+        # the shape of an effect is fitted at the end, that of an unknown form is not
+        better = [
+            s for s in found if s.candidate.is_function and s.score > before[s.candidate.name]
+        ]
+        near = [c for s in better for c in _neighbours(joint.layout, s.candidate)]
     bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
     more = assessed(joint, groups_of(joint, bent), folds)
     ranked = _by_reading(joint, best_of_each([*best, *more]), folds)
@@ -214,11 +220,11 @@ def _as_late(one: Scored) -> list[Claim]:
 
 
 def _neighbours(layout: Layout, candidate: Candidate) -> list[Claim]:
-    """Return a named effect at shapes between the points of the grid."""
-    cause = candidate.cause
+    """Return a cause at shapes between the points of the grid."""
+    cause, out = candidate.cause, list[Claim]()
     if isinstance(cause, Function):
-        return []
-    out = []
+        near = at_other_contacts(layout, cause)
+        return [Claim(function, candidate.acts, candidate.choices) for function in near]
     for k, parameter in enumerate(cause.effect.shape):
         for value in _nearby(layout, cause, k, parameter):
             shape = (*cause.shape[:k], float(value), *cause.shape[k + 1 :])
@@ -238,10 +244,7 @@ def _nearby(layout: Layout, cause: Source, k: int, parameter: Parameter) -> list
     values = RELATIVE.get((cause.effect.id, parameter.name)) or RELATIVE.get(parameter.name)
     if parameter.name in ("width", "settled") or values is None or len(values) < 2:
         return []
-    steps, ratio = (-0.5, -0.25, 0.25, 0.5), values[1] / values[0]
-    near = [cause.shape[k] * ratio**step for step in steps]
-    if parameter.linear:
-        near = [cause.shape[k] + step * (values[1] - values[0]) for step in steps]
+    near = between(values, cause.shape[k], parameter.linear)
     if parameter.unit != "1":
         return near
     # a number without a unit has the same bounds on every machine

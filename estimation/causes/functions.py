@@ -9,11 +9,13 @@ import numba
 import numpy as np
 
 from estimation.causes.angles import travel_of
+from estimation.causes.grids import contacts, next_to
 from estimation.causes.instruments import signal
 from estimation.causes.layout import Layout
 from estimation.causes.places import Place, direction_width
 from estimation.causes.run_signals import RunSignals
 from estimation.derived import CAMPAIGN_TIME
+from estimation.effects.friction_dwell import aged
 from estimation.recording import FloatArray
 
 KNOTS, KNOTS_ALONE, KNOTS_OF_FACTOR = 6, 14, 3
@@ -22,9 +24,6 @@ that is a factor."""
 
 PLAY = 0.06
 """Half width of the play operator that stands for history, share of the travel."""
-
-GROWTH_S, FADE_S = 0.1, 0.3
-"""Dwell: the logarithm of the last rest over the first time, fading in motion by the second."""
 
 ROLE_OF_VARIABLE = {
     "velocity_sign": "speed",
@@ -35,8 +34,9 @@ ROLE_OF_VARIABLE = {
 }
 """Variable to the role of an effect that its channel plays, where the names differ."""
 
-OVER_WIDTH = ("velocity_sign", "dwell")
-"""Variables that depend on the speed over which friction changes its sign."""
+Contact = tuple[float, float]
+"""Time in which a contact at rest ages, s, and way that wears it, in the unit of its speed times
+s."""
 
 TURN = 2.0 * math.pi
 LEAST_TURNS = 1.5
@@ -44,6 +44,12 @@ LEAST_TURNS = 1.5
 
 MOST_VARIABLES = 3
 """Variables of one function, direction included."""
+
+OF_CONTACT = {"velocity_sign", "dwell"}
+"""Variables of the functions that show how fast a contact ages and wears."""
+
+Form = float | Contact | None
+"""Width of a direction, contact of a dwell; nothing of other variables."""
 
 LOOSE_PLACES = ("loss", "deflection", "actuator")
 
@@ -57,6 +63,7 @@ class Function:
         variables: Names of its variables, as a verdict lists them.
         knots: Places of each variable's hat functions; none of a direction.
         width: Speed over which friction changes its sign.
+        contact: Of one of dwell: how fast the contact ages, and wears.
         as_read: Whether its variables are read, also where another sensor or the equation predicts
             them.
     """
@@ -65,6 +72,7 @@ class Function:
     variables: tuple[str, ...]
     knots: tuple[tuple[float, ...], ...]
     width: float
+    contact: Contact | None = None
     as_read: bool = False
 
     family = "unknown"
@@ -92,20 +100,19 @@ class Function:
     ) -> FloatArray:
         """Return a variable's hat functions on the run's grid, or one and the direction."""
         channel = _channel(run, self.place, variable, equation, self.as_read)
-        values = _values_of(run, variable, channel, self.width)
+        form = _form(variable, self.width, self.contact)
+        values = _values_of(run, variable, channel, form)
         if variable == "velocity_sign":
             if "turn" in self.variables:  # what repeats in both directions is a ripple
                 return values[:, None]
             return np.column_stack([np.ones(len(values)), values])
-        width = self.width if variable in OVER_WIDTH else 0.0
-        return run.once(("hats", variable, channel, knots, width), lambda: _hats(values, knots))
+        return run.once(("hats", variable, channel, form, knots), lambda: _hats(values, knots))
 
 
 def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
     """Yield every smooth function that competes at a place."""
     if place.kind not in LOOSE_PLACES or any(e.order for e in place.enters):
         return
-    width = direction_width(layout, place)
     known = variables_at(layout, place)
     chosen: list[tuple[str, ...]] = [(v,) for v in known]
     chosen += list(itertools.combinations(known, 2))
@@ -119,10 +126,46 @@ def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
     for others in place.others:  # a joint carries the joints behind it, and is carried
         chosen += [(v,) for v in others]
         chosen += [*itertools.product(own, others), *((others[0], v) for v in others[1:])]
+    tried = _contacts(layout, place) if "dwell" in known else []
     for variables in chosen:
-        counts = _counts(variables)
-        knots = tuple(_knots(layout, place, v, width, counts[v]) for v in variables)
-        yield Function(place, variables, knots, width)
+        if "dwell" not in variables:
+            yield _function(layout, place, variables)
+            continue
+        alone = {*variables} <= OF_CONTACT
+        for contact in tried if alone else [_middle(tried)]:
+            yield _function(layout, place, variables, contact)
+
+
+def at_other_contacts(layout: Layout, function: Function) -> Iterator[Function]:
+    """Yield a function of dwell whose contact ages or wears between the values that were tried."""
+    if function.contact is None or not {*function.variables} <= OF_CONTACT:
+        return
+    for contact in next_to(function.contact):
+        yield _function(layout, function.place, function.variables, contact)
+
+
+def _contacts(layout: Layout, place: Place) -> list[Contact]:
+    return contacts(layout, {"speed": place.roles["speed"][0], "clock": "time_s"})
+
+
+def _middle(of: Sequence[Contact]) -> Contact:
+    """Return the geometric mean of times and of ways."""
+    time_s, way = np.exp(np.mean(np.log(of), axis=0))
+    return float(time_s), float(way)
+
+
+def _function(
+    layout: Layout, place: Place, variables: tuple[str, ...], contact: Contact | None = None
+) -> Function:
+    width, counts = direction_width(layout, place), _counts(variables)
+    forms = {v: _form(v, width, contact) for v in variables}
+    knots = tuple(_knots(layout, place, v, forms[v], counts[v]) for v in variables)
+    return Function(place, variables, knots, width, contact)
+
+
+def _form(variable: str, width: float, contact: Contact | None) -> Form:
+    """Return the part of a form that a variable's values depend on."""
+    return {"velocity_sign": width, "dwell": contact}.get(variable)
 
 
 def variables_at(layout: Layout, place: Place) -> list[str]:
@@ -134,6 +177,8 @@ def variables_at(layout: Layout, place: Place) -> list[str]:
     if place.kind != "loss":
         others.remove("acceleration")
     found += [v for v in others if ROLE_OF_VARIABLE.get(v, v) in place.roles]
+    if "dwell" in found and not _contacts(layout, place):
+        found.remove("dwell")  # no run rests: it is a function of the velocity
     return [*found, "time"]
 
 
@@ -162,16 +207,10 @@ def _read(place: Place, variable: str) -> str:
     return channels[0]
 
 
-def variable_of(
-    run: RunSignals, place: Place, variable: str, equation: str, width: float
-) -> FloatArray:
+def _values_of(run: RunSignals, variable: str, channel: str, form: Form) -> FloatArray:
     """Return a variable's values on the run's grid, shape (n,)."""
-    return _values_of(run, variable, _channel(run, place, variable, equation), width)
-
-
-def _values_of(run: RunSignals, variable: str, name: str, width: float) -> FloatArray:
-    key = (variable, name, width if variable in OVER_WIDTH else 0.0)
-    return run.once(key, lambda: _worked_out(run, variable, name, width))
+    key = variable, channel, form
+    return run.once(key, lambda: _worked_out(run, variable, channel, form))
 
 
 def _channel(
@@ -183,18 +222,16 @@ def _channel(
     return signal(run, _read(place, variable), equation, as_read)
 
 
-def _worked_out(run: RunSignals, variable: str, name: str, width: float) -> FloatArray:
+def _worked_out(run: RunSignals, variable: str, name: str, form: Form) -> FloatArray:
     whole = run.channels[name]
-    if variable == "velocity_sign":
-        return np.tanh(run.on_grid(name) / width)
+    if isinstance(form, float):
+        return np.tanh(run.on_grid(name) / form)
     if variable == "history":
         # half the difference to the same backwards in time: the loop, without what noise follows
         half = PLAY * float(np.ptp(whole)) or 1.0
         return 0.5 * (_play(whole[::-1], half)[::-1] - _play(whole, half))[run.grid]
-    if variable == "dwell":
-        usual = float(np.percentile(np.abs(whole), 95))
-        resting = (np.abs(whole) < max(width, 0.05 * usual)).astype(np.float64)
-        return np.asarray(_rested(resting, 1.0 / run.rate_hz)[run.grid])
+    if isinstance(form, tuple):
+        return np.asarray(_ages(whole, 1.0 / run.rate_hz, *form)[run.grid])
     if variable == "turn":
         return np.asarray(np.mod(run.on_grid(name), TURN))
     return run.on_grid(name)
@@ -211,14 +248,16 @@ def _counts(variables: Sequence[str]) -> dict[str, int]:
 
 
 def _knots(
-    layout: Layout, place: Place, variable: str, width: float, count: int
+    layout: Layout, place: Place, variable: str, form: Form, count: int
 ) -> tuple[float, ...]:
     """Return the knots of a variable, evenly over the range of its values."""
     if variable == "velocity_sign":
         return ()
-    key = (variable, _channel(layout.runs[0], place, variable, place.home), width)
+    channels = [_channel(run, place, variable, place.home) for run in layout.runs]
+    key = variable, channels[0], form
     if key not in layout.ranges:
-        inside = [variable_of(run, place, variable, place.home, width) for run in layout.runs]
+        pairs = zip(layout.runs, channels, strict=True)
+        inside = [_values_of(run, variable, channel, form) for run, channel in pairs]
         ends = np.array([np.percentile(x, [1, 99]) for x in inside])
         layout.ranges[key] = float(ends[:, 0].min()), float(ends[:, 1].max())
     low, high = layout.ranges[key]
@@ -243,15 +282,10 @@ def _play(x: FloatArray, half: float) -> FloatArray:
 
 
 @numba.njit(cache=True)
-def _rested(resting: FloatArray, period_s: float) -> FloatArray:
-    """Return the logarithm of the last rest's time, fading while it moves."""
-    out = np.empty(len(resting))
-    rest, since = 0.0, np.inf
-    for i in range(len(resting)):
-        if resting[i]:
-            rest = rest + period_s if since == 0.0 else period_s
-            since = 0.0
-        else:
-            since += period_s
-        out[i] = np.log1p(rest / GROWTH_S) * np.exp(-since / FADE_S)
+def _ages(speed: FloatArray, period_s: float, time_s: float, way: float) -> FloatArray:
+    """Return the state of a contact at each sample, 0 to 1; a run starts after a long rest."""
+    out = np.empty(len(speed))
+    state = 1.0
+    for i in range(len(speed)):
+        out[i] = state = aged(state, speed[i], period_s, time_s, way) if i else 1.0
     return out

@@ -4,6 +4,7 @@ They follow the data: a speed is searched over the speeds there are, a travel ov
 effect that is not distinguishable from a simpler one over that range has none.
 """
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 
@@ -22,6 +23,13 @@ LEAST_PERIODS, MOST_PERIODS = 2.0, 60.0
 """Periods of a harmonic that some run must cover: fewer are a slow change with the angle."""
 
 
+STEPS = (-0.5, -0.25, 0.25, 0.5)
+"""Values between the points of a grid, in its steps."""
+
+CONTACT = ("time", "way")
+"""Shape parameters of friction that depends on dwell: the ageing of a contact, and its wear."""
+
+
 def axis(
     layout: Layout, place: Place, effect: Effect, parameter: Parameter, channels: Mapping[str, str]
 ) -> list[float]:
@@ -37,7 +45,7 @@ def axis(
         return _orders(layout, effect, channels[effect.turning])
     relative = RELATIVE.get((effect.id, parameter.name)) or RELATIVE.get(parameter.name)
     if effect.id == "friction.dwell" and relative is not None:
-        return _rests(layout, parameter, channels, relative)
+        return _rests(layout, parameter.name, channels, relative)
     if parameter.name == "fall" and relative is not None:
         # one that falls faster is another form of the change of sign
         usual = _range(layout, channels["speed"])[1] or 1.0
@@ -82,17 +90,42 @@ RELATIVE: Mapping[object, Sequence[float]] = {
 """Shape parameter to the values tried, shares of the range of the channel that its unit names."""
 
 
+def contacts(layout: Layout, channels: Mapping[str, str]) -> list[tuple[float, float]]:
+    """Return times in which a contact ages and ways that wear it; none where no run rests."""
+    time_s, way = (
+        _rests(layout, name, channels, RELATIVE["friction.dwell", name]) for name in CONTACT
+    )
+    return list(itertools.product(time_s, way))
+
+
+def next_to(contact: tuple[float, float]) -> list[tuple[float, float]]:
+    """Return the time and the way of a contact with one of them between the points of its grid."""
+    time_s, way = contact
+    times, ways = (
+        between(RELATIVE["friction.dwell", name], value)
+        for name, value in zip(CONTACT, contact, strict=True)
+    )
+    return [(x, way) for x in times] + [(time_s, x) for x in ways]
+
+
+def between(relative: Sequence[float], value: float, linear: bool = False) -> list[float]:
+    """Return values next to one, nearer than the points of its grid are to one another."""
+    if linear:
+        return [value + step * (relative[1] - relative[0]) for step in STEPS]
+    return [value * (relative[1] / relative[0]) ** step for step in STEPS]
+
+
 def _rests(
-    layout: Layout, parameter: Parameter, channels: Mapping[str, str], relative: Sequence[float]
+    layout: Layout, name: str, channels: Mapping[str, str], relative: Sequence[float]
 ) -> list[float]:
-    """Return the times in which a contact ages, and the ways that wear it, that the runs show.
+    """Return the times in which a contact ages, or the ways that wear it, that the runs show.
 
     A time is a share of a run, and at most the longest rest: without one the contact is always as
     its speed makes it, which is a friction that falls with the speed. A way is a share of that of a
     whole run at its usual most speed: a contact that is worn within less is a curve over speed too.
     """
     whole_s, speed = _range(layout, channels["clock"])[1], channels["speed"]
-    if parameter.name == "way":
+    if name == "way":
         return [x * whole_s * _range(layout, speed)[1] for x in relative]
     slowest = signals_of(layout).rest.get(speed, 0.0)
     rest_s = max(longest_rest_s(r.channels[speed], r.rate_hz, slowest) for r in layout.runs)

@@ -10,16 +10,20 @@ from estimation.recording import FloatArray
 
 
 @numba.njit(cache=True)
+def aged(state: float, speed: float, step_s: float, time_s: float, way: float) -> float:
+    """Return the state of a contact, 0 to 1, after a step; exact for a speed that holds in it."""
+    growth, wear = 1.0 / time_s, abs(speed) / way
+    settled = growth / (growth + wear)
+    return float(settled + (state - settled) * np.exp(-(growth + wear) * step_s))
+
+
+@numba.njit(cache=True)
 def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
     """Fill the rows; state: started (0 or 1), its time, what the contact has grown (0 to 1)."""
     for i in range(len(now)):
         speed, clock = now[i, 0], now[i, 1]
         if state[0]:
-            # exact for a speed that holds from one sample to the next
-            growth, wear = 1.0 / shape[0], abs(speed) / shape[1]
-            settled = growth / (growth + wear)
-            fade = np.exp(-(growth + wear) * (clock - state[1]))
-            state[2] = settled + (state[2] - settled) * fade
+            state[2] = aged(state[2], speed, clock - state[1], shape[0], shape[1])
         state[0], state[1] = 1.0, clock
         rows[i, 0] = state[2] * np.tanh(speed / shape[2])
 
