@@ -33,6 +33,10 @@ def angles_of(layout: Layout) -> list[str]:
     known = {*layout.measured, *(name for ends in agreeing for name in ends)}
     names = _grown(read & known, agreeing)
     angles = [name for name in names if name.endswith(ANGLES)]
+    stated = [name for name in angles if name in signals_of(layout).readings]
+    if stated:  # a formula in metres is no position
+        moving = {*stated, *signals_of(layout).integrals, *(n for ends in agreeing for n in ends)}
+        angles = [name for name in angles if name in moving]
     return sorted(angles, key=lambda name: (-travel_of(layout, name), name))  # a set has no order
 
 

@@ -18,7 +18,7 @@ from estimation.causes.candidates import Candidate, Claim, Group, as_read, group
 from estimation.causes.criterion import gained
 from estimation.causes.folds import Folds
 from estimation.causes.functions import LOOSE_PLACES, Function, at_other_contacts
-from estimation.causes.grids import RELATIVE, between, least_order, order_step
+from estimation.causes.grids import RELATIVE, axis, between, least_order, order_step
 from estimation.causes.instruments import stands_for_itself
 from estimation.causes.joint import Joint
 from estimation.causes.layout import Layout
@@ -29,6 +29,9 @@ from estimation.effects import Parameter
 
 KNOTS_OF_BEND, BENT = 5, 24
 """Hat functions of a form's deviation from its equation, and families that are given one."""
+
+INSTANTS = tuple(0.5**k for k in range(2, 7))
+"""Steps in which the instant of a jump is approached, shares of that of its grid."""
 
 Equations = frozenset[str]
 """Names of the equations that a candidate enters."""
@@ -112,6 +115,10 @@ def refined(joint: Joint, pool: Sequence[Group], folds: Folds, survey: Survey) -
             s for s in found if s.candidate.is_function and s.score > before[s.candidate.name]
         ]
         near = [c for s in better for c in _neighbours(joint.layout, s.candidate)]
+    for part in INSTANTS:
+        shown = [s.candidate for s in best[:REFINED] if s.gain > 0.0]
+        jumps = [c for one in shown for c in _at_other_instants(joint.layout, one, part)]
+        best = best_of_each([*best, *assessed(joint, groups_of(joint, jumps), folds)])
     bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
     more = assessed(joint, groups_of(joint, bent), folds)
     ranked = _by_reading(joint, best_of_each([*best, *more]), folds)
@@ -217,6 +224,26 @@ def _as_late(one: Scored) -> list[Claim]:
         return []
     shape = (*cause.shape[:-1], cause.shape[-1] * share)
     return [Claim(replace(cause, shape=shape), candidate.acts, candidate.choices)]
+
+
+def _at_other_instants(layout: Layout, candidate: Candidate, part: float) -> list[Claim]:
+    """Return an effect that begins at an instant so much earlier and later, of a step of its grid.
+
+    A jump has no slope by its time, so no fit moves it.
+    """
+    cause = candidate.cause
+    if isinstance(cause, Function):
+        return []
+    out = []
+    for k, parameter in enumerate(cause.effect.shape):
+        if parameter.name != "since" or cause.tried:
+            continue
+        points = axis(layout, cause.place, cause.effect, parameter, dict(cause.channels))
+        for step in (-part, part):
+            value = cause.shape[k] + step * (points[1] - points[0])
+            shape = (*cause.shape[:k], value, *cause.shape[k + 1 :])
+            out.append(Claim(replace(cause, shape=shape), candidate.acts, candidate.choices))
+    return out
 
 
 def _neighbours(layout: Layout, candidate: Candidate) -> list[Claim]:

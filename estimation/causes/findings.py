@@ -39,8 +39,8 @@ VARIABLE_OF_ROLE: Mapping[str, str] = {
 }
 """Role of an effect to the variable that a finding names."""
 
-ANGLES_OF_ROLE = ("position", "output_angle", "motor_angle", "encoder", "stop", "tilt")
-"""Roles of an angle or a position, which a finding names by its channel."""
+BY_CHANNEL = ("position", "output_angle", "motor_angle", "encoder", "stop", "tilt", "condition")
+"""Roles of an angle, a position or a condition, which a finding names by its channel."""
 
 
 @dataclass(frozen=True)
@@ -291,9 +291,9 @@ def variables_of(candidate: Candidate) -> tuple[str, ...]:
     if isinstance(cause, Function):
         return names(cause.place, cause.variables)
     found = [
-        name_of_channel(channel) if role in ANGLES_OF_ROLE else VARIABLE_OF_ROLE[role]
+        name_of_channel(channel) if role in BY_CHANNEL else VARIABLE_OF_ROLE[role]
         for role, channel in cause.channels
-        if role in ANGLES_OF_ROLE or role in VARIABLE_OF_ROLE
+        if role in BY_CHANNEL or role in VARIABLE_OF_ROLE
     ]
     if cause.family == "friction.dwell":
         found = ["dwell" if v == "time" else v for v in found]

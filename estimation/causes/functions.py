@@ -140,8 +140,10 @@ def at_other_contacts(layout: Layout, function: Function) -> Iterator[Function]:
     """Yield a function of dwell whose contact ages or wears between the values that were tried."""
     if function.contact is None or not {*function.variables} <= OF_CONTACT:
         return
+    least = np.min(_contacts(layout, function.place), axis=0)
     for contact in next_to(function.contact):
-        yield _function(layout, function.place, function.variables, contact)
+        if np.all(contact >= least):  # one without a memory is a curve over speed
+            yield _function(layout, function.place, function.variables, contact)
 
 
 def _contacts(layout: Layout, place: Place) -> list[Contact]:

@@ -10,6 +10,7 @@ import numpy as np
 from estimation.campaign import Campaign
 from estimation.causes.equations import Equation, equation_of
 from estimation.causes.run_signals import LEAST, LayoutError, RunSignals, signals_of_run
+from estimation.channels import unit_or_none
 from estimation.derived import CAMPAIGN_TIME, measured_channels
 from estimation.errors import EstimationError
 from estimation.filters import FilterError
@@ -35,6 +36,7 @@ class Layout:
         shaken: The runs once more with each reading's noise added to it a second time, in the same
             order, instruments included: how a column follows noise. Filled with the instruments.
         independent: Pairs of an effort and an equation that has it from other sensors than its own.
+        conditions: Stated conditions that differ between the runs, channels of every run.
         undecided: Declared equation that is not laid out to the reason.
         left_out: Run without enough samples of some equation to the reason.
     """
@@ -44,6 +46,7 @@ class Layout:
     measured: tuple[str, ...]
     shaken: list[RunSignals] = field(default_factory=list)
     independent: set[tuple[str, str]] = field(default_factory=set)
+    conditions: tuple[str, ...] = ()
     undecided: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
 
@@ -71,14 +74,15 @@ def lay_out(
         LayoutError: No run has samples enough to regress on.
         FitError: An equation cannot be identified.
     """
-    timed = on_one_clock(recordings)
+    timed = prepared(recordings)
     campaign = Campaign.of([r for r in timed if r.name in set(train)])
     read = {c for m in models for c in measured_channels([*m.channels, m.target], m.signals)}
+    columns = [n for n in shared_columns(timed) if n != CAMPAIGN_TIME]
+    stated = [n for n in columns if n not in read and all(n in r.conditions for r in timed)]
     measured = tuple(
-        n
-        for n in shared_columns(timed)
-        if n != CAMPAIGN_TIME and (n in read or all(_is_whole(r, n) for r in timed))
+        n for n in columns if n not in stated and (n in read or all(_is_whole(r, n) for r in timed))
     )
+    differ = tuple(n for n in stated if len({r.conditions[n] for r in timed}) > 1)
     equations: dict[str, Equation] = {}
     undecided: dict[str, EstimationError] = {}
     for model in models:
@@ -110,7 +114,7 @@ def lay_out(
         raise next(iter(undecided.values()))
     runs, lost = _laid_out(timed, equations, measured)
     reasons = {name: str(error) for name, error in undecided.items()}
-    return Layout(equations, runs, measured, undecided=reasons, left_out=lost)
+    return Layout(equations, runs, measured, conditions=differ, undecided=reasons, left_out=lost)
 
 
 def _is_whole(recording: Recording, channel: str) -> bool:
@@ -127,7 +131,7 @@ def laid_out_like(layout: Layout, recordings: Sequence[Recording]) -> Layout:
     Raises:
         LayoutError: All of them are.
     """
-    runs, lost = _laid_out(on_one_clock(recordings), layout.equations, layout.measured)
+    runs, lost = _laid_out(prepared(recordings), layout.equations, layout.measured)
     return Layout(layout.equations, runs, layout.measured, left_out=lost)
 
 
@@ -158,8 +162,26 @@ def _thinned(run: RunSignals, every: int) -> RunSignals:
     return replace(run, grid=run.grid[::every], used=used)
 
 
-def on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
-    """Return the runs with the campaign's time; where no start is known they follow one another."""
+def prepared(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the runs, by their start, with the campaign's time and their conditions as channels.
+
+    Where no start is known they follow one another. Conditions are those that are numbers in a
+    stated unit.
+    """
+    return [_with_conditions(recording) for recording in _on_one_clock(recordings)]
+
+
+def _with_conditions(recording: Recording) -> Recording:
+    return recording.with_columns(
+        **{
+            name: np.full(len(recording), value)
+            for name, value in recording.conditions.items()
+            if isinstance(value, (int, float)) and unit_or_none(name) and name not in recording
+        }
+    )
+
+
+def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:
     known = Campaign.of(recordings).timed()
     timed = list(known.evidence)
     if all(CAMPAIGN_TIME in r for r in timed):

@@ -42,7 +42,14 @@ NOT_A_LOSS = (
 )
 OF_KIND: Mapping[str, tuple[str, ...]] = {
     "lever": ("eccentric.load.pulley",),
-    "actuator": ("motor.", "ripple.current", "sensor.delay", "sensor.gain_nonlinear"),
+    "actuator": (
+        "motor.",
+        "ripple.current",
+        "sensor.delay",
+        "sensor.gain_nonlinear",
+        "sensor.drift",
+        "change.step.offset",
+    ),
     "deflection": (
         "coupling.kinematic",
         "transmission.",
@@ -54,6 +61,7 @@ OF_KIND: Mapping[str, tuple[str, ...]] = {
     "torque sensor": (
         "sensor.gain_nonlinear",
         "sensor.drift",
+        "sensor.thermal",
         "sensor.creep",
         "sensor.lag",
         "sensor.delay",
@@ -103,6 +111,9 @@ OF_FEW = (
 
 OF_ANY_ORDER = ("ripple.motor", "ripple.output", "ripple.current", "eccentric.load")
 """Waves that a shaft may make which turns by another ratio; an encoder is on its own shaft."""
+
+ZEROS = ("sensor.drift", "change.step.offset")
+"""Changes of a zero or of a constant force: of a drive that is an equation's target."""
 
 SERIES = ("inertia.position.harmonics",)
 """Effects of several harmonics of one turn: over less than a turn these are nearly the same."""
@@ -204,6 +215,8 @@ def _acts(layout: Layout, effect: Effect, place: Place) -> bool:
         return False  # a drive that is stated as a force has a sensor's place, too
     if (place.home, place.kind) == ("calibration.encoder", "deflection"):
         return False  # slower than a count a sample, the pattern of the counts passes for a bend
+    if place.kind == "actuator" and effect.id.startswith(ZEROS):
+        return layout.equations[place.home].target in place.roles["current"]
     is_known = kind in KNOWN and any(name in layout.measured for name in SENSORS)
     if effect.family in OF_FEW and is_known and kind not in effect.balances:
         return False  # a wrapped cable or a linkage, not a shaft in its bearings

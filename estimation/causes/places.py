@@ -77,6 +77,10 @@ class Place:
         return tuple(dict.fromkeys(entry.equation for entry in self.enters))
 
 
+WARMED = ("loss", "actuator", "deflection", "torque sensor")
+"""Kinds of places whose effects may follow a measured temperature."""
+
+
 def places_of(layout: Layout) -> list[Place]:
     """Return every place the declared equations know of."""
     found = []
@@ -94,10 +98,12 @@ def places_of(layout: Layout) -> list[Place]:
             found += [_behind(layout, sensor, *both, angles), *_levers(sensor, *both, angles)]
     found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
     warmth = tuple(n for n in signals.temperatures if n in layout.measured)
-    if warmth:
-        for k, place in enumerate(found):
-            if place.kind in ("loss", "actuator"):
-                found[k] = replace(place, roles={**place.roles, "temperature": warmth})
+    for k, place in enumerate(found):
+        if warmth and place.kind in WARMED:
+            place = replace(place, roles={**place.roles, "temperature": warmth})
+        if layout.conditions and place.kind == "loss":
+            place = replace(place, roles={**place.roles, "condition": layout.conditions})
+        found[k] = place
     return found
 
 
@@ -219,18 +225,25 @@ def _is_difference(equation: Equation, channel: str) -> bool:
 
 def _actuators(equation: Equation, angles: Sequence[str]) -> Iterator[Place]:
     """Yield the places of the actuators that an equation reads as terms or as its target."""
-    read = [t.channels["source"] for t in equation.terms if t.effect.id == "motor.torque_constant"]
-    is_driven = equation.target in equation.model.signals.actuators
+    stated = equation.model.signals.actuators
+    read = {
+        channel: term.sign
+        for term in equation.terms
+        for channel in term.channels.values()
+        if channel in stated or term.effect.id == "motor.torque_constant"
+    }
+    is_driven = equation.target in stated
     if not read and not is_driven and (equation.of_angle or equation.target.endswith(EFFORTS)):
         return
-    for current in dict.fromkeys(read) or [equation.target]:
+    driven = {equation.target: -1.0} if is_driven or not read else {}
+    for current in (*read, *driven):
         roles = _shared(angles, _position(angles, next(iter(angles), ""))) | {
             "current": (current,),
             "drive": (current,),
             "reading": (current,),
         }
         share = abs(equation.channels.get(current, 0.0)) or 1.0  # amplitudes are of the constant's
-        enters = (Entry(equation.name, share if read else -1.0),)
+        enters = (Entry(equation.name, driven.get(current) or read[current] * share),)
         yield Place(f"actuator {current}", "actuator", equation.name, enters, roles)
 
 

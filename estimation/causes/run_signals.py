@@ -116,6 +116,8 @@ def signals_of_run(
     )
     noise = {n: np.array(random[n])[::step] for n in dict.fromkeys(wanted) if n not in CLOCKS}
     channels[CAMPAIGN_TIME] = np.array(recording[CAMPAIGN_TIME])[::step]
+    stated = [n for n in recording.conditions if n in recording and n not in channels]
+    channels.update({name: recording[name][::step] for name in stated})
     channels["time_s"] = (recording.time_s - recording.time_s[0])[::step]
     rate_hz = recording.sample_rate_hz / step
     used = {}

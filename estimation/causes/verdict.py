@@ -25,7 +25,7 @@ from estimation.causes.findings import (
 )
 from estimation.causes.held_out import HeldOut
 from estimation.causes.instruments import add_instruments
-from estimation.causes.layout import Layout, lay_out, on_one_clock
+from estimation.causes.layout import Layout, lay_out, prepared
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.causes.refit import Addition, that_falls
@@ -85,7 +85,7 @@ def answer(
     """
     began = time.perf_counter()
     on_stage("fitting the declared equations")
-    timed = on_one_clock(recordings)
+    timed = prepared(recordings)
     layout, sealed, wrong = _without_wrong_runs(models, timed, sealed, numbers)
     kept_names = {run.name for run in layout.runs}
     timed = [r for r in timed if r.name in kept_names]

@@ -58,10 +58,13 @@ def flagged(recordings: Sequence[Recording]) -> list[str]:
 def audit(recordings: Sequence[Recording], read: Set[str] = frozenset()) -> list[str]:
     """Return the limits that the clocks and the conditions of used runs set, one sentence each.
 
-    What an effect that was found reads is not a limit: between runs it was decided.
+    What an effect that was found reads is not a limit: between runs it was decided. Stated
+    conditions compete with it.
     """
     said = _skipping(recordings)
-    others = [name for name in shared_columns(recordings) if name not in {*read, *CLOCKS}]
+    stated = {name for recording in recordings for name in recording.conditions}
+    passed = {*read, *stated, *CLOCKS}
+    others = [name for name in shared_columns(recordings) if name not in passed]
     return said + [line for name in others if (line := _held(name, recordings))]
 
 

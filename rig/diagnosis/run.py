@@ -14,7 +14,7 @@ import numpy as np
 from estimation.arm.balances import declared_arm
 from estimation.arm.shared import laid_out
 from estimation.campaign import Campaign
-from estimation.causes.layout import on_one_clock
+from estimation.causes.layout import prepared
 from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.audit import flagged, steady
@@ -71,7 +71,7 @@ def run_diagnosis(
     if arm is not None:
         on_stage("fitting the links that all joints share")
         recordings = laid_out(arm, recordings, sealed.discover)
-    recordings = on_one_clock(recordings)
+    recordings = prepared(recordings)
     found = answer(recordings, asked.models, sealed, on_stage=on_stage)
     proposed = None
     if not quick:

@@ -61,6 +61,7 @@ class LiveEstimator:
             interval = estimator.interval
             self.usual_half_width = interval.typical if interval is not None else None
         self.is_of_simulation = origin is not None and origin.is_simulated  # as far as stated
+        self._constant = {n: float(x) for n, x in conditions.items() if not isinstance(x, str)}
         self.target_channel = estimator.target
         self.stream: Stepper = estimator.stepper(sample_rate_hz)
 
@@ -78,19 +79,21 @@ class LiveEstimator:
     def push(self, columns: Mapping[str, FloatArray], time_s: FloatArray) -> FloatArray:
         """Return the estimate of the next samples, shape (n,); NaN until the filters have settled.
 
-        A stream that begins in motion begins with a step in the derivatives.
+        A stream that begins in motion begins with a step in the derivatives. A condition of the run
+        is a channel of one value.
 
         Raises:
             MissingChannelError: The stream lacks a channel that the model needs.
         """
-        absent = [name for name in self.stream.channels if name not in columns]
-        if absent:
+        lacking = [name for name in self.stream.channels if name not in columns]
+        stated = {n: np.full(len(time_s), x) for n, x in self._constant.items() if n in lacking}
+        if absent := [name for name in lacking if name not in stated]:
             raise MissingChannelError(
                 f"The model needs {', '.join(absent)}, and the stream has no such channel.",
                 f"It has: {', '.join(columns) or 'none'}.",
                 "Choose another with --model or `rig model use`; `rig model reset` undoes that.",
             )
-        estimate = self.stream.step(time_s, columns)
+        estimate = self.stream.step(time_s, {**columns, **stated})
         if math.isnan(self._began_s) and len(time_s):
             self._began_s = float(time_s[0])
         return np.where(time_s - self._began_s < self._settles_s, np.nan, estimate)
@@ -125,7 +128,7 @@ def with_estimates(recording: Recording, path: Path) -> Recording:
     An EstimationError, too, where it is of another instrument or lacks a channel.
     """
     estimated = {}
-    for estimator in estimators_of(path, recording.sample_rate_hz):
+    for estimator in estimators_of(path, recording.sample_rate_hz, recording.conditions):
         require_own(estimator.instrument, recording)
         name = f"{ESTIMATED}{estimator.target_channel}"
         values = estimator.push(recording.columns, recording.time_s)

@@ -5,7 +5,7 @@ import math
 import sys
 from collections.abc import Sequence
 
-from estimation.channels import PLAIN_UNIT
+from estimation.channels import PLAIN_UNIT, unit_or_none
 from estimation.diagnosis.result import Diagnosis, Finding, Value, is_unexplained
 from estimation.effects import catalogue
 from estimation.plant_models import WORDS
@@ -139,7 +139,9 @@ def _named(finding: Finding) -> str:
 def meaning_of(finding: Finding) -> str:
     """Return the meaning of the form that was found, in plain words; empty without a name."""
     known = catalogue().get(finding.form)
-    return (known.meaning if known else "") or meaning(finding.family)
+    plain = (known.meaning if known else "") or meaning(finding.family)
+    condition = next((n for n in finding.depends_on if unit_or_none(n)), "its condition")
+    return plain.replace("a stated condition of the runs", condition)
 
 
 def meaning(name: str) -> str:

@@ -11,9 +11,10 @@ import pytest
 from estimation import model_file
 from estimation.bank.states import Bank
 from estimation.campaign import Campaign
+from estimation.effects import effect
 from estimation.estimators.bank import BankRecipe
 from estimation.fitting import fit
-from estimation.model import predict
+from estimation.model import Estimate, Term, predict
 from estimation.recording import MissingChannelError, Recording
 from rig.configuration.config import SHIPPED
 from rig.diagnosis.subject import subject
@@ -103,6 +104,22 @@ def test_a_channel_the_model_lacks_is_named(model_path):
     (estimator,) = estimators_of(model_path, 1000.0)
     with pytest.raises(MissingChannelError, match="motor_current_a"):
         list(replay_blocks(run, [estimator], speed=None))
+
+
+def test_a_condition_of_the_run_is_a_channel_of_one_value(motor, tmp_path):
+    estimator, run = motor
+    channels = {"speed": "motor_velocity_rad_s", "condition": "payload_kg"}
+    values = {"slope": Estimate(0.05), "width": Estimate(0.5)}
+    model, path = estimator().model, tmp_path / "loaded.toml"
+    term = Term(effect("friction.condition"), channels=channels, values=values)
+    model_file.write(replace(model, terms=(*model.terms, term)), path)
+    (stated,) = estimators_of(path, run.sample_rate_hz, {"payload_kg": 2.0})
+    (read,) = estimators_of(path, run.sample_rate_hz)
+    columns = {**run.columns, "payload_kg": np.full(len(run), 2.0)}
+    expected = read.push(columns, run.time_s)
+    np.testing.assert_array_equal(stated.push(run.columns, run.time_s), expected)
+    plain = estimator().push(run.columns, run.time_s)
+    assert np.nanmax(np.abs(plain - expected)) > 0.05
 
 
 def test_a_state_estimator_runs_live_as_offline(tmp_path):

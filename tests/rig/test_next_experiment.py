@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from estimation.causes.experiment import question
-from estimation.causes.layout import on_one_clock
+from estimation.causes.layout import prepared
 from estimation.causes.verdict import Answer, answer
 from estimation.diagnosis.split import split
 from estimation.recording import Recording
@@ -33,7 +33,7 @@ PATIENCE_S = 120.0
 
 @pytest.fixture(scope="module")
 def rippled() -> list[Recording]:
-    return on_one_clock(record(HiddenEffect("motor_ripple", 1.0)))
+    return prepared(record(HiddenEffect("motor_ripple", 1.0)))
 
 
 @pytest.fixture(scope="module")

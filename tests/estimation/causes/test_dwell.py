@@ -7,8 +7,8 @@ from scipy import signal
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.split import split
 from estimation.effects import effect
-from estimation.recording import Recording
-from tests.estimation.causes.synthetic import axis
+from estimation.recording import FloatArray, Recording
+from tests.estimation.causes.synthetic import axis, turning
 
 RATE_HZ, SECONDS = 250.0, 10.0
 
@@ -54,3 +54,13 @@ def test_nothing_depends_on_dwell_where_no_run_rests() -> None:
     findings = diagnose(runs, [axis()], split(runs)).findings
     assert findings
     assert not [f for f in findings if "dwell" in f.depends_on or f.family == "friction.dwell"]
+
+
+@pytest.mark.parametrize("at_rad_s", [0.3, 0.8])
+def test_a_curve_over_speed_does_not_depend_on_dwell(at_rad_s: float) -> None:
+    def extra(_: FloatArray, speed: FloatArray, __: FloatArray) -> FloatArray:
+        return 0.1 * np.exp(-(((np.abs(speed) - at_rad_s) / 0.12) ** 2)) * np.tanh(speed / 0.02)
+
+    runs = turning(extra)
+    (finding,) = diagnose(runs, [axis()], split(runs)).findings
+    assert "dwell" not in finding.depends_on
