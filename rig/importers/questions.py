@@ -53,6 +53,9 @@ COLDEST_K, HOTTEST_K = 200.0, 600.0
 PLATEAU = 3
 """Equal samples in a row that make a plateau."""
 
+ENTRY = 6
+"""Samples before a plateau of which the largest step counts."""
+
 CLIPPED = 0.005
 """Share of the samples on abrupt plateaus at an end of the range that is remarked on."""
 
@@ -296,8 +299,8 @@ def _held(values: FloatArray, end: float, abrupt: float) -> int:
     held = 0
     for first, stop in at.reshape(-1, 2):
         if stop - first >= PLATEAU and first >= 2:
-            # the step before the last one: the last is cut short by the limit itself
-            entered = abs(values[first - 1] - values[first - 2])
+            # without the last step, which the limit itself cuts short; by noise, one may be small
+            entered = float(np.abs(np.diff(values[max(first - ENTRY, 0) : first])).max())
             held += int(stop - first) if entered >= abrupt and entered > 0 else 0
     return held
 

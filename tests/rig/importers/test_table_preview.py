@@ -136,6 +136,16 @@ def test_a_channel_that_is_clipped_in_some_runs_is_named_with_them(tmp_path):
     assert "held at the greatest value, 0.8 N in run2; is it clipped?" in found
 
 
+def test_a_noisy_channel_that_is_clipped_is_asked_about(tmp_path):
+    """The step before a plateau is small by chance in some of them."""
+    random = np.random.default_rng(8)
+    force = np.minimum(np.round(WAVE + random.normal(0, 0.01, TIME.size), 3), 0.9)
+    text_table(tmp_path / "run.csv", {"time_s": TIME, "load_force_n": force})
+    (found,) = asked(tmp_path)
+    share = 100 * np.mean(force == 0.9)
+    assert float(found.split()[1]) == pytest.approx(share, rel=0.15)
+
+
 def test_a_temperature_that_is_read_in_whole_degrees_is_not_clipped(tmp_path):
     random = np.random.default_rng(0)
     for number in range(4):
