@@ -17,14 +17,17 @@ from estimation.campaign import Campaign
 from estimation.causes.layout import prepared
 from estimation.causes.refits import Refits
 from estimation.causes.verdict import Answer, answer
+from estimation.derived import measured_channels
 from estimation.diagnosis.audit import flagged, steady
 from estimation.diagnosis.split import cut_and_split, path_of, period_of
 from estimation.plant_check import offsets_note
+from estimation.plant_equations import integrals
 from estimation.recording import FloatArray, Recording
 from rig.diagnosis.ledger import Ledger, Look, look_at
 from rig.diagnosis.propose import propose
 from rig.diagnosis.subject import Subject
-from rig.importers.questions import doubts
+from rig.importers.apart import spoiled
+from rig.importers.questions import doubts, without
 from rig.output.table import counted
 
 LEAST_SHARED = 200
@@ -62,6 +65,9 @@ def run_diagnosis(
     ledger.check()
     on_stage("reading the recordings")
     whole, lost = steady(list(asked.campaign.evidence))
+    bad = _spoiled(asked, whole)
+    whole = [recording for recording in whole if recording.name not in bad]
+    lost += [f"Run {name} is left out: {reason}." for name, reason in bad.items()]
     for reason in lost:
         on_stage(reason)
     known = ledger.known(whole)
@@ -96,6 +102,17 @@ def run_diagnosis(
         quick=quick,
     )
     return replace(found, diagnosis=diagnosis), look_at(whole, sealed)
+
+
+def _spoiled(asked: Subject, recordings: Sequence[Recording]) -> dict[str, str]:
+    """Return the runs in which a recorded channel of an equation is surely wrong, and how."""
+    integral_of = {} if asked.plant is None else integrals(asked.plant)
+    read = {
+        integral_of.get(name, name)
+        for model in asked.models
+        for name in measured_channels([*model.channels, model.target], model.signals)
+    }
+    return spoiled(without(recordings, integral_of), read)
 
 
 def noise_floors(refits: Refits, recordings: Sequence[Recording]) -> dict[str, float | None]:

@@ -4,7 +4,7 @@ Each is a question in words. A channel is compared with itself in the other runs
 is alike in most of them.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +31,9 @@ LEAST = 100
 
 CONSTANT = "and varies in the other runs; is the sensor connected and within its range"
 """What is asked of a channel that has one value in a run."""
+
+EFFORTS, TINY = ("N", "N m", "A"), 1e-300
+"""Units of what a machine that moves never holds exactly, and a divisor in place of zero."""
 
 POSITIONS, MOTIONS = ("rad", "m"), ("rad", "m", "rad/s", "m/s", "rad/s^2", "m/s^2")
 """Units of which the rate counts, and those of motion: two motions may be independent."""
@@ -61,8 +64,51 @@ def in_another_unit(recordings: Sequence[Recording]) -> Iterator[str]:
             continue
         yield (
             f"{name}: it varies {places[0][1]:.3g} times as much{how} in {where} as in the other"
-            f" runs, and other channels as usual; {unit or 'are unit and gain right'} there?"
+            f" runs, and other channels as usual;"
+            f" {f'is it {unit}' if unit else 'are unit and gain right'} there?"
         )
+
+
+def spoiled(recordings: Sequence[Recording], read: Collection[str]) -> dict[str, str]:
+    """Return the runs that cannot be used as they are, each with what is wrong with it in words.
+
+    A channel that is read surely has another unit there: its size and its noise are both beyond
+    those of all other runs, and one of the two is so by far. Or a force, a torque or a current has
+    one value there that is not zero: a machine that coasts has none.
+    """
+    runs: dict[tuple[str, str], dict[str, float]] = {}
+    for measure in (_spread, _noise):
+        compared = recordings if measure is _spread else _at_one_rate(recordings)
+        for name, unit, run, ratio in _apart(compared, measure):
+            if name in read and unit and not _is_explained(name, run, ratio, recordings):
+                runs.setdefault((name, unit), {}).setdefault(run, ratio)
+    found: dict[str, str] = {}
+    for (name, unit), ratios in runs.items():
+        own = [recording for recording in recordings if recording.name in ratios]
+        rest = [recording for recording in recordings if recording.name not in ratios]
+        if unit == CONSTANT:
+            held = [r.name for r in own if unit_of(name) in EFFORTS and r[name][r.valid][0] != 0.0]
+            found |= dict.fromkeys(held, f"{name} is constant there, and varies in the other runs")
+        elif rest and _is_beyond(name, own, rest):
+            found |= {
+                run: f"{name} varies {ratio:.3g} times as much there as in the other runs, so it is"
+                f" probably {unit}; correct the unit in it to use it"
+                for run, ratio in ratios.items()
+            }
+    return found
+
+
+def _is_beyond(name: str, own: Sequence[Recording], rest: Sequence[Recording]) -> bool:
+    """Whether a channel's size and noise are both beyond those of other runs, one of them by far.
+
+    A run that moves less, or faster, is beyond them in one of the two, or by little.
+    """
+    beyond = []
+    for measure in (_spread, _noise):
+        ours, others = ([measure(r, name) for r in runs] for runs in (own, rest))
+        larger, smaller = min(ours) / max(*others, TINY), min(others) / max(*ours, TINY)
+        beyond.append((larger, smaller))
+    return any(min(gaps) > 1.0 and max(gaps) > FAR for gaps in zip(*beyond, strict=True))
 
 
 def _is_explained(name: str, run: str, ratio: float, recordings: Sequence[Recording]) -> bool:
@@ -95,7 +141,7 @@ def _at_one_rate(recordings: Sequence[Recording]) -> list[Recording]:
 def _apart(
     recordings: Sequence[Recording], measure: Callable[[Recording, str], float]
 ) -> Iterator[tuple[str, str, str, float]]:
-    """Yield channel, question about its unit or nothing, run, and ratio to the usual measure."""
+    """Yield channel, what its unit probably is or nothing, run, and ratio to the usual measure."""
     recordings = [recording for recording in recordings if recording.valid.any()]
     ratios = {}
     for name in shared_columns(recordings) if recordings else ():
@@ -157,9 +203,9 @@ def _unit(name: str, ratio: float, ratios: FloatArray) -> str:
         if (size := conversion(unit, name)) is None:
             continue
         if _within(ratio, size.factor, allowed):
-            return f"is it stated in {unit} without being so"
+            return f"stated in {unit} without being so"
         if _within(ratio, 1 / size.factor, allowed):
-            return f"is it in {unit}"
+            return f"in {unit}"
     return ""
 
 

@@ -4,8 +4,9 @@
 tables and of logs. Samples that are flagged do not count. Nothing is corrected here.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -82,7 +83,15 @@ def questions(recordings: Sequence[Recording], plant: Plant | None = None) -> li
         f"{n}: {text}" for n in names for text in of_channel(n, recordings, limits.get(n, 0.0))
     ]
     speeds = () if plant is None else of_speeds(recordings, plant)
-    return [*found, *speeds, *of_runs(recordings)]
+    return [*found, *speeds, *of_runs(without(recordings, derived))]
+
+
+def without(recordings: Sequence[Recording], names: Collection[str]) -> list[Recording]:
+    """Return recordings without some channels, such as those that follow from others."""
+    return [
+        replace(r, columns={n: v for n, v in r.columns.items() if n not in names})
+        for r in recordings
+    ]
 
 
 def doubts(recordings: Sequence[Recording], plant: Plant | None) -> list[str]:

@@ -103,6 +103,25 @@ def test_a_diagnosis_enters_the_access_log_as_the_command_does(model, tmp_path, 
     assert not apart.exploratory
 
 
+@pytest.mark.integration
+@pytest.mark.parametrize(
+    ("factor", "left_out"),
+    [(1e-3, "in another unit"), (1e3, "in another unit"), (0.01, "constant"), (0.25, "")],
+)
+def test_a_run_with_a_channel_that_is_surely_wrong_takes_no_part(tmp_path, model, factor, left_out):
+    """Friction hides the factor of a position from an equation that predicts a force."""
+    runs = [axis_run(f"{k}", 0.7 * k) for k in range(8)]
+    for k in (3, 6):
+        force = np.full(len(TIME_S), 1.5) if left_out == "constant" else runs[k]["drive_force_n"]
+        position = (1.0 if left_out == "constant" else factor) * runs[k]["axis_position_m"]
+        runs[k] = runs[k].with_columns(axis_position_m=position, drive_force_n=force)
+    found = rig.diagnose(Campaign.of(runs), [model], ledger=tmp_path / "looks.jsonl")
+    used = {*found.sealed.discover, *found.sealed.confirm}
+    assert {"3", "6"}.isdisjoint(used) == bool(left_out)
+    notes = [note for note in found.notes if note.startswith("Run 3 is left out: ")]
+    assert len(notes) == bool(left_out)
+
+
 def test_two_campaigns_are_compared(campaign, model):
     assert rig.compare(campaign, campaign, [model]).changes == ()
 
