@@ -6,6 +6,8 @@ FACTORS = {
     math.degrees(1.0): "the degrees of a radian",
     2.0 * math.pi: "the radians of a turn",
     360.0: "the degrees of a turn",
+    30.0 / math.pi: "the revolutions a minute of a radian a second",
+    10.0: "a step of ten",
     60.0: "the seconds of a minute",
     25.4: "the millimetres of an inch",
     100.0: "the step from centi, or per cent",
@@ -15,14 +17,14 @@ FACTORS = {
 """Factor between two units to what it is."""
 
 NEAR = 0.03
-"""Share by which a factor may differ from that of two units."""
+"""Share by which a factor may differ from that of two units, unless another is stated."""
 
 
-def unit_factor(factor: float) -> str:
+def unit_factor(factor: float, near: float = NEAR) -> str:
     """Return the two units whose factor, or its inverse, a factor is, in words; else nothing."""
     size = _size(factor)
-    near = min(FACTORS, key=lambda one: abs(size / one - 1.0))
-    return FACTORS[near] if abs(size / near - 1.0) < NEAR else ""
+    nearest = min(FACTORS, key=lambda one: abs(size / one - 1.0))
+    return FACTORS[nearest] if abs(size / nearest - 1.0) < near else ""
 
 
 def off_by(factor: float) -> str:

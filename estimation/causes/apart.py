@@ -15,6 +15,7 @@ from estimation.causes.numbers import Numbers
 from estimation.derived import measured_channels
 from estimation.diagnosis.split import Sealed
 from estimation.recording import FloatArray
+from estimation.unit_factors import unit_factor
 
 FACTOR, UNEXPLAINED = 2.0, 0.1
 """Factor of the prediction of the other runs from which a run is remarked on, and the share of its
@@ -25,9 +26,8 @@ LARGER, MINORITY = 2.0, 0.5
 share of runs that are fewer. Where the equation lacks an effect, its share of a slow or light run
 appears as a factor."""
 
-
-DEGREES, OF_A_UNIT = math.degrees(1.0), 1.1
-"""Degrees of a radian, and the factor within which that of a run is the factor of a unit."""
+OF_A_UNIT = 0.1
+"""Share by which the factor of a run may differ from that of two units."""
 
 
 class Apart(NamedTuple):
@@ -133,14 +133,9 @@ def _is_wrong(one: Apart) -> bool:
 
     A run of an arm whose equation lacks the motion of the other joints may appear reversed.
     """
-    return 1.0 / FACTOR < -one.factor < FACTOR or _is_of_a_unit(one.factor)
-
-
-def _is_of_a_unit(factor: float) -> bool:
-    """Whether a factor is about a power of ten, or the degrees of a radian; none is so near one."""
-    size = abs(math.log(factor)) if factor > 0.0 else 0.0
-    tens = math.log(10.0) * max(round(size / math.log(10.0)), 1)
-    return any(abs(size - whole) < math.log(OF_A_UNIT) for whole in (tens, math.log(DEGREES)))
+    if one.factor < 0.0:
+        return 1.0 / FACTOR < -one.factor < FACTOR
+    return bool(unit_factor(one.factor, OF_A_UNIT))
 
 
 def _joint(layout: Layout, names: Sequence[str], numbers: Numbers) -> Joint:

@@ -59,7 +59,7 @@ def test_a_run_with_a_swapped_sign_is_the_first_note_and_takes_no_part(place: in
     assert found.findings == alone.findings == ()
 
 
-@pytest.mark.parametrize("factor", [1000.0, 0.001, 57.3])
+@pytest.mark.parametrize("factor", [1000.0, 0.001, 57.3, 0.105, 6.28])
 def test_a_run_in_another_unit_takes_no_part_as_one_with_a_swapped_sign(factor: float) -> None:
     runs = turning(lambda angle, speed, acceleration: 0.0 * speed)[:8]
     runs[3] = runs[3].with_columns(crank_torque_n_m=factor * runs[3]["crank_torque_n_m"])

@@ -10,6 +10,7 @@ from scipy.io import savemat
 from estimation.files import write_text_atomic
 from estimation.plant import Axis, Plant, Sensor, Transmission
 from estimation.plant_file import to_toml
+from estimation.recording import Recording
 from rig.errors import ExitCode
 from rig.importers.questions import questions as questions_of
 from rig.importers.registry import left_out, open_campaign
@@ -277,6 +278,20 @@ def test_a_run_in_which_a_channel_is_constant_is_asked_about_as_that(tmp_path):
 )
 def test_a_run_that_moves_less_is_not_asked_about(tmp_path, angles, currents):
     assert of_runs(tmp_path, angles, currents) == []
+
+
+def test_a_position_that_is_the_integral_of_a_speed_is_not_asked_about(tmp_path):
+    """By chance it varies little in a run whose speed varies as usual."""
+    speed = Sensor("drum_velocity_rad_s", "drum", "speed")
+    plant = Plant("drum", axes=(Axis("drum", "rad"),), sensors=(speed,))
+    runs = []
+    for number in range(6):
+        wave = np.sin(TIME * (2 + 0.1 * number))
+        columns = {"motor_supply_v": wave, "drum_velocity_rad_s": wave}
+        columns["drum_angle_rad"] = (0.16 if number == 3 else 1.0) * wave
+        runs.append(Recording(f"run{number}", TIME, columns))
+    assert any(one.startswith("drum_angle_rad: ") for one in questions_of(runs))
+    assert questions_of(runs, plant) == []
 
 
 @pytest.mark.parametrize(
