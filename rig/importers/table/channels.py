@@ -132,7 +132,7 @@ def _by_name(raw: Raw, mapping: ColumnMapping) -> dict[str, Source]:
 
 def _channel(raw: Raw, where: str, name: str, source: Source, edges: Sequence[int]) -> FloatArray:
     """Return a column in SI units; a counter that starts again does so in each run for itself."""
-    found = find(raw, where, name, source.column)
+    found = find(raw, where, name, source.column, source.unit)
     if not isinstance(found, np.ndarray):
         found = np.full(len(raw), found)
     if found.dtype.kind not in "fiub":
@@ -201,7 +201,7 @@ def _unwrapped(values: FloatArray, period: float) -> FloatArray:
 def _condition(raw: Raw, where: str, name: str, source: Source) -> float | str | Values:
     if source.value is not None:
         return source.value
-    found = find(raw, where, name, source.column)
+    found = find(raw, where, name, source.column, source.unit)
     many = found if isinstance(found, np.ndarray) else np.array([found])
     if many.dtype.kind in "US" and unit_or_none(name):
         if raw.decimal == "," and any(has_thousands(str(cell), ",") for cell in many):

@@ -123,9 +123,12 @@ def _each_run(
             runs = _runs_of(file, mapping, remarks, asks)
         except DataError as error:
             if bad is None:
-                if isinstance(error, NoColumnError) and not mapping.data.files and len(files) > 1:
-                    raise DataError(error.what, error.why, _not_this(error, files)) from error
-                raise
+                if not isinstance(error, NoColumnError) or len(files) == 1:
+                    raise
+                kept = f"The files before it have it: give the column that name in {file.name}."
+                fix = kept if taken else error.fix
+                other = "" if mapping.data.files else _not_this(error, files)
+                raise DataError(error.what, error.why, f"{fix}{other}") from error
             bad.append(unreadable("/".join((*folders, file.name)), error))
             continue
         for run in runs:
@@ -152,7 +155,7 @@ def _absent(files: Sequence[Path], mapping: ColumnMapping) -> Iterator[str]:
 
 
 def _not_this(error: NoColumnError, files: Sequence[Path]) -> str:
-    """Return the remedy where a file of a folder is not a recording, after that of its column."""
+    """Return the remedy where a file of a folder is not a recording, after a space."""
     name, kind = error.raw.path.name, error.raw.path.suffix
     letters = zip(*(file.name for file in files if file.name != name), strict=False)
     shared = itertools.takewhile(lambda same: len(set(same)) == 1, letters)
@@ -160,7 +163,7 @@ def _not_this(error: NoColumnError, files: Sequence[Path]) -> str:
     pattern = f"{stem}*{kind}" if not name.startswith(stem) else "PATTERN"
     own = f"; if it states values of each file, side_file = {name!r}"
     own = own if "file" in error.raw.columns else ""
-    return f"{error.fix} If {name} is not a recording, write files = {pattern!r} under [data]{own}."
+    return f" If {name} is not a recording, write files = {pattern!r} under [data]{own}."
 
 
 def _runs_of(

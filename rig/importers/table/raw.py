@@ -16,6 +16,9 @@ from rig.importers.table.units import BASE
 Values = NDArray[np.generic]
 """One column: float64, or text where a cell is not a number."""
 
+Cells = Values | float | str
+"""One column or single value."""
+
 Remark = tuple[str, str]
 """File or run, and what was assumed, left out or filled in there, in words."""
 
@@ -74,8 +77,10 @@ class NoColumnError(DataError):
         super().__init__(what, why, fix)
 
 
-def find(raw: Raw, where: str, key: str, column: str) -> Values | float | str:
+def find(raw: Raw, where: str, key: str, column: str, stated: str | None = None) -> Cells:
     """Return a column or single value of a file by name, for a key of the mapping and its place.
+
+    The unit that the mapping states of it is kept in the remedy.
 
     Raises:
         DataError: The file has neither.
@@ -93,11 +98,12 @@ def find(raw: Raw, where: str, key: str, column: str) -> Values | float | str:
             f"Write {key} = '{name}:UNIT', or the column alone where it is in SI units.",
         )
     near = raw.nearest(column)
+    source = repr(f"{near}:{stated}" if stated else near)
     raise NoColumnError(
         raw,
         f"{where}: {raw.path.name} has no column {column!r} for {key}.",
         raw.listing(),
-        f"Did you mean {near!r}? Write {key} = {near!r}." if near else "Correct the name.",
+        f"Did you mean {near!r}? Write {key} = {source}." if near else "Correct the name.",
     )
 
 

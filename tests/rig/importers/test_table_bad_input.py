@@ -42,7 +42,14 @@ def refused(folder, *given, **more):
 
 ANGLE = "motor_angle_rad"
 MAPPINGS = {
-    "a column that is not there": ("angle:deg", "angel:deg", 5, "'angel'", "mean 'angle'?"),
+    "a column that is not there": (
+        "angle:deg",
+        "angel:deg",
+        5,
+        "'angel'",
+        "mean 'angle'?",
+        "= 'angle:deg'",
+    ),
     "a unit of another travel": ("angle:deg", "angle:mm", 5, "'mm' is not a unit", "motor_angle_m"),
     "a unit of another speed": (
         *(f'{ANGLE} = "angle:deg"', 'motor_velocity_rad_s = "angle:mm/s"'),
@@ -373,6 +380,16 @@ def test_a_file_of_a_folder_that_is_not_a_recording_is_left_out_by_the_line_name
     with pytest.raises(DataError) as error:
         open_table(tmp_path, read_mapping(tmp_path / "bench.toml", []))
     assert words in error.value.fix
+
+
+def test_a_column_that_one_file_of_several_calls_otherwise_is_to_be_renamed_there(tmp_path):
+    """To name it in the mapping would break the files before it."""
+    for name, column in (("a", "angle"), ("b", "angel")):
+        (tmp_path / f"{name}.csv").write_text(TABLE.replace("angle", column))
+    (tmp_path / "bench.toml").write_text(GOOD + '[data]\nfiles = "*.csv"\n')
+    with pytest.raises(DataError) as error:
+        open_table(tmp_path, read_mapping(tmp_path / "bench.toml", []))
+    assert error.value.fix == "The files before it have it: give the column that name in b.csv."
 
 
 def test_files_and_runs_that_cannot_be_read_are_left_out_where_asked(tmp_path):
