@@ -13,6 +13,7 @@ from estimation.causes.refits import Refits
 from estimation.causes.scoring import Scored, posterior
 from estimation.causes.sources import LATE, Source
 from estimation.causes.unsteady import Unsteady
+from estimation.channels import ending_of
 from estimation.diagnosis.result import Finding, Value
 from estimation.effects import Proportional
 from estimation.model import Model, Term
@@ -41,6 +42,9 @@ VARIABLE_OF_ROLE: Mapping[str, str] = {
 
 BY_CHANNEL = ("position", "output_angle", "motor_angle", "encoder", "stop", "tilt", "condition")
 """Roles of an angle, a position or a condition, which a finding names by its channel."""
+
+OTHER_ROLES = ("other_reading", "other_angle", "other_torque")
+"""Roles of a quantity of elsewhere, which a finding names by its channel without the unit."""
 
 
 @dataclass(frozen=True)
@@ -290,11 +294,7 @@ def variables_of(candidate: Candidate) -> tuple[str, ...]:
     cause = candidate.cause
     if isinstance(cause, Function):
         return names(cause.place, cause.variables)
-    found = [
-        name_of_channel(channel) if role in BY_CHANNEL else VARIABLE_OF_ROLE[role]
-        for role, channel in cause.channels
-        if role in BY_CHANNEL or role in VARIABLE_OF_ROLE
-    ]
+    found = [name for role, channel in cause.channels if (name := _variable(role, channel))]
     if cause.family == "friction.dwell":
         found = ["dwell" if v == "time" else v for v in found]
     follows_speed = cause.effect.id.endswith(".viscous") or cause.family.endswith(
@@ -303,6 +303,15 @@ def variables_of(candidate: Candidate) -> tuple[str, ...]:
     if cause.family.startswith("friction.") and not follows_speed:
         found = ["velocity_sign" if v == "velocity" else v for v in found]
     return tuple(dict.fromkeys(found))
+
+
+def _variable(role: str, channel: str) -> str:
+    """Return the variable that a finding names for a channel in a role; empty for none."""
+    if role in BY_CHANNEL:
+        return name_of_channel(channel)
+    if role in OTHER_ROLES:
+        return channel.removesuffix(f"_{ending_of(channel)}")
+    return VARIABLE_OF_ROLE.get(role, "")
 
 
 def _same(one: Term, other: Term) -> bool:

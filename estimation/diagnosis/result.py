@@ -33,8 +33,8 @@ VARIABLES = [
     "wrist_pitch",
     "wrist_roll",
 ]
-"""Variables that a finding may depend on; besides these, `joint_N` of an arm, and angles and
-positions by the name of their channel, such as `spindle_angle`."""
+"""Variables that a finding may depend on; besides these, `joint_N` of an arm, and angles, positions
+and what a sensor responds to by the name of their channel, such as `spindle_angle`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from estimation.causes.findings import BY_CHANNEL, VARIABLE_OF_ROLE, Kept
+from estimation.causes.findings import BY_CHANNEL, OTHER_ROLES, VARIABLE_OF_ROLE, Kept
 from estimation.causes.functions import Function
 from estimation.causes.verdict import Answer
 from estimation.cross_validation import live_half_width
@@ -99,7 +99,7 @@ def _channels(kept: Kept, most: int = 2) -> tuple[str, ...]:
     if isinstance(cause, Function):
         read: Sequence[str] = cause.reads
     else:
-        named = (*BY_CHANNEL, *VARIABLE_OF_ROLE)
+        named = (*BY_CHANNEL, *OTHER_ROLES, *VARIABLE_OF_ROLE)
         read = [channel for role, channel in cause.channels if role in named]
     return tuple(dict.fromkeys(c for c in read if c != "time_s"))[:most]
 

@@ -127,6 +127,8 @@ def _named(finding: Finding) -> str:
     if finding.confidence is not None:
         sizes.append(f"confidence {confidence(finding.confidence)}")
     plain = meaning_of(finding)
+    if finding.family == "sensor.crosstalk" and finding.depends_on:
+        plain += f", the {variables_of(finding)}"
     where = f" ({finding.place})" if finding.place != finding.balance else ""
     named = f"[{finding.family}]{where}" + (f", {', '.join(sizes)}" if sizes else "")
     if finding.family in WORDS:

@@ -151,6 +151,14 @@ def test_sizes_are_those_of_the_wave_and_in_readable_units(along, repeats):
     assert "lead of the screw, the pitch of the belt" in check_of(finding)
 
 
+def test_a_crosstalk_is_stated_with_the_quantity_that_the_sensor_responds_to():
+    share = {"share": Value(0.5, "N m/rad", None)}
+    place = "sensor link_torque_n_m"
+    finding = found("sensor.crosstalk", place=place, depends_on=("link_angle",), parameters=share)
+    (said,) = sentences(diagnosis(finding, unit={"motor": "N m"}))
+    assert "responds to another measured quantity, the link angle [sensor.crosstalk]" in said
+
+
 def test_a_zero_that_settles_far_beyond_a_run_is_stated_with_the_rate_at_which_it_begins():
     """Of short runs the size and the time are known by their quotient alone."""
     finding = Finding(

@@ -619,6 +619,7 @@ def test_crosstalk_has_the_size_of_the_equation_that_identifies_it() -> None:
     ]
     finding = _only(runs, motor(), gearbox())
     assert (finding.family, finding.error_of) == ("sensor.crosstalk", "gearbox")
+    assert finding.depends_on == ("motor_current",)
     assert finding.parameters["share"].value == pytest.approx(0.1, rel=0.1)
 
 
