@@ -12,7 +12,7 @@ from estimation.plant_models import WORDS
 from rig.output.table import counted
 
 NO_NEXT = "None is proposed: no named hypotheses compete."
-PART_OF_THE_NAME = "half the ", "share of a load of "
+PART_OF_THE_NAME = "half the ", "share of a load of ", "fall of the ", "loss at the start "
 """What the description of a parameter begins with whose number is misread without it."""
 
 SETTLING = {"sensor.drift.exponential": "time_constant", "sensor.drift.campaign": "time"}
@@ -99,6 +99,8 @@ def _claim(finding: Finding) -> str:
     also = f"; also possible: {others}; these runs cannot distinguish them" if others else ""
     if finding.verdict == "one_of":
         none = f", and no effect at all has {finding.no_effect:.0%}" * (finding.no_effect >= 0.01)
+        if finding.no_effect > (finding.confidence or 0.0):  # of all names together, less
+            none += f", next to {1.0 - finding.no_effect:.0%} of all effects together"
         return _named(finding) + (also or "; these runs are not enough to be sure of it") + none
     if finding.verdict == "depends_on":
         return f"unmodelled effect of unknown form; it depends on {variables_of(finding)}{also}"

@@ -159,6 +159,27 @@ def test_a_crosstalk_is_stated_with_the_quantity_that_the_sensor_responds_to():
     assert "responds to another measured quantity, the link angle [sensor.crosstalk]" in said
 
 
+@pytest.mark.parametrize(
+    ("confidence", "words"),
+    [
+        (0.3, "no effect at all has 44%, next to 56% of all effects together; error"),
+        (0.5, "no effect at all has 44%; error"),
+    ],
+)
+def test_no_effect_that_is_likelier_than_a_name_is_stated_next_to_all_names(confidence, words):
+    likely = {"verdict": "one_of", "confidence": confidence, "no_effect": 0.44}
+    (said,) = sentences(diagnosis(found("friction.load", **likely), unit={"motor": "N m"}))
+    assert words in said
+
+
+def test_a_friction_that_falls_with_the_temperature_is_labelled_so():
+    """Of one that grows, the number is negative."""
+    parameters = {"friction": Value(-0.0065, "A/K", None)}
+    form = "friction.warmup.measured"
+    finding = found("friction.warmup", form=form, parameters=parameters)
+    assert sizes_of(finding) == {"friction (fall of the loss per kelvin)": "-0.0065 A/K"}
+
+
 def test_a_zero_that_settles_far_beyond_a_run_is_stated_with_the_rate_at_which_it_begins():
     """Of short runs the size and the time are known by their quotient alone."""
     finding = Finding(
