@@ -118,7 +118,8 @@ def far(
 def _end(layout: Layout, equation: Equation, run: str, recordings: Sequence[Recording]) -> str:
     """Return the condition, or the channel of an equation, of which a run has an end; else nothing.
 
-    Of a speed or a load only the largest size counts.
+    Of a speed or a load only the largest size counts. A level of several runs explains none: an
+    effect of it would show in all of them.
     """
     stated = {r.name: r.conditions for r in recordings}
     for key in stated.get(run, {}):
@@ -128,7 +129,7 @@ def _end(layout: Layout, equation: Equation, run: str, recordings: Sequence[Reco
         ):
             continue
         for word, end in (("least", min), ("largest", max)):
-            if values[run] == end(values.values()):
+            if [x for x in values.values() if x == end(values.values())] == [values[run]]:
                 return f"the {word} {key}"
     for channel in equation.model.channels:
         if channel.endswith(ANGLES) or channel in CLOCKS or origin_of(channel)[1] > 1:
@@ -137,6 +138,27 @@ def _end(layout: Layout, equation: Equation, run: str, recordings: Sequence[Reco
         if run == max(peaks, key=peaks.__getitem__):
             return f"the largest {channel}"
     return ""
+
+
+def of_levels(findings: Iterable[Finding], recordings: Sequence[Recording]) -> Iterator[str]:
+    """Yield which stated condition the runs share in which a finding acts, and no others have.
+
+    A condition of nearly as many levels as runs, such as a date, has every group of runs.
+    """
+    for found in findings:
+        acts = {*found.runs_affected}
+        for key in dict.fromkeys(key for r in recordings for key in r.conditions):
+            levels: dict[str | float | None, set[str]] = {}
+            for run in recordings:
+                levels.setdefault(run.conditions.get(key), set()).add(run.name)
+            own = {level: runs for level, runs in levels.items() if runs & acts}
+            is_exact = set().union(*own.values()) == acts and len(own) < len(levels)
+            if acts and is_exact and 2 * len(levels) <= len(recordings):
+                shown = " and ".join(f"{x:g}" if isinstance(x, float) else str(x) for x in own)
+                yield (
+                    f"{found.balance}: the {len(acts)} runs in which {found.family} acts are"
+                    f" exactly those of {key} {shown}: it may depend on that."
+                )
 
 
 def _loudest(equation: Equation, layout: Layout) -> tuple[str, float]:

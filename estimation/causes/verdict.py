@@ -122,6 +122,7 @@ def answer(
         *remarks.left(layout, left, over_noise, explained),
         *remarks.far(layout, {name: refits.sizes(name) for name in layout.equations}, timed),
         *remarks.at_bounds(written),
+        *remarks.of_levels(findings, timed),
         *remarks.pauses(timed, (kept.scored.candidate.cause for kept, _ in judged)),
         *remarks.limits(timed, layout, sealed, read),
         *notes,

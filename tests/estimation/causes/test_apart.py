@@ -116,15 +116,17 @@ def test_a_run_with_a_far_larger_error_is_named(knocked: int | None) -> None:
 
 
 @pytest.mark.parametrize(
-    ("warmth", "words"),
+    ("warmth", "another", "words"),
     [
-        (40.0, "It has the largest warmth of all runs: either an effect that the equation lacks"),
-        (20.5, "Check what happened in it, or exclude the run: --exclude"),
+        (40.0, 20.0, "It has the largest warmth of all runs: either an effect that the equation"),
+        (40.0, 40.0, "Check what happened in it, or exclude the run: --exclude"),
+        (20.5, 20.0, "Check what happened in it, or exclude the run: --exclude"),
     ],
 )
 def test_a_run_at_an_end_of_a_condition_is_not_only_to_be_excluded(
-    warmth: float, words: str
+    warmth: float, another: float, words: str
 ) -> None:
+    """Unless another run is there, too."""
     runs = turning(lambda angle, speed, acceleration: 0.0 * speed)[:8]
     peaks = [float(np.abs(np.gradient(run["crank_angle_rad"])).max()) for run in runs]
     odd = int(np.argsort(peaks)[3])
@@ -134,6 +136,8 @@ def test_a_run_at_an_end_of_a_condition_is_not_only_to_be_excluded(
         replace(run, conditions={"warmth": warmth if k == odd else 20.0 + k / 7})
         for k, run in enumerate(runs)
     ]
+    other = (odd + 1) % len(runs)
+    runs[other] = replace(runs[other], conditions={"warmth": another})
     runs[odd] = runs[odd].with_columns(crank_torque_n_m=torque)
     found = diagnose(runs, [axis()], split(runs))
     (note,) = [one for one in found.notes if "times that in any other run" in one]
@@ -223,6 +227,23 @@ def test_a_term_that_differs_is_stated_of_the_fewer_runs() -> None:
     (finding,) = diagnose(runs, [axis()], split(runs)).findings
     assert (finding.family, finding.runs_affected) == ("friction.viscous", ("01", "05", "08"))
     assert finding.parameters["change"].value == pytest.approx(-0.02, rel=0.1)
+
+
+@pytest.mark.parametrize("also", [(), (0,)])
+def test_runs_that_share_a_condition_with_no_other_are_linked_to_it(also: tuple[int, ...]) -> None:
+    pairs = zip(turning(lambda *_: 0.0), turning(lambda _, speed, __: 0.02 * speed), strict=True)
+    acts = (1, 5, 8)
+    runs = [
+        replace(
+            one if k in acts else two,
+            conditions={"day": k, "payload_kg": 2.0 if k in acts + also else 5.0 * (k % 2)},
+        )
+        for k, (one, two) in enumerate(pairs)
+    ]
+    found = diagnose(runs, [axis()], split(runs))
+    linked = [note for note in found.notes if "are exactly those of" in note]
+    said = "crank: the 3 runs in which friction.viscous acts are exactly those of payload_kg 2: it"
+    assert [note.startswith(said) for note in linked] == [True] * (not also)
 
 
 def test_what_nothing_explains_is_stated_with_the_terms_at_their_bounds() -> None:
