@@ -108,6 +108,7 @@ def fit(
         ),
     ] = None,
     machine: options.MachineOption = None,
+    balance: options.EquationOption = None,
     out: Annotated[Path | None, Option("--out", "-o", help="File of the fitted model.")] = None,
     folds: Annotated[
         int | None, Option(min=2, help="Folds of the error on runs not fitted on. If none: 5.")
@@ -134,7 +135,7 @@ def fit(
     from estimation import model_file
     from rig.importers.questions import doubts
     from rig.machines.recordings import open_recordings
-    from rig.machines.shipped import read_machine
+    from rig.machines.shipped import of_equation, read_machine
     from rig.reports.fit import held_out_sentence, parameter_table
 
     options.require_new(out)
@@ -144,7 +145,8 @@ def fit(
         _learn(_recipe(model, target, surrogate, live, seed), campaign, folds, seed, out, json_)
         return
     campaign = campaign.held()  # it is walked many times
-    done = _fitted(declared_models(model, machine), campaign, folds, seed)
+    declared = of_equation(declared_models(model, machine), balance)
+    done = _fitted(declared, campaign, folds, seed)
     plant = None if machine is None else read_machine(machine)
     asked = doubts(list(campaign.evidence), plant)
     said: list[str | TextTable] = [f"Check: {line}" for line in asked]

@@ -172,6 +172,7 @@ def replay(
         bool, Option("--any-instrument", help="Allow a model of another instrument.")
     ] = False,
     machine: options.MachineOption = None,
+    balance: options.EquationOption = None,
     format_: options.FormatOption = None,
     core: Annotated[
         bool, Option("--core", help="Run the firmware's core again on a simulated log; compare.")
@@ -201,7 +202,7 @@ def replay(
 
     options.require_number("--speed", speed, 0.0)
     recording = _choose(open_recordings(log, machine, format_), run, quiet=json_)
-    estimators = _estimators(recording, model, any_instrument, quiet=json_)
+    estimators = _estimators(recording, model, balance, any_instrument, quiet=json_)
     wanted = ShowOptions(
         title=f"rig replay {recording.name}",
         channels=shown_channels(estimators, _usual(recording)),
@@ -264,20 +265,26 @@ def _choose(campaign: "Campaign", name: str | None, quiet: bool) -> "Recording":
 
 
 def _estimators(
-    recording: "Recording", model: Path | None, any_instrument: bool, quiet: bool
+    recording: "Recording",
+    model: Path | None,
+    balance: str | None,
+    any_instrument: bool,
+    quiet: bool,
 ) -> "list[LiveEstimator]":
     """Begin the estimates of the named model, else of that in use, at the recording's rate."""
     from estimation.estimators.instrument import require_own
     from rig.configuration.model_in_use import model_in_use
-    from rig.live.estimator import estimators_of, without_interval
+    from rig.live.estimator import estimators_of, passed_over, without_interval
 
     path = model or model_in_use(recording.rig)
     if path is None:
         return []
     if model is None and not quiet:
         remarks().print(f"Estimate of the model in use, {path.name}.")
-    estimators = estimators_of(path, recording.sample_rate_hz, recording.conditions)
-    for line in () if quiet else without_interval((e.model for e in estimators), path):
+    estimators = estimators_of(path, recording.sample_rate_hz, recording.conditions, balance)
+    models = [estimator.model for estimator in estimators]
+    chosen = [] if balance else passed_over(models, path)
+    for line in () if quiet else (*chosen, *without_interval(models, path)):
         remarks().print(line)
     for name, level in estimators[0].other_levels.items() if not quiet else ():
         remarks().print(

@@ -8,15 +8,13 @@ from estimation import model_file, plant_file
 from estimation.arm.balances import balances_of
 from estimation.campaign import Campaign
 from estimation.derived import measured_channels
-from estimation.errors import nearest
 from estimation.model import Model
 from estimation.plant import Plant
 from estimation.plant_models import declared as declared_of
 from rig.calibrate.declared import Declared, declared_by_folder, is_raw
-from rig.errors import UsageError
 from rig.importers.registry import open_campaign
 from rig.machines.recordings import open_recordings, with_motion
-from rig.machines.shipped import equations_of, read_machine
+from rig.machines.shipped import equations_of, of_equation, read_machine
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ def subject(
     """
     if machine is not None:
         own = equations_of(machine)
-        models = _of(own, balance) if model is None else declared_models(model, balance)
+        models = of_equation(own, balance) if model is None else declared_models(model, balance)
         campaign = open_recordings(path, machine, format_name, skip_bad)
         plant = read_machine(machine)
         return Subject(with_motion(campaign, models), models, plant, of_machine=model is None)
@@ -74,12 +72,12 @@ def subject(
     rigs = [declared_of(plant_file.shipped_plant(name)) for name in ("reference", *others)]
     if balance is not None and not balance.startswith("joint."):
         known = [rig for rig in rigs if balance in {model.balance for model in rig}]
-        rigs = [_of(rig, balance) for rig in known or [model_file.reference_rig()]]
+        rigs = [of_equation(rig, balance) for rig in known or [model_file.reference_rig()]]
     campaign = open_campaign(path, format_name, skip_bad)
     first = next(iter(campaign.evidence), None)
     arm = None if first is None else balances_of(first)
     if arm is not None:
-        return Subject(campaign, _of(arm.models, balance))
+        return Subject(campaign, of_equation(arm.models, balance))
     there = set() if first is None else {"time_s", *first.columns}
 
     def readable(rig: Sequence[Model]) -> int:
@@ -91,7 +89,7 @@ def subject(
 
 def of_calibration(declared: Declared, balance: str | None = None) -> Subject:
     """Return a calibration as what is diagnosed."""
-    return Subject(Campaign.of(declared.recordings), _of([declared.model], balance))
+    return Subject(Campaign.of(declared.recordings), of_equation([declared.model], balance))
 
 
 def declared_models(path: Path | None, balance: str | None) -> list[Model]:
@@ -104,16 +102,4 @@ def declared_models(path: Path | None, balance: str | None) -> list[Model]:
         ModelFileError: The file cannot be read.
     """
     models = model_file.reference_rig() if path is None else model_file.read_all(path)
-    return _of(models, balance)
-
-
-def _of(models: Sequence[Model], balance: str | None) -> list[Model]:
-    chosen = [model for model in models if balance in (None, model.balance)]
-    if not chosen:
-        known = list(dict.fromkeys(model.balance for model in models))
-        raise UsageError(
-            f"There is no declared model of the equation {balance!r}.",
-            f"Declared: {', '.join(known)}.",
-            f"{nearest(balance or '', known)} Or name a model file with --model.",
-        )
-    return chosen
+    return of_equation(models, balance)

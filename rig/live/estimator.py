@@ -24,6 +24,7 @@ from rig.configuration.config import Config
 from rig.configuration.model_in_use import model_in_use
 from rig.errors import UsageError
 from rig.live.joint_forces import AXES, JOINTS, interval_of_joints
+from rig.machines.shipped import of_equation
 
 NOT_STATED: Mapping[str, float | str] = {}
 
@@ -105,11 +106,15 @@ def within_range(estimator: LiveEstimator, estimate: FloatArray) -> FloatArray:
 
 
 def estimators_of(
-    path: Path, sample_rate_hz: float, conditions: Mapping[str, float | str] = NOT_STATED
+    path: Path,
+    sample_rate_hz: float,
+    conditions: Mapping[str, float | str] = NOT_STATED,
+    balance: str | None = None,
 ) -> list[LiveEstimator]:
     """Return the estimators of a file, each before its first sample.
 
-    The file is a model file, or a state estimator or a network (`.npz`).
+    The file is a model file, of which one equation may be chosen, or a state estimator or a network
+    (`.npz`).
 
     Raises:
         EstimationError: The file is not an estimator, else as `LiveEstimator`.
@@ -118,7 +123,7 @@ def estimators_of(
     if path.suffix == ".npz":
         found = [load(path)]
     else:
-        found = [ModelEstimator(model) for model in models_in_use(path)]
+        found = [ModelEstimator(model) for model in models_in_use(path, balance)]
     return [LiveEstimator(one, sample_rate_hz, conditions) for one in found]
 
 
@@ -136,16 +141,35 @@ def with_estimates(recording: Recording, path: Path) -> Recording:
     return replace(recording, columns={**recording.columns, **estimated})
 
 
-def models_in_use(path: Path) -> list[Model]:
+def models_in_use(path: Path, balance: str | None = None) -> list[Model]:
     """Return the models in use of a model file: those of a grasper's axes, else the first.
 
-    Of a machine of one's own it is the first of each target. Raises ModelFileError as `read_all`.
+    Of a machine of one's own it is the first of each target. Of an equation, if one is given.
+    Raises ModelFileError as `read_all`, and UsageError where there is no such equation.
     """
-    models = model_file.read_all(path)
+    models = of_equation(model_file.read_all(path), balance)
     of_axes = [model for model in models if model.target in AXES]
     if not of_axes and models[0].signals.rest != reference().rest:
         return list({model.target: model for model in reversed(models)}.values())[::-1]
     return of_axes or models[:1]
+
+
+def passed_over(models: Sequence[Model | None], path: Path) -> list[str]:
+    """Return a line where a file has other equations of a target than the models in use."""
+    used = [model for model in models if model is not None]
+    lines = []
+    for model in used:
+        others = [
+            one.balance
+            for one in model_file.read_all(path)
+            if one.target == model.target and one.balance != model.balance
+        ]
+        if others:
+            lines.append(
+                f"Estimate of {model.target} by the equation {model.balance}; {path.name} has"
+                f" {', '.join(others)} of it, too: --equation NAME chooses."
+            )
+    return lines
 
 
 def without_interval(models: Iterable[Model | None], path: Path) -> list[str]:

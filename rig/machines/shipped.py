@@ -1,5 +1,6 @@
 """The machines that come with the project: the reference rig, and some that other people built."""
 
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -68,3 +69,16 @@ def equations_of(path: Path) -> "list[Model]":
             f"`rig machine check {path}` lists what is needed.",
         )
     return models
+
+
+def of_equation(models: "Sequence[Model]", balance: str | None) -> "list[Model]":
+    """Return the models of an equation; all of them without one (UsageError if there is none)."""
+    chosen = [model for model in models if balance in (None, model.balance)]
+    if not chosen:
+        known = list(dict.fromkeys(model.balance for model in models))
+        raise UsageError(
+            f"There is no declared model of the equation {balance!r}.",
+            f"Declared: {', '.join(known)}.",
+            f"{nearest(balance or '', known)} Or name a model file with --model.",
+        )
+    return chosen

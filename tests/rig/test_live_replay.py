@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,12 +14,13 @@ import pytest
 from estimation.campaign import Campaign
 from estimation.estimators.model import ModelEstimator
 from estimation.fitting import fit
+from estimation.model_file import write_all
 from estimation.recording import Flag, Recording, Stretch
 from rig.errors import DataError, ExitCode, UsageError
 from rig.live.estimator import LiveEstimator
 from rig.live.replay import lost_samples, replay_blocks
 from rig.log.convert import write_recording
-from tests.estimation.causes.synthetic import gearbox, geared
+from tests.estimation.causes.synthetic import gearbox, geared, motor
 
 GRIP = "distal_torque_n_m"
 ESTIMATED = "estimated_distal_torque_n_m"
@@ -187,6 +189,20 @@ def test_command_writes_plain_lines_and_reports_which_run(logs, said):
     out, err = said("replay --plain --speed 0", path)
     assert err == "Run 01, 2 of 3; --run NAME shows another.\n"
     assert "Finished after 2.0 s: 2000 samples, lost 0." in out
+
+
+def test_of_two_equations_of_a_target_the_first_is_named_and_another_can_be_chosen(
+    logs, said, tmp_path
+):
+    runs = geared()[:6]
+    one = fit(motor(), Campaign.of(runs), bootstrap=0)
+    file = tmp_path / "two.toml"
+    write_all([one, replace(one, name="other", balance="other")], file)
+    words = ("replay --plain --speed 0", logs(*runs), "--model", file)
+    first = "Estimate of proximal_torque_n_m by the equation motor; two.toml has other of it, too: "
+    assert f"{first}--equation NAME chooses." in said(*words).err
+    assert "by the equation" not in said(*words, "--equation other").err
+    assert "Declared: motor, other." in said(*words, "--equation none", code=2).err
 
 
 @pytest.mark.parametrize("words", ["--run 99", "--speed -1", "--speed nan", "--lever-mm 0"])

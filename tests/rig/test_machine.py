@@ -422,7 +422,10 @@ def test_a_machine_with_a_sensor_of_speed_alone_is_fitted_and_diagnosed(tmp_path
     printed = said("machine check", file, table).out
     assert "carriage_position_m is the integral of carriage_velocity_m_s" in printed
     assert "Read by no equation" not in printed
-    assert answered("fit", table, "--machine", file)["parameters"]
+    assert answered("fit", table, "--machine", file, "--equation carriage")["parameters"]
+    assert (
+        "Declared: carriage." in said("fit", table, "--machine", file, "--equation x", code=2).err
+    )
     (finding,) = answered("diagnose --quick", table, "--machine", file)["findings"]
     assert (finding["family"], finding["verdict"]) == ("friction.viscous_asymmetry", "identified")
 
