@@ -170,8 +170,8 @@ def _error_words(sight: Sight) -> str:
 
 def _beyond(channel: str, low: float, high: float) -> str:
     """Return a message for an estimate outside the range of its fit and its interval."""
-    unit = unit_of(channel)
-    ends = words.digits(Value(low), unit), words.with_unit(Value(high), unit)
+    unit, size = unit_of(channel), max(abs(low), abs(high))
+    ends = words.digits(Value(low), unit, size), words.with_unit(Value(high), unit, size)
     return f"{words.name_of(channel)} beyond its fit, {ends[0]} to {ends[1]}"
 
 

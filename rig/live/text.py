@@ -1,11 +1,14 @@
 """The words of the display: numbers with their unit, or why a number is missing.
 
-SI ends here: torque is shown in mN m and angles in degrees, to people only.
+SI ends here: small torques are shown in mN m and angles in degrees, small ones in mrad, to people
+only.
 """
 
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
+
+import numpy as np
 
 from estimation.channels import describe
 from rig.live.block import LimitStatus
@@ -14,6 +17,9 @@ from rig.live.state import Reading, Snapshot, Summary, Value
 
 SHOWN = {"N m": (1e3, "mN m", 1), "rad": (180 / math.pi, "deg", 2), "N": (1.0, "N", 2)}
 """SI unit to its factor, name and decimals on the display."""
+
+LARGE, SMALL = {"N m": (1.0, (1.0, "N m", 3))}, {"rad": (0.01, (1e3, "mrad", 3))}
+"""SI unit to the size from which, or below which, values are shown otherwise, and how."""
 
 NAMES = {
     "distal_torque_n_m": "Grip torque",
@@ -41,9 +47,19 @@ STATES = {
 """State of a device to its symbol and style, so that no state is shown by colour alone."""
 
 
-def in_shown_unit(unit: str) -> tuple[float, str, int]:
-    """Return the factor from SI, the unit's name and the decimals of the display."""
+def in_shown_unit(unit: str, size: float = math.nan) -> tuple[float, str, int]:
+    """Return the factor from SI, the unit's name and the decimals of values of a size."""
+    if unit in LARGE and abs(size) >= LARGE[unit][0]:
+        return LARGE[unit][1]
+    if unit in SMALL and abs(size) < SMALL[unit][0]:
+        return SMALL[unit][1]
     return SHOWN.get(unit, (1.0, unit, 3))
+
+
+def size_of(reading: Reading) -> float:
+    """Return the largest size in the last 10 s: all numbers of a reading have one unit."""
+    recent = np.abs([*reading.estimate_trace.flat, *reading.sensor_trace.flat])
+    return float(np.nanmax(recent)) if np.isfinite(recent).any() else math.nan
 
 
 def name_of(channel: str) -> str:
@@ -51,21 +67,24 @@ def name_of(channel: str) -> str:
     return NAMES.get(channel) or describe(channel).description.capitalize()
 
 
-def digits(value: Value, unit: str) -> str | None:
-    """Return the number alone in the display's unit, or None when there is none."""
+def digits(value: Value, unit: str, size: float | None = None) -> str | None:
+    """Return the number alone in the display's unit, or None when there is none.
+
+    The unit is that of values of a size, by default the value's own.
+    """
     if value.number is None:
         return None
-    factor, _, decimals = in_shown_unit(unit)
+    factor, _, decimals = in_shown_unit(unit, value.number if size is None else size)
     # adding zero turns -0.0 into 0.0
     return f"{round(value.number * factor, decimals) + 0.0:.{decimals}f}"
 
 
-def with_unit(value: Value, unit: str) -> str:
-    """Return the number with its unit, or `no value` and the reason."""
-    number = digits(value, unit)
-    if number is None:
+def with_unit(value: Value, unit: str, size: float | None = None) -> str:
+    """Return the number with its unit, or `no value` and the reason; see `digits`."""
+    if value.number is None:
         return f"no value ({value.missing})"
-    return f"{number} {in_shown_unit(unit)[1]}"
+    shown = in_shown_unit(unit, value.number if size is None else size)
+    return f"{digits(value, unit, size)} {shown[1]}"
 
 
 def tip_force_n(reading: Reading, lever_m: float) -> float | None:
@@ -80,7 +99,8 @@ def tip_force_n(reading: Reading, lever_m: float) -> float | None:
 
 def main_words(reading: Reading, options: ShowOptions) -> str:
     """Return the main value with its unit, an estimate with its 95 % interval where it is known."""
-    return f"{with_unit(reading.main, reading.unit)}{interval(reading, options, ' ±')}"
+    main = with_unit(reading.main, reading.unit, size_of(reading))
+    return f"{main}{interval(reading, options, ' ±')}"
 
 
 def interval(reading: Reading, options: ShowOptions, sign: str = "±") -> str:
@@ -88,14 +108,15 @@ def interval(reading: Reading, options: ShowOptions, sign: str = "±") -> str:
     half_width = options.half_widths().get(reading.channel)
     if not reading.has_estimator or reading.main.number is None or half_width is None:
         return ""
-    return f"{sign}{with_unit(Value(half_width), reading.unit)}"
+    return f"{sign}{with_unit(Value(half_width), reading.unit, size_of(reading))}"
 
 
 def error_rms(reading: Reading) -> str:
     """Return the error of the estimate against the sensor in words."""
     if reading.error_rms is None:
         return "error unknown"
-    return f"error rms {with_unit(Value(reading.error_rms), reading.unit)} in 5 s"
+    error = with_unit(Value(reading.error_rms), reading.unit, size_of(reading))
+    return f"error rms {error} in 5 s"
 
 
 def notes(reading: Reading, options: ShowOptions) -> Iterator[str]:
@@ -109,7 +130,7 @@ def notes(reading: Reading, options: ShowOptions) -> Iterator[str]:
     if not reading.has_estimator:
         yield from ("no estimator", "")
         return
-    yield f"sensor {with_unit(reading.sensor, reading.unit)}"
+    yield f"sensor {with_unit(reading.sensor, reading.unit, size_of(reading))}"
     yield error_rms(reading)
 
 
@@ -143,7 +164,7 @@ def limit_words(limit: LimitStatus) -> tuple[str, str]:
     most = with_unit(Value(limit.limit), limit.unit)
     if share is None:
         return f"no value, limit {most}", "bad"
-    text = f"{digits(Value(limit.value), limit.unit)} of {most}, {100 * share:.0f} %"
+    text = f"{digits(Value(limit.value), limit.unit, limit.limit)} of {most}, {100 * share:.0f} %"
     if share >= 1:
         return f"{text} AT LIMIT", "bad"
     return (f"{text} near", "warning") if share >= 0.8 else (text, "good")
@@ -182,7 +203,8 @@ def plain_line(snapshot: Snapshot, options: ShowOptions) -> str:
         if force_n is not None:
             parts.append(f"{force_n:.2f} N at {options.lever_m * 1e3:g} mm")
         if reading.has_estimator:
-            parts.append(f"sensor {with_unit(reading.sensor, reading.unit)}")
+            sensor = with_unit(reading.sensor, reading.unit, size_of(reading))
+            parts.append(f"sensor {sensor}")
             parts.append(error_rms(reading))
     parts += [rate(snapshot), lost(snapshot.lost, snapshot.samples)]
     parts += [f"{device.name} {device.state}" for device in snapshot.devices]

@@ -112,7 +112,8 @@ def _header(snapshot: Snapshot, title: str, width: int) -> Text:
 
 def _headline(reading: Reading, options: ShowOptions, width: int) -> Iterator[Text]:
     """Yield the main number in large digits, and what belongs to it."""
-    source, digits = reading.source, words.digits(reading.main, reading.unit)
+    source, size = reading.source, words.size_of(reading)
+    digits = words.digits(reading.main, reading.unit, size)
     name = _styled(f"{words.name_of(reading.channel)}, {source}  ", "title")
     number = _styled(words.main_words(reading, options), "warning" if digits is None else source)
     if name.cell_len + number.cell_len <= width:
@@ -141,13 +142,14 @@ def _other(reading: Reading, options: ShowOptions) -> Text:
     line = _styled(f"{words.name_of(reading.channel)}, {reading.source} ")
     line.append(words.main_words(reading, options), style=STYLES[reading.source])
     if reading.has_estimator:
-        line.append(f", sensor {words.with_unit(reading.sensor, reading.unit)}")
+        sensor = words.with_unit(reading.sensor, reading.unit, words.size_of(reading))
+        line.append(f", sensor {sensor}")
     return line
 
 
 def _traces(reading: Reading, width: int, free: int) -> Iterator[Text]:
     """Yield the recent traces, one under the other on one scale, in at most `free` lines."""
-    factor, unit, _ = words.in_shown_unit(reading.unit)
+    factor, unit, _ = words.in_shown_unit(reading.unit, words.size_of(reading))
     traces = {"estimate": reading.estimate_trace * factor, "sensor": reading.sensor_trace * factor}
     shown = {name: trace for name, trace in traces.items() if not np.all(np.isnan(trace))}
     height = (free - 1) // max(len(shown), 1)

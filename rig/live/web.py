@@ -66,12 +66,13 @@ class WebView:
 def frame(snapshot: Snapshot, options: ShowOptions) -> dict[str, Any]:
     """Return the content of the page, in the words of the terminal's display."""
     main = snapshot.readings[0]
+    size = words.size_of(main)
     return {
         "title": options.title,
         "name": f"{words.name_of(main.channel)}, {main.source}",
-        "number": words.digits(main.main, main.unit),
+        "number": words.digits(main.main, main.unit, size),
         "missing": main.main.missing,
-        "unit": words.in_shown_unit(main.unit)[1],
+        "unit": words.in_shown_unit(main.unit, size)[1],
         "interval": words.interval(main, options),
         "beside": [note for note in words.notes(main, options) if note],
         "main": main.channel,

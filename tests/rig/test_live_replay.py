@@ -18,7 +18,10 @@ from estimation.model_file import write_all
 from estimation.recording import Flag, Recording, Stretch
 from rig.errors import DataError, ExitCode, UsageError
 from rig.live.estimator import LiveEstimator
+from rig.live.options import ShowOptions
 from rig.live.replay import lost_samples, replay_blocks
+from rig.live.state import LiveState
+from rig.live.text import plain_line
 from rig.log.convert import write_recording
 from tests.estimation.causes.synthetic import gearbox, geared, motor
 
@@ -189,6 +192,24 @@ def test_command_writes_plain_lines_and_reports_which_run(logs, said):
     out, err = said("replay --plain --speed 0", path)
     assert err == "Run 01, 2 of 3; --run NAME shows another.\n"
     assert "Finished after 2.0 s: 2000 samples, lost 0." in out
+
+
+@pytest.mark.parametrize(
+    ("channel", "size", "shown"),
+    [
+        ("link_torque_n_m", 30.0, "sensor 30.000 N m"),
+        ("link_torque_n_m", 0.03, "sensor 30.0 mN m"),
+        ("link_deflection_rad", 0.001, "sensor 1.000 mrad"),
+        ("link_deflection_rad", 0.1, "sensor 5.73 deg"),
+    ],
+)
+def test_torques_and_angles_are_shown_in_a_unit_of_their_size(channel, size, shown):
+    time_s = np.arange(0, 2, 1e-3)
+    run = Recording("a", time_s, {channel: np.full(time_s.size, size)})
+    state = LiveState((channel,))
+    for block in replay_blocks(run, (), None):
+        state.feed(block)
+    assert shown in plain_line(state.snapshot(), ShowOptions(title="", channels=(channel,)))
 
 
 def test_of_two_equations_of_a_target_the_first_is_named_and_another_can_be_chosen(
