@@ -159,8 +159,8 @@ def new(
     sensor: Annotated[
         list[str] | None,
         Option(
-            help="AXIS:CHANNEL, or CHANNEL alone of no axis, such as air_temperature_k; what it"
-            " reads follows from the channel's unit."
+            help="AXIS:CHANNEL, or CHANNEL alone of no axis, such as thrust_n; what it reads"
+            " follows from the channel's unit. A position or a speed is of an axis."
         ),
     ] = None,
     from_: Annotated[

@@ -40,8 +40,8 @@ READS: Mapping[str, Reads] = {
 }
 """Unit of a channel to the quantity that its sensor reads."""
 
-OF_AN_AXIS = ("position", "speed", "effort")
-"""What a sensor reads of an axis; any other may be of none."""
+MOTIONS = ("position", "speed")
+"""What a sensor reads of an axis in any case; any other may be of none, such as a thrust."""
 
 
 def asked(table: Path | None) -> dict[str, list[str]]:
@@ -73,7 +73,7 @@ def plant_of(name: str, words: Mapping[str, Sequence[str]]) -> Plant:
             axes=tuple(Axis(axis, unit) for axis, unit in parts["axis"]),
             transmissions=tuple(_transmission(one, read) for one in parts["transmission"]),
             actuators=tuple(Actuator(channel, axis) for axis, channel in parts["actuator"]),
-            sensors=tuple(Sensor(c, axis, reads_of(c)) for axis, c in parts["sensor"]),
+            sensors=tuple(_sensor(axis, channel) for axis, channel in parts["sensor"]),
         )
     except (PlantError, UnknownUnitError) as error:
         raise UsageError(error.what, error.why, error.fix) from error
@@ -81,7 +81,7 @@ def plant_of(name: str, words: Mapping[str, Sequence[str]]) -> Plant:
 
 def _parts(kind: str, word: str) -> list[str]:
     parts, (form, _) = word.split(":"), PARTS[kind]
-    if kind == "sensor" and len(parts) == 1 and reads_of(word) not in OF_AN_AXIS:
+    if kind == "sensor" and len(parts) == 1 and reads_of(word) not in MOTIONS:
         return ["", word]
     most = 3 if kind == "transmission" else 2
     if not 2 <= len(parts) <= most or not all(parts[:2]):
@@ -103,6 +103,12 @@ def _transmission(parts: Sequence[str], read: Collection[str]) -> Transmission:
             ) from None
     compliant = {*parts[:2]} <= {*read}
     return Transmission(f"{parts[0]}_to_{parts[1]}", parts[0], parts[1], ratio, compliant)
+
+
+def _sensor(axis: str, channel: str) -> Sensor:
+    """Return a sensor; an effort that no axis passes on is of nothing else that is known."""
+    reads = reads_of(channel)
+    return Sensor(channel, axis, "other" if reads == "effort" and not axis else reads)
 
 
 def reads_of(channel: str) -> Reads:

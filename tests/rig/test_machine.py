@@ -442,6 +442,13 @@ def test_a_machine_file_is_written_from_options_and_nothing_prompts_without_a_te
     assert not out.exists()
     words = "--axis carriage:m --actuator carriage:drive_force_n"
     words += " --sensor carriage:carriage_position_m --from"
+    alone = words.replace(" --from", " --sensor thrust_n --sensor air_temperature_k")
+    said("machine new", tmp_path / "alone.toml", alone)
+    assert read_machine(tmp_path / "alone.toml").sensors[1:] == (
+        Sensor("thrust_n"),
+        Sensor("air_temperature_k", reads="temperature"),
+    )
+    assert "AXIS:CHANNEL" in said("machine new", out, "--sensor arm_angle_rad", code=2).err
     step = f"rig import {table} --machine {out} --preview"
     assert step in said("machine new", out, words, table).out
     text = out.read_text()
