@@ -86,7 +86,7 @@ def _listed(one: Isolable, least: float = 0.05) -> dict[str, float]:
 
 
 def sentences(plan: Plan) -> list[str]:
-    """Return the plan as lines: effects not distinguished, effects not seen, and advice."""
+    """Return the plan as lines: effects not distinguished, not seen and named, and advice."""
     vague = [one for one in plan.effects if one.share < SURE and _seen(one)]
     unseen = [one for one in plan.effects if not _seen(one)]
     named = [one for one in plan.effects if one.share >= SURE]
@@ -113,6 +113,9 @@ def sentences(plan: Plan) -> list[str]:
         if effects:
             lines.append(f"Not seen, {why}:")
             lines += [f"  {one.equation}: {one.family} ({one.place})" for one in effects]
+    if named:
+        lines.append("Named:")
+        lines += [f"  {one.equation}: {one.family} {one.share:.2f} ({one.place})" for one in named]
     advice = {
         effect.family: effect.told_apart_by
         for one in vague

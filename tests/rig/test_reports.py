@@ -253,7 +253,9 @@ def test_what_may_be_wrong_with_the_recordings_comes_before_what_is_found_in_the
 
 def test_a_plan_states_what_its_numbers_are():
     vague = Isolable("motor", "ripple.motor", "motor", 0.4, {"sensor.crosstalk": 0.5})
-    said = plan.sentences(plan.Plan("quick", 12, (vague,)))
+    sure = Isolable("motor", "friction.load", "motor", 0.97, {})
+    said = plan.sentences(plan.Plan("quick", 12, (vague, sure)))
+    assert said[4:6] == ["Named:", "  motor: friction.load 0.97 (motor)"]
     assert "the probability that it would be named" in said[2]
     assert said[3] == "  motor: ripple.motor 0.40 or sensor.crosstalk 0.50 (motor)"
 
