@@ -14,9 +14,9 @@ from estimation.filters import LowPass
 from estimation.model import Model, Term, balance_channels, settled
 from estimation.noise import white_noise
 from estimation.recording import FloatArray, Recording
-from estimation.within_bounds import solve_within
+from estimation.within_bounds import solve_apart
 
-OFFSET, VISCOUS = "sensor.offset", "friction.viscous"
+OFFSET, VISCOUS, COULOMB = "sensor.offset", "friction.viscous", "friction.coulomb"
 
 NARROWEST = 1e-3
 """Speed over which friction changes its sign that is searched, of the usual most speed."""
@@ -63,6 +63,7 @@ class Problem:
     runs: list[FitRun]
     free: NDArray[np.intp]  # columns that least squares solves for
     offset: int | None  # column of the model's own offset when run offsets replace it
+    same: tuple[int, int] | None  # columns of Coulomb friction and of an offset that are one
     names: list[str]  # of all columns
     shape_parameters: list[Parameter]  # of all terms, in order
     signs: FloatArray
@@ -169,12 +170,28 @@ def problem_of(model: Model, runs: list[FitRun]) -> Problem:
         runs=runs,
         free=free,
         offset=replaced,
+        same=None if model.run_offsets else one_constant(model.terms, runs),
         names=names,
         shape_parameters=[p for term in model.terms for p in _shapes(term, model, runs)],
         signs=np.array([float(term.sign) for term, _ in parameters]),
         lower=np.array([p.lower for _, p in parameters])[free],
         upper=np.array([p.upper for _, p in parameters])[free],
     )
+
+
+def one_constant(terms: Sequence[Term], runs: Sequence[FitRun]) -> tuple[int, int] | None:
+    """Return the amplitudes of Coulomb friction and of an offset that are one constant, if any.
+
+    They are so where the speed never changes its sign: noise alone would decide their difference.
+    """
+    names = [term.effect.id for term in terms for _ in term.effect.amplitudes]
+    if names.count(COULOMB) != 1 or OFFSET not in names:
+        return None
+    channel = next(term.channels["speed"] for term in terms if term.effect.id == COULOMB)
+    speed = np.concatenate([run.thin[channel] for run in runs])
+    if speed.min() <= 0.0 <= speed.max():
+        return None
+    return names.index(COULOMB), names.index(OFFSET)
 
 
 def _shapes(term: Term, model: Model, runs: Sequence[FitRun]) -> list[Parameter]:
@@ -205,10 +222,12 @@ def solve(problem: Problem, gram: FloatArray) -> FloatArray:
     """Return the amplitudes of the free columns within their bounds."""
     if problem.free.size == 0:
         return np.empty(0)
-    scale = np.sqrt(np.maximum(np.diag(gram)[:-1], np.finfo(float).tiny))
-    normal = gram[:-1, :-1] / np.outer(scale, scale)
-    _check_independent(problem, normal, np.diag(gram)[:-1])
-    return solve_within(gram[:-1, :-1], gram[:-1, -1], problem.lower, problem.upper)
+    kept = [k for k in range(len(gram) - 1) if problem.same is None or k != problem.same[1]]
+    inner = gram[np.ix_(kept, kept)]
+    scale = np.sqrt(np.maximum(np.diag(inner), np.finfo(float).tiny))
+    _check_independent(problem, inner / np.outer(scale, scale), np.diag(inner), kept)
+    bounds = problem.lower, problem.upper
+    return solve_apart(gram[:-1, :-1], gram[:-1, -1], *bounds, problem.same)
 
 
 def check_target(problem: Problem) -> None:
@@ -231,12 +250,14 @@ def check_target(problem: Problem) -> None:
         )
 
 
-def _check_independent(problem: Problem, normal: FloatArray, power: FloatArray) -> None:
+def _check_independent(
+    problem: Problem, normal: FloatArray, power: FloatArray, places: Sequence[int]
+) -> None:
     values, vectors = np.linalg.eigh(normal)
     if np.all(power > 0) and values[0] > 1e-10:
         return
     guilty = np.abs(vectors[:, 0]) > 0.1 if np.all(power > 0) else power <= 0
-    named = ", ".join(problem.names[k] for k in problem.free[guilty])
+    named = ", ".join(problem.names[k] for k in problem.free[places][guilty])
     raise FitError(
         f"{named} cannot be identified from these runs.",
         "The columns are constant or proportional to one another in every run.",

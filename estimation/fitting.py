@@ -126,6 +126,7 @@ def _bootstrap(
     shapes = problem.shape_parameters
     between = [not _is_at_bound(p, x) for p, x in zip(shapes, shape, strict=True)]
     inside = np.append((free > problem.lower) & (free < problem.upper), np.array(between, bool))
+    inside[[k for k in problem.same or () if free[k] == 0.0]] = False  # it is the other one
     moving = np.flatnonzero(inside)
     power = np.diag(np.sum(products, axis=0))[moving]
     size = np.sqrt(np.where(power > 0.0, power, 1.0))

@@ -32,6 +32,31 @@ def solve_within(
     return np.clip(found.x / scale, low, high)
 
 
+def solve_apart(
+    normal: FloatArray,
+    right: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    same: tuple[int, int] | None,
+) -> FloatArray:
+    """Return the x of `solve_within` where two columns may be the same.
+
+    The second of them is zero; where the first is at its lower bound then, the first is.
+    """
+    if same is None:
+        return solve_within(normal, right, low, high)
+    first, second = same
+    found = np.zeros(len(right))
+    for zero in (second, first):
+        kept = np.delete(np.arange(len(right)), zero)
+        inner = normal[np.ix_(kept, kept)]
+        found[kept] = solve_within(inner, right[kept], low[kept], high[kept])
+        found[zero] = 0.0
+        if found[first] > low[first]:
+            break
+    return found
+
+
 def determined(normal: FloatArray) -> NDArray[np.bool_]:
     """Return which x of `solve_within` the data determine, shape (n,).
 

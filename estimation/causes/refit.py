@@ -20,12 +20,12 @@ from estimation.campaign import Campaign
 from estimation.causes import shapes
 from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.derived import settled_places
-from estimation.fit_problem import OFFSET, FitError, FitRun, prepared
+from estimation.fit_problem import OFFSET, FitError, FitRun, one_constant, prepared
 from estimation.fitting import fit
 from estimation.model import Estimate, Model, Term
 from estimation.predicted import with_prediction, without_unused
 from estimation.recording import FloatArray, Recording
-from estimation.within_bounds import solve_within
+from estimation.within_bounds import solve_apart
 
 MOVES = 4
 """Turns of moving the shapes."""
@@ -264,7 +264,8 @@ class Refit:
 
     def _amplitudes(self, parts: tuple[Addition, ...], declared: tuple[Term, ...]) -> Solved:
         grams, means, samples = [], [], 0
-        for run in self._train_runs(parts):
+        runs = [*self._train_runs(parts)]
+        for run in runs:
             table = _table(parts, declared, run, run.places)
             whole = np.column_stack([table, run.whole[self.model.target][run.places]])
             means.append(whole.mean(axis=0))
@@ -273,7 +274,8 @@ class Refit:
         gram = np.sum(grams, axis=0)
         penalty, low, high = self._limits(parts)
         penalty = penalty * samples / (len(grams) * self.numbers.samples_a_run)
-        weights = solve_within(gram[:-1, :-1] + np.diag(penalty), gram[:-1, -1], low, high)
+        normal, same = gram[:-1, :-1] + np.diag(penalty), one_constant(declared, runs)
+        weights = solve_apart(normal, gram[:-1, -1], low, high, same)
         level = 0.0
         if self.model.run_offsets:
             level = float(np.mean([m[-1] - m[:-1] @ weights for m in means]))

@@ -52,6 +52,28 @@ def test_a_fit_is_repeatable_and_starts_from_known_shapes(motor):
     assert again == pytest.approx(numbers(motor), rel=1e-3)
 
 
+@pytest.mark.parametrize("constant", [0.012, -0.005])
+def test_where_a_motor_turns_one_way_its_friction_has_the_whole_constant(constant):
+    """The offset has it where it is not a friction; noise would decide their difference."""
+
+    def ahead(one):
+        speed = 30.0 + 10.0 * np.sin(one.time_s) + 5.0 * np.sin(2.7 * one.time_s)
+        angle = np.cumsum(speed) / one.sample_rate_hz
+        torque = 0.94 * one["motor_current_a"] - 4e-4 * speed - constant
+        torque -= 2e-5 * np.gradient(speed, one.time_s)
+        torque += np.random.default_rng(3).normal(0.0, 1e-3, len(one))
+        return one.with_columns(motor_angle_rad=angle, proximal_torque_n_m=torque)
+
+    runs = Campaign.of(ahead(one) for one in campaign().evidence)
+    model = replace(read(Path("motor")), run_offsets=False)
+    terms = {term.effect.id: term.values for term in fit(model, runs).terms}
+    friction, offset = terms["friction.coulomb"]["friction"], terms["sensor.offset"]["offset"]
+    which, none = (friction, offset) if constant > 0.0 else (offset, friction)
+    assert abs(which.value) == pytest.approx(abs(constant), abs=2e-3)
+    assert which.ci95 is not None
+    assert (none.value, none.ci95) == (0.0, None)
+
+
 def test_friction_never_comes_out_negative():
     runs = campaign(extra=lambda angle, speed, load: -8e-4 * speed)  # drives instead of braking
     damping = fit(read(Path("motor")), runs).terms[2].values["damping"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation import plant_file
-from estimation.causes.verdict import diagnose
+from estimation.causes.verdict import answer, diagnose
 from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import split
 from estimation.effects import effect
@@ -242,3 +242,22 @@ def test_of_a_spring_that_hardens_the_whole_curve_is_found() -> None:
     assert finding.family == "spring.position"
     assert finding.parameters["stiffness"].value == pytest.approx(0.05, rel=0.1)
     assert finding.parameters["twist"].value == pytest.approx(0.02, rel=0.1)
+
+
+def test_a_drive_that_warms_is_one_cause_where_the_motor_turns_one_way() -> None:
+    """The current that warms it has the friction, which an offset would take from it."""
+    runs = []
+    for run in turning(always_ahead=True, size=3.0):
+        weaker = 1.0 - 0.1 * (1.0 - np.exp(-run.time_s / 3.0))
+        runs.append(run.with_columns(crank_current_a=run["crank_torque_n_m"] / weaker))
+    found = answer(runs, [axis("crank_current_a")], split(runs))
+    (finding,) = found.diagnosis.findings
+    assert finding.family == "motor.thermal"
+    assert finding.parameters["loss"].value == pytest.approx(0.1, rel=0.1)
+    (model,) = found.models
+    values = {term.effect.id: term.values for term in model.terms}
+    assert values["friction.coulomb"]["friction"].value == pytest.approx(0.45, rel=0.05)
+    assert values["sensor.offset"]["offset"].value == 0.0
+    (predicted,) = model.signals.combinations
+    assert predicted.direction is not None
+    assert predicted.direction.size == pytest.approx(0.48, rel=0.05)
