@@ -5,7 +5,7 @@ shows the result: the held-out runs count as used once there is a result to see,
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 
@@ -64,10 +64,7 @@ def run_diagnosis(
     """
     ledger.check()
     on_stage("reading the recordings")
-    whole, lost = steady(list(asked.campaign.evidence))
-    bad = _spoiled(asked, whole)
-    whole = [recording for recording in whole if recording.name not in bad]
-    lost += [f"Run {name} is left out: {reason}." for name, reason in bad.items()]
+    whole, lost = _usable(asked)
     for reason in lost:
         on_stage(reason)
     known = ledger.known(whole)
@@ -84,11 +81,8 @@ def run_diagnosis(
         on_stage("choosing the experiment that separates the alternatives")
         proposed = propose(found, recordings, executor)
     asked_of = (f"Check: {line}" for line in doubts(whole, asked.plant))
-    fitted = [e.model for e in found.layout.equations.values()] if asked.of_machine else []
-    runs = Campaign.of(recordings)
-    means = [(model.balance, offsets_note(model, runs)) for model in fitted]
-    ignored = [f"{name}: {note[0].lower()}{note[1:]}" for name, note in means if note]
-    notes = [*found.diagnosis.notes, *lost, *flagged(whole), *ignored, *asked_of]
+    of_file = _of_file(asked, found, Campaign.of(recordings))
+    notes = [*found.diagnosis.notes, *lost, *flagged(whole), *of_file, *asked_of]
     if seen:
         share = f"{len(seen)} of the {counted(len(sealed.confirm), 'test run')}"
         was = "was" if len(seen) == 1 else "were"
@@ -102,6 +96,31 @@ def run_diagnosis(
         quick=quick,
     )
     return replace(found, diagnosis=diagnosis), look_at(whole, sealed)
+
+
+def _of_file(asked: Subject, found: Answer, runs: Campaign) -> Iterator[str]:
+    """Yield what the file of the machine has to do with the result, a sentence each."""
+    models = {name: equation.model for name, equation in found.layout.equations.items()}
+    for name, model in models.items() if asked.of_machine else ():
+        if note := offsets_note(model, runs):
+            yield f"{name}: {note[0].lower()}{note[1:]}"
+    for finding in found.diagnosis.findings:
+        places = (finding.place, *finding.alternative_places.values())
+        for channel in dict.fromkeys(place.removeprefix("sensor ") for place in places):
+            if channel in asked.formulas:
+                yield (
+                    f"{finding.balance}: no sensor reads {channel}, which is the formula"
+                    f" {asked.formulas[channel]}. An error of it is one of the formula, or of the"
+                    f" reading {models[finding.balance].target} that it is compared with."
+                )
+
+
+def _usable(asked: Subject) -> tuple[list[Recording], list[str]]:
+    """Return the runs that can be used as they are, and a sentence on each other run."""
+    whole, lost = steady(list(asked.campaign.evidence))
+    bad = _spoiled(asked, whole)
+    lost += [f"Run {name} is left out: {reason}." for name, reason in bad.items()]
+    return [recording for recording in whole if recording.name not in bad], lost
 
 
 def _spoiled(asked: Subject, recordings: Sequence[Recording]) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """What is diagnosed: the recordings at a path, and the models that are declared of them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from estimation import model_file, plant_file
@@ -13,7 +13,7 @@ from estimation.plant import Plant
 from estimation.plant_models import declared as declared_of
 from rig.calibrate.declared import Declared, declared_by_folder, is_raw
 from rig.importers.registry import open_campaign
-from rig.machines.recordings import open_recordings, with_motion
+from rig.machines.recordings import formulas_of, open_recordings, with_motion
 from rig.machines.shipped import equations_of, of_equation, read_machine
 
 
@@ -27,6 +27,8 @@ class Subject:
     """The machine, where its file is given."""
     of_machine: bool = False
     """Whether the models are those of a machine file, which its owner can change."""
+    formulas: Mapping[str, str] = field(default_factory=dict)
+    """Channels that no sensor reads, to the formula of others that they are."""
 
 
 def subject(
@@ -62,7 +64,8 @@ def subject(
         models = of_equation(own, balance) if model is None else declared_models(model, balance)
         campaign = open_recordings(path, machine, format_name, skip_bad)
         plant = read_machine(machine)
-        return Subject(with_motion(campaign, models), models, plant, of_machine=model is None)
+        moving, formulas = with_motion(campaign, models), formulas_of(machine)
+        return Subject(moving, models, plant, of_machine=model is None, formulas=formulas)
     if model is not None:
         models = declared_models(model, balance)
         return Subject(open_campaign(path, format_name, skip_bad), models)

@@ -80,6 +80,12 @@ def recorded_channels(machine: Path) -> list[str]:
     return [*stated, *(p for p, s in integrals(read_machine(file)).items() if s in stated)]
 
 
+def formulas_of(machine: Path) -> dict[str, str]:
+    """Return the channels of a machine file that are formulas of others, as `recorded_channels`."""
+    file = place_of(machine)
+    return dict(read_mapping(file, ()).data.formulas) if has_data(file) else {}
+
+
 def has_data(file: Path) -> bool:
     """Whether a machine file states how a foreign table is read."""
     return "data" in tomllib.loads(file.read_text("utf-8"))

@@ -180,3 +180,51 @@ def test_the_ratio_is_asked_about_only_where_every_run_contradicts_it(tmp_path, 
     line = "it is 0.5 times the speed of crank_angle_rad times 3 in every run;"
     printed = said("machine check", file, table).out
     assert f"{line} are its unit, gain and sign, and the ratio, right there?" in printed
+
+
+PROPELLER = """
+schema = "rig.machine/1"
+machine = { name = "stand", cutoff_hz = 8.0, run_offsets = false }
+axis = [{ name = "rotor", unit = "rad" }]
+sensor = [
+  { name = "rotor_velocity_rad_s", axis = "rotor", reads = "speed" },
+  { name = "thrust_n", reads = "other" },
+  { name = "lift_n", reads = "other" },
+]
+[[equation]]
+name = "thrust"
+target = "thrust_n"
+samples = "all"
+effects = [{ id = "transmission.ratio", channels = { load = "lift_n" } }, { id = "sensor.offset" }]
+[data.columns]
+time_s = "t"
+rotor_velocity_rad_s = "speed"
+thrust_n = "thrust"
+[data.formulas]
+lift_n = "1.3e-5 * rotor_velocity_rad_s**2"
+[data.runs]
+changes = ["run"]
+"""
+
+
+def test_an_error_of_a_formula_is_stated_as_one_of_the_reading_that_it_is_compared_with(
+    tmp_path, answered
+):
+    random, rows = np.random.default_rng(6), []
+    time = np.arange(0.0, 10.0, 0.02)
+    for run in range(10):
+        wave = np.sin(2 * np.pi * random.uniform(0.1, 0.3) * time + random.uniform(0.0, 6.0))
+        speed = random.uniform(300.0, 500.0) + random.uniform(100.0, 200.0) * wave
+        thrust = 1.3e-5 * speed**2
+        thrust = thrust + 0.01 * thrust**2 + random.normal(0.0, 0.02, len(time))
+        rows.append(np.column_stack([np.full(len(time), run + 1), time, speed, thrust]))
+    table, file = tmp_path / "stand.csv", tmp_path / "stand.toml"
+    head = "run,t,speed,thrust"
+    np.savetxt(table, np.vstack(rows), delimiter=",", header=head, comments="", fmt="%.7g")
+    file.write_text(PROPELLER)
+    answer = answered("diagnose --quick", table, "--machine", file)
+    (finding,) = answer["findings"]
+    assert "sensor lift_n" in (finding["place"], *finding["alternative_places"].values())
+    (note,) = [note for note in answer["notes"] if "no sensor reads lift_n" in note]
+    assert "the formula 1.3e-5 * rotor_velocity_rad_s**2." in note
+    assert "of the reading thrust_n that it is compared with." in note
