@@ -141,5 +141,8 @@ NOT_HIDDEN = {
     "inertia.position": "needs a linkage, and the rig's shafts are round",
     "coupling.torque": "needs another axis with a torque of its own",
     "unknown": "the answer to what no catalogue holds",
+    "friction.condition": "friction.load: the rig's conditions are its loads",
+    "sensor.thermal": "the rig measures no temperature",
+    "transmission.thermal": "the rig measures no temperature",
 }
 """Families that no case hides, and why the simulated rig cannot."""

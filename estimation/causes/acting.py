@@ -25,6 +25,9 @@ from estimation.recording import FloatArray
 PARTIAL, CHOICES = 24, 6
 """Names tried on some of the runs alone, and choices of runs of each."""
 
+BETWEEN = {"campaign_clock", "condition"}
+"""Roles of channels that state a run."""
+
 TURNS = 4
 """Turns of fitting an effect to the runs that have it, and of choosing these runs."""
 
@@ -46,14 +49,17 @@ class Promise(NamedTuple):
 
 
 def on_some_runs(joint: Joint, everything: Sequence[tuple[Claim, Products]]) -> list[Promise]:
-    """Return choices of some of the runs in which named effects may act."""
+    """Return choices of some of the runs in which named effects may act.
+
+    What follows the time of the campaign or a condition states itself in which runs it acts.
+    """
     count = len(joint.runs)
     if count < 6:
         return []
     inverse = joint.left_out([[]]).inverse[0]
     named: dict[int, list[tuple[Claim, Products]]] = {}
     for claim, by_run in everything:
-        if not claim.is_function:
+        if isinstance(claim.cause, Source) and not BETWEEN & dict(claim.cause.channels).keys():
             named.setdefault(by_run.target.shape[1], []).append((claim, by_run))
     promises: list[Promise] = []
     for group in named.values():

@@ -125,14 +125,15 @@ def named(one: Kept, may_name: bool) -> Finding:
 
 
 def unpredicted(found: Unsteady, refits: Refits) -> Finding:
-    """Return the finding of a friction level that changes within runs."""
+    """Return the finding of a friction level that changes within runs or between them."""
+    speed = "velocity" if found.effect.endswith("viscous") else "velocity_sign"
     before = refits.test_errors(found.equation)
     return Finding(
         balance=found.equation,
         place=found.equation,
         family="unknown",
         verdict="depends_on",
-        depends_on=("velocity" if found.effect.endswith("viscous") else "velocity_sign",),
+        depends_on=(speed,) if found.within else (speed, "run"),
         error_of=found.equation,
         rmse_before=before.rmse,
         rmse_after=found.fall * before.rmse,

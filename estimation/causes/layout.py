@@ -78,7 +78,7 @@ def lay_out(
     campaign = Campaign.of([r for r in timed if r.name in set(train)])
     read = {c for m in models for c in measured_channels([*m.channels, m.target], m.signals)}
     columns = [n for n in shared_columns(timed) if n != CAMPAIGN_TIME]
-    stated = [n for n in columns if n not in read and all(n in r.conditions for r in timed)]
+    stated = [n for n in columns if all(n in r.conditions for r in timed)]
     measured = tuple(
         n for n in columns if n not in stated and (n in read or all(_is_whole(r, n) for r in timed))
     )

@@ -1,4 +1,4 @@
-"""Friction that follows a stated condition of the runs, such as their payload."""
+"""Condition friction: friction that follows a stated condition of the runs."""
 
 from typing import ClassVar
 

@@ -838,6 +838,35 @@ def test_friction_that_jumps_at_random_times_is_found_without_a_name() -> None:
     assert any("changes within runs" in note for note in answer.notes)
 
 
+def at_levels(levels: Sequence[float], seed: int = 0) -> list[Recording]:
+    """Return runs with Coulomb friction that is so much larger in each of them."""
+    each = iter(levels)
+
+    def of_run(angle: FloatArray, speed: FloatArray, load: FloatArray) -> FloatArray:
+        return next(each) * np.tanh(speed / 2.0)
+
+    return recordings(of_run, seed=seed)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 8])
+def test_friction_of_another_level_in_each_run_has_no_sure_name(seed: int) -> None:
+    levels = np.random.default_rng(seed).normal(0.0, 0.008, 12)
+    runs = at_levels(list(levels), seed)
+    findings = diagnose(runs, [motor()], split(runs)).findings
+    assert not [f for f in findings if f.confidence is not None and f.confidence >= 0.9]
+
+
+@pytest.mark.parametrize("size_n_m", [0.004, 0.015])
+def test_friction_of_another_level_in_four_runs_changes_between_runs(size_n_m: float) -> None:
+    sealed = split(at_levels([0.0] * 12))
+    names = {*sealed.discover[:2], *sealed.confirm[:2]}
+    runs = at_levels([size_n_m * (f"{k:02d}" in names) for k in range(12)])
+    answer = diagnose(runs, [motor()], split(runs))
+    (finding,) = answer.findings
+    assert (finding.family, finding.depends_on) == ("unknown", ("velocity_sign", "run"))
+    assert any("changes between runs" in note for note in answer.notes)
+
+
 @pytest.mark.parametrize("size", [0.0, 0.004])
 def test_an_error_that_a_finding_leaves_above_the_noise_is_stated(size: float) -> None:
     """A disturbance of random course has no explanation; without one, nothing is stated."""
