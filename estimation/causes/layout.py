@@ -25,6 +25,10 @@ MOST = 24_000
 counts as 40 samples that are independent of one another, so more of them show nothing new."""
 
 
+OF_MOTION = ("rad", "rad/s", "rad/s^2", "m", "m/s", "m/s^2", "s", "Hz", "1")
+"""Units of motion, of time, and of what is a share of something."""
+
+
 @dataclass(frozen=True)
 class Layout:
     """Equations and runs.
@@ -126,12 +130,15 @@ def _is_whole(recording: Recording, channel: str) -> bool:
 def laid_out_like(layout: Layout, recordings: Sequence[Recording]) -> Layout:
     """Return other runs with the equations of a layout, for what a cause would do there.
 
-    A run without enough samples of some equation is left out.
+    A run without enough samples of some equation is left out. A condition that is not stated of a
+    run is the mean one.
 
     Raises:
         LayoutError: All of them are.
     """
-    runs, lost = _laid_out(prepared(recordings), layout.equations, layout.measured)
+    usual = {n: float(np.mean([r.channels[n][0] for r in layout.runs])) for n in layout.conditions}
+    stated = [replace(r, conditions={**usual, **r.conditions}) for r in recordings]
+    runs, lost = _laid_out(prepared(stated), layout.equations, layout.measured)
     return Layout(layout.equations, runs, layout.measured, left_out=lost)
 
 
@@ -166,7 +173,7 @@ def prepared(recordings: Sequence[Recording]) -> list[Recording]:
     """Return the runs, by their start, with the campaign's time and their conditions as channels.
 
     Where no start is known they follow one another. Conditions are those that are numbers in a
-    stated unit.
+    stated unit, but for those of motion and time: the channels have the motion itself.
     """
     return [_with_conditions(recording) for recording in _on_one_clock(recordings)]
 
@@ -176,9 +183,15 @@ def _with_conditions(recording: Recording) -> Recording:
         **{
             name: np.full(len(recording), value)
             for name, value in recording.conditions.items()
-            if isinstance(value, (int, float)) and unit_or_none(name) and name not in recording
+            if not isinstance(value, str) and _is_state(name) and name not in recording
         }
     )
+
+
+def _is_state(condition: str) -> bool:
+    """Whether a condition is in the unit of something else than motion and time."""
+    unit = unit_or_none(condition)
+    return unit is not None and unit not in OF_MOTION
 
 
 def _on_one_clock(recordings: Sequence[Recording]) -> list[Recording]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from estimation import plant_file
+from estimation.causes.layout import laid_out_like, lay_out, prepared
 from estimation.causes.verdict import diagnose
 from estimation.diagnosis.result import Diagnosis
 from estimation.diagnosis.split import split
@@ -143,3 +144,17 @@ def test_a_formula_in_the_unit_of_a_position_is_no_angle_of_a_wave() -> None:
     (model,) = (m for m in declared(plant_file.parse(text)) if m.balance == "drive")
     for finding in diagnose(runs, [model], split(runs)).findings:
         assert not {name for name in finding.depends_on if name.startswith("scaled")}
+
+
+def test_a_condition_that_another_run_does_not_state_is_the_mean_one() -> None:
+    runs = [replace(run, conditions={"payload_kg": k % 3}) for k, run in enumerate(turning())]
+    layout = lay_out([axis()], runs, [run.name for run in runs])
+    assert layout.conditions == ("payload_kg",)
+    (planned,) = laid_out_like(layout, [replace(runs[0], conditions={})]).runs
+    assert planned.channels["payload_kg"] == pytest.approx(0.9)
+
+
+def test_a_condition_in_a_unit_of_motion_is_not_a_channel() -> None:
+    stated = {"speed_m_s": 0.3, "amplitude_rad": 0.2, "payload_kg": 1.0, "gripper": 2.0}
+    (run,) = prepared([replace(turning()[0], conditions=stated)])
+    assert stated.keys() & run.columns.keys() == {"payload_kg"}
