@@ -125,15 +125,14 @@ def named(one: Kept, may_name: bool) -> Finding:
 
 
 def unpredicted(found: Unsteady, refits: Refits) -> Finding:
-    """Return the finding of a friction level that changes within runs or between them."""
-    speed = "velocity" if found.effect.endswith("viscous") else "velocity_sign"
+    """Return the finding of a friction level that changes within runs."""
     before = refits.test_errors(found.equation)
     return Finding(
         balance=found.equation,
         place=found.equation,
         family="unknown",
         verdict="depends_on",
-        depends_on=(speed,) if found.within else (speed, "run"),
+        depends_on=("velocity" if found.effect.endswith("viscous") else "velocity_sign",),
         error_of=found.equation,
         rmse_before=before.rmse,
         rmse_after=found.fall * before.rmse,

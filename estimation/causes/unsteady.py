@@ -1,10 +1,10 @@
-"""Friction whose level changes within runs or between them, as nothing that is recorded predicts.
+"""Friction whose level changes within runs, at times that no recorded signal predicts.
 
 No function of the signals predicts such an effect in a run that was left out, so it is looked for
-within runs: a declared friction term with an amplitude of the run, or one that varies over time, is
-fitted to every other block of a run and judged on the blocks between them. An offset that varies is
-part of all fits, so a drifting zero is not taken for friction. A slow disturbance is followed by
-any smooth column, so friction must explain more than the same column at other times of the run.
+within runs: a declared friction term with an amplitude that varies over time is fitted to every
+other block of a run and judged on the blocks between them. An offset that varies likewise is part
+of both fits, so a drifting zero is not taken for friction. A slow disturbance is followed by any
+smooth column, so friction must explain more than the same column at other times of the run.
 """
 
 from collections.abc import Mapping
@@ -22,43 +22,38 @@ KNOTS = 12
 MOST = 0.75
 """Share of the runs, and of the test runs, in which the error is lower: not by chance in some."""
 
-Errors = Mapping[tuple[str, str], FloatArray]
-"""Equation and friction term to squared errors of each run."""
-
 RIDGE = 0.01
 """Prior precision of an amplitude, of the mean information on one."""
 
 
 @dataclass(frozen=True)
 class Unsteady:
-    """A declared friction term whose amplitude changes within runs or between them.
+    """A declared friction term whose amplitude changes within runs.
 
     Attributes:
         equation: Its equation.
         effect: Id of the declared term.
-        within: Whether it changes within runs.
         by_run: Run to the log ratio of its squared errors without and with the change.
         fall: Error of the test runs with it, over that without.
     """
 
     equation: str
     effect: str
-    within: bool
     by_run: Mapping[str, float]
     fall: float
+
+    @property
+    def sentence(self) -> str:
+        """What happens, for a person."""
+        return (
+            f"{self.equation}: the level of {self.effect} changes within runs, at times that no"
+            " recorded signal predicts."
+        )
 
 
 def unsteady(held_out: HeldOut) -> Unsteady | None:
     """Return the friction term whose level changes most; None without evidence on the test runs."""
-    errors = _errors(held_out)
-    within = {name: found[:, 1:] for name, found in errors.items()}
-    between = {name: found[:, :2] for name, found in errors.items()}
-    return _changing(held_out, within, True) or _changing(held_out, between, False)
-
-
-def _changing(held_out: HeldOut, errors: Errors, within: bool) -> Unsteady | None:
-    """Return the term whose change is shown by the errors without and with it, (runs, 2)."""
-    numbers = held_out.numbers
+    errors, numbers = _errors(held_out), held_out.numbers
     if not errors:
         return None
     test = np.zeros(len(held_out.layout.runs), dtype=np.bool_)
@@ -74,7 +69,7 @@ def _changing(held_out: HeldOut, errors: Errors, within: bool) -> Unsteady | Non
         return None
     names = [run.name for run in held_out.layout.runs]
     fall = float(np.exp(-0.5 * _gain(errors[found], test)))
-    return Unsteady(*found, within, dict(zip(names, by_run.tolist(), strict=True)), fall)
+    return Unsteady(*found, dict(zip(names, by_run.tolist(), strict=True)), fall)
 
 
 def _gain(errors: FloatArray, runs: NDArray[np.bool_]) -> float:
@@ -83,11 +78,8 @@ def _gain(errors: FloatArray, runs: NDArray[np.bool_]) -> float:
     return float(np.log(old / new)) if new > 0.0 else 0.0
 
 
-def _errors(held_out: HeldOut) -> Errors:
-    """Return equation and friction term to the squared errors of its levels, (runs, 3).
-
-    With the usual level, with one of the run, and with one that changes within the run.
-    """
+def _errors(held_out: HeldOut) -> Mapping[tuple[str, str], FloatArray]:
+    """Return equation and friction term to the squared errors without and with it, (runs, 2)."""
     joint, layout = held_out.joint, held_out.layout
     base = joint.left_out([held_out.at]).base[0]
     out = {}
@@ -98,7 +90,7 @@ def _errors(held_out: HeldOut) -> Errors:
         column = 0
         for term in equation.terms:
             if term.effect.id.startswith("friction."):
-                found = np.zeros((len(layout.runs), 3))
+                found = np.zeros((len(layout.runs), 2))
                 for r, run in enumerate(layout.runs):
                     used = run.grid[run.used[name]]
                     own = equation.columns(run.channels)[used][:, column]
@@ -108,26 +100,20 @@ def _errors(held_out: HeldOut) -> Errors:
     return out
 
 
-def _judged(
-    time_s: FloatArray, residual: FloatArray, column: FloatArray
-) -> tuple[float, float, float]:
-    """Return the squared errors of one run's blocks, with each of the levels of a term."""
+def _judged(time_s: FloatArray, residual: FloatArray, column: FloatArray) -> tuple[float, float]:
+    """Return the squared error of one run's blocks, without the term at its times and with it."""
     size = float(np.sqrt(np.mean(column**2)))
     if len(time_s) < 4 * KNOTS or size == 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0
     place = (time_s - time_s[0]) / (time_s[-1] - time_s[0]) * (KNOTS - 1)
     hats = np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(KNOTS)))
     is_odd = np.floor(2.0 * place) % 2 == 1
     half = len(column) // 2
-    own = column[:, None] / size
-    shifted = [own[::-1], np.roll(own, half, axis=0), np.roll(own[::-1], half, axis=0)]
-
-    def error(*added: FloatArray) -> float:
-        return _left_out(np.hstack([hats, *added]), residual, is_odd)
-
-    usual = min(error(), *(error(other) for other in shifted))
-    of_run = min(error(own), *(error(own, hats * other) for other in shifted))
-    return usual, of_run, error(hats * own)
+    shifted = [column[::-1], np.roll(column, half), np.roll(column[::-1], half)]
+    level = column[:, None] / size  # another one in all of the run is no change within it
+    others = [hats[:, :0], *(hats * (other / size)[:, None] for other in shifted)]
+    without = min(_left_out(np.hstack([hats, level, x]), residual, is_odd) for x in others)
+    return without, _left_out(np.hstack([hats, hats * level]), residual, is_odd)
 
 
 def _left_out(columns: FloatArray, target: FloatArray, is_odd: NDArray[np.bool_]) -> float:

@@ -106,11 +106,7 @@ def answer(
     if not findings and sealed.may_name and (changing := unsteady(held_out)):
         findings = [unpredicted(changing, refits)]
         left[changing.equation] = findings[0].rmse_after
-        when = "within runs, at times" if changing.within else "between runs, in a way"
-        notes.append(
-            f"{changing.equation}: the level of {changing.effect} changes {when} that no recorded"
-            " signal and no stated condition predicts."
-        )
+        notes.append(changing.sentence)
     over_noise = remarks.over_noise(layout, left)
     explained = {name for f in findings for name in (f.balance, *f.also_in)}
     read = {name for kept, _ in judged for name in kept.scored.candidate.cause.reads}

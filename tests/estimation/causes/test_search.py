@@ -857,14 +857,15 @@ def test_friction_of_another_level_in_each_run_has_no_sure_name(seed: int) -> No
 
 
 @pytest.mark.parametrize("size_n_m", [0.004, 0.015])
-def test_friction_of_another_level_in_four_runs_changes_between_runs(size_n_m: float) -> None:
+def test_friction_of_another_level_in_four_runs_does_not_change_within_runs(
+    size_n_m: float,
+) -> None:
     sealed = split(at_levels([0.0] * 12))
     names = {*sealed.discover[:2], *sealed.confirm[:2]}
     runs = at_levels([size_n_m * (f"{k:02d}" in names) for k in range(12)])
     answer = diagnose(runs, [motor()], split(runs))
-    (finding,) = answer.findings
-    assert (finding.family, finding.depends_on) == ("unknown", ("velocity_sign", "run"))
-    assert any("changes between runs" in note for note in answer.notes)
+    assert not any("changes within runs" in note for note in answer.notes)
+    assert answer.verdict != "nothing_missing"
 
 
 @pytest.mark.parametrize("size", [0.0, 0.004])
