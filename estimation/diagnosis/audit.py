@@ -58,13 +58,11 @@ def flagged(recordings: Sequence[Recording]) -> list[str]:
 def audit(recordings: Sequence[Recording], read: Set[str] = frozenset()) -> list[str]:
     """Return the limits that the clocks and the conditions of used runs set, one sentence each.
 
-    What an effect that was found reads is not a limit: between runs it was decided. Stated
-    conditions compete with it.
+    What an effect that was found reads is not a limit: between runs it was decided. Nor is a stated
+    condition that differs, which competes with it.
     """
     said = _skipping(recordings)
-    stated = {name for recording in recordings for name in recording.conditions}
-    passed = {*read, *stated, *CLOCKS}
-    others = [name for name in shared_columns(recordings) if name not in passed]
+    others = [name for name in shared_columns(recordings) if name not in {*read, *CLOCKS}]
     return said + [line for name in others if (line := _held(name, recordings))]
 
 
@@ -94,6 +92,8 @@ def _held(name: str, recordings: Sequence[Recording], steady: float = 1e-3) -> s
     levels = {round(float(np.mean(r[name])) / max(size, 1e-300), 3) for r in recordings}
     if len(levels) == 1:
         return f"{name} never varies: these runs do not show an effect that depends on it."
+    if all(name in r.conditions for r in recordings):
+        return ""
     return (
         f"{name} is held within each run: an effect that depends on it shows between runs alone,"
         " where all else that differs between them shows, too."
