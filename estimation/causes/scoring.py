@@ -43,8 +43,8 @@ class Price:
 
     Attributes:
         choices: Logarithm of the number of choices that it is one of.
-        rare: How many rare things it supposes: an unknown form, and that it changes over time or
-            acts in some of the runs only.
+        rare: How many rare things it supposes: an unknown form or what a condition does by no
+            channel, and that it changes over time or acts in some of the runs only.
         amplitudes: Score that the amplitudes but the first cost.
     """
 
@@ -310,5 +310,6 @@ def _price(candidate: Candidate, joint: Joint) -> Price:
         turns = len(candidate.acts) - 1
         changes_at = sum(a != b for a, b in itertools.pairwise(candidate.acts))
         choices += math.log(2 * (turns + 1) * math.comb(turns, changes_at))
-    rare = int(candidate.is_function) + int(changes or chosen)
+    of_condition = isinstance(cause, Source) and "condition" in cause.effect.roles
+    rare = int(candidate.is_function or of_condition) + int(changes or chosen)
     return Price(choices, rare, more * float(np.log(samples)) / samples)
