@@ -54,7 +54,9 @@ def in_another_unit(recordings: Sequence[Recording]) -> Iterator[str]:
         for name, unit, run, ratio in _apart(compared, measure):
             if not how and _is_explained(name, run, ratio, recordings):
                 continue
-            if (name, run) not in asked and not (how and not unit and not _is_of_ten(ratio)):
+            if how and (_is_smooth(recordings, name, run) or not (unit or _is_of_ten(ratio))):
+                continue
+            if (name, run) not in asked:
                 asked.add((name, run))
                 runs.setdefault((name, unit, how), []).append((run, ratio))
     for (name, unit, how), places in runs.items():
@@ -185,6 +187,16 @@ def _noise(recording: Recording, name: str) -> float:
     """Return the mean size of a channel's second differences; none of few samples."""
     values = recording[name][recording.valid & np.isfinite(recording[name])]
     return float(np.mean(np.abs(np.diff(values, 2)))) if values.size > 2 else np.nan
+
+
+def _is_smooth(recordings: Sequence[Recording], name: str, run: str) -> bool:
+    """Whether a channel of a run has next to no noise, such as a reference.
+
+    Its second differences are then those of the motion: larger at twice the step, where those of
+    noise are of one size.
+    """
+    own = next(recording for recording in recordings if recording.name == run)
+    return bool(_noise(own.at(np.arange(0, len(own), 2)), name) > ALIKE * _noise(own, name))
 
 
 def _within(values: ArrayLike, usual: float, factor: float = ALIKE) -> NDArray[np.bool_]:

@@ -382,6 +382,17 @@ def test_runs_of_all_sizes_or_speeds_are_not_asked_about(tmp_path, fast):
     assert of_all_sizes(tmp_path, fast=fast) == []
 
 
+def test_a_reference_without_noise_of_a_faster_run_is_not_asked_about(tmp_path):
+    random = np.random.default_rng(6)
+    for number, speed in enumerate([2.0, 2.1, 1.9, 5.0, 2.2, 1.8]):
+        wave = np.sin(speed * TIME)
+        noise = 0.01 * random.normal(size=TIME.size)
+        columns = {"target_angle_rad": wave, "motor_current_a": np.sign(wave) + noise}
+        columns["motor_angle_rad"] = wave + noise
+        text_table(tmp_path / f"run{number}.csv", {"time_s": TIME, **columns})
+    assert asked(tmp_path) == []
+
+
 @pytest.mark.parametrize(
     ("name", "runs", "is_asked"),
     [
