@@ -48,8 +48,9 @@ MOST_VARIABLES = 3
 OF_CONTACT = {"velocity_sign", "dwell"}
 """Variables of the functions that show how fast a contact ages and wears."""
 
-Form = float | Contact | None
-"""Width of a direction, contact of a dwell; nothing of other variables."""
+Form = float | Contact | bool | None
+"""Width of a direction, contact of a dwell, and of a velocity next to a direction that its size
+counts; nothing of other variables."""
 
 LOOSE_PLACES = ("loss", "deflection", "actuator")
 
@@ -100,7 +101,7 @@ class Function:
     ) -> FloatArray:
         """Return a variable's hat functions on the run's grid, or one and the direction."""
         channel = _channel(run, self.place, variable, equation, self.as_read)
-        form = _form(variable, self.width, self.contact)
+        form = _form(variable, self.variables, self.width, self.contact)
         values = _values_of(run, variable, channel, form)
         if variable == "velocity_sign":
             if "turn" in self.variables:  # what repeats in both directions is a ripple
@@ -160,13 +161,19 @@ def _function(
     layout: Layout, place: Place, variables: tuple[str, ...], contact: Contact | None = None
 ) -> Function:
     width, counts = direction_width(layout, place), _counts(variables)
-    forms = {v: _form(v, width, contact) for v in variables}
+    forms = {v: _form(v, variables, width, contact) for v in variables}
     knots = tuple(_knots(layout, place, v, forms[v], counts[v]) for v in variables)
     return Function(place, variables, knots, width, contact)
 
 
-def _form(variable: str, width: float, contact: Contact | None) -> Form:
-    """Return the part of a form that a variable's values depend on."""
+def _form(variable: str, variables: Sequence[str], width: float, contact: Contact | None) -> Form:
+    """Return the part of a form that a variable's values depend on.
+
+    Any function of a velocity is one of its size and its direction, so that its knots are twice as
+    dense at the same number of columns.
+    """
+    if variable == "velocity" and "velocity_sign" in variables:
+        return True
     return {"velocity_sign": width, "dwell": contact}.get(variable)
 
 
@@ -226,6 +233,8 @@ def _channel(
 
 def _worked_out(run: RunSignals, variable: str, name: str, form: Form) -> FloatArray:
     whole = run.channels[name]
+    if form is True:
+        return np.abs(run.on_grid(name))
     if isinstance(form, float):
         return np.tanh(run.on_grid(name) / form)
     if variable == "history":
