@@ -1,5 +1,6 @@
 """What a diagnosis remarks on besides its findings: one sentence each."""
 
+import itertools
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
 
@@ -25,6 +26,9 @@ from estimation.model import AT_BOUND, Model
 from estimation.noise import MOST_ERROR, MOST_NOISE, noise_of, noisy_sentence
 from estimation.recording import Recording
 from estimation.signals import Signals
+
+FEW = 4
+"""At most one run in so many is far apart from the others."""
 
 
 def apart(found: Iterable[Apart], is_left_out: bool = False) -> Iterator[str]:
@@ -92,7 +96,7 @@ def left(
 def far(
     layout: Layout, sizes: Mapping[str, Mapping[str, float]], recordings: Sequence[Recording]
 ) -> Iterator[str]:
-    """Yield the run of which an equation's error is far larger than that of all others.
+    """Yield the few runs of which an equation's error is far larger than that of all others.
 
     A run at an end of what was recorded may be the one that shows an effect. `sizes` has the error
     of each equation in each run, in the unit of the target.
@@ -100,19 +104,27 @@ def far(
     several = {name: found for name, found in sizes.items() if len(found) > 1}
     ratios = over_noise(layout, {name: max(found.values()) for name, found in several.items()})
     for name, found in several.items():
-        *_, second, largest = sorted(found, key=found.__getitem__)
-        is_far = found[largest] > LARGER * found[second]
-        if is_far and is_unexplained(ratios.get(name, math.inf)):
-            factor = f"{found[largest] / max(found[second], TINY):.2g}"
-            text = f"{name}: the error in {largest} is {factor} times that in any other run."
-            fault = f"Check what happened in it, or exclude the run: --exclude {largest}."
-            if end := _end(layout, layout.equations[name], largest, recordings):
-                fault = (
-                    f"It has {end} of all runs: either an effect that the equation lacks shows"
-                    " there, and more such runs would identify it, or something happened in it, and"
-                    f" it is to be excluded: --exclude {largest}."
-                )
-            yield f"{text} {fault}"
+        runs = sorted(found, key=found.__getitem__, reverse=True)
+        gaps = [found[one] / max(found[next_], TINY) for one, next_ in itertools.pairwise(runs)]
+        gap = max(gaps[: max(1, len(runs) // FEW)])
+        if gap < LARGER or not is_unexplained(ratios.get(name, math.inf)):
+            continue
+        odd = runs[: gaps.index(gap) + 1]
+        if len(odd) > 1:
+            yield (
+                f"{name}: the errors in {', '.join(sorted(odd))} are at least {gap:.2g} times that"
+                " in any other run. Compare what these runs have in common; more runs like them"
+                " would identify an effect that acts in some of the runs only."
+            )
+            continue
+        fault = f"Check what happened in it, or exclude the run: --exclude {odd[0]}."
+        if end := _end(layout, layout.equations[name], odd[0], recordings):
+            fault = (
+                f"It has {end} of all runs: either an effect that the equation lacks shows"
+                " there, and more such runs would identify it, or something happened in it, and"
+                f" it is to be excluded: --exclude {odd[0]}."
+            )
+        yield f"{name}: the error in {odd[0]} is {gap:.2g} times that in any other run. {fault}"
 
 
 def _end(layout: Layout, equation: Equation, run: str, recordings: Sequence[Recording]) -> str:

@@ -180,9 +180,11 @@ def _judged(
     """Return the causes that the test runs confirm with their findings, and notes on the others."""
     confirmed, rejected = _confirmed(found, held_out)
     opened: dict[int, _Opened] = {}
-    spread = [len(one.scored.candidate.cause.place.equations) for one in confirmed]
+    tried = [one.scored.candidate for one in confirmed]
     # each equation is refitted on its own, where a cause of several ones could stand in for another
-    for k in sorted(range(len(confirmed)), key=spread.__getitem__):
+    # one; and a smooth function could stand in for a named cause of its variables
+    order = [(len(one.cause.place.equations), one.is_function) for one in tried]
+    for k in sorted(range(len(confirmed)), key=order.__getitem__):
         one = _opened(confirmed[k], [o.kept for o in opened.values()], held_out, refits)
         if one is None:
             candidate = confirmed[k].scored.candidate

@@ -115,6 +115,20 @@ def test_a_run_with_a_far_larger_error_is_named(knocked: int | None) -> None:
     assert named == ([] if knocked is None else [runs[knocked].name])
 
 
+def test_two_runs_with_far_larger_errors_are_named_together() -> None:
+    """What acts in one training run and in one test run can be no finding."""
+    runs = turning(lambda angle, speed, acceleration: 0.0 * speed)
+    sealed = split(runs)
+    odd = {sealed.discover[1], sealed.confirm[0]}
+    for k, run in enumerate(runs):
+        if run.name in odd:
+            torque = run["crank_torque_n_m"].copy()
+            torque[len(torque) // 2 :] += 10.0 * np.std(torque)
+            runs[k] = run.with_columns(crank_torque_n_m=torque)
+    (note,) = [n for n in diagnose(runs, [axis()], sealed).notes if "the errors in" in n]
+    assert f"the errors in {', '.join(sorted(odd))} are at least" in note
+
+
 @pytest.mark.parametrize(
     ("warmth", "another", "words"),
     [
