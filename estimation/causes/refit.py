@@ -351,11 +351,12 @@ class Refit:
                 held[name] = None
             else:
                 step = max(1, int(run.whole.sample_rate_hz / (4 * model.low_pass.cutoff_hz)))
+                # what a cause reads decides no motion: before and after count the same samples
+                own = {c: x for c, x in run.whole.columns.items() if c not in key}
+                whole = replace(run.whole, columns=own)
                 held[name] = (
                     run,
-                    settled_places(
-                        run.whole, model.low_pass, step, self.model.samples, model.signals
-                    ),
+                    settled_places(whole, model.low_pass, step, model.samples, model.signals),
                 )
         return held[name]
 

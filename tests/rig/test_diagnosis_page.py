@@ -51,6 +51,30 @@ def diagnosed() -> tuple[Diagnosis, Traces]:
     return replace(found.diagnosis, findings=(doubted,), **told), traces(found)
 
 
+def _with_play(angle_rad, gap_rad=0.02):
+    """Return the angle of a shaft that follows another one after a gap."""
+    out, at = np.empty_like(angle_rad), angle_rad[0]
+    for k, x in enumerate(angle_rad):
+        out[k] = at = min(max(at, x - gap_rad), x + gap_rad)
+    return out
+
+
+def test_the_errors_before_and_after_a_cause_of_a_shaft_that_rests_are_of_the_same_samples():
+    """The ripple is that of the output shaft, which rests at every reversal of the motor."""
+    rippled = campaign(lambda angle, speed, load: 3e-3 * np.sin(35 * _with_play(angle / 35)))
+    runs = [
+        run.with_columns(spindle_angle_rad=_with_play(run["motor_angle_rad"] / 35))
+        for run in rippled
+    ]
+    found = answer(runs, [model_file.read(Path("motor"))], split(runs, 0))
+    (finding,) = found.diagnosis.findings
+    assert finding.family == "ripple.output"
+    for run in traces(found).equations["motor"].runs:
+        counted = [run.time_s, run.measured, run.before, run.after, *run.channels.values()]
+        assert len({len(values) for values in counted}) == 1
+        assert 0.0 < np.std(run.after) < np.std(run.before)
+
+
 @pytest.fixture(scope="module")
 def text(diagnosed):
     return page(*diagnosed, Provenance.now(1))
