@@ -229,7 +229,7 @@ def _form_of_others(plain: Joint, joint: Joint, folds: Folds) -> float:
 def _differs(one: Scored, joint: Joint, folds: Folds) -> bool:
     """Whether a change is worth its price where the same cause acts in both campaigns as well."""
     shared = laid_out(joint, Claim(one.candidate.cause))
-    if shared is None:  # a declared column
+    if one.candidate.cause.is_declared or shared is None:  # in both already
         return True
     both = joint.with_cause(shared.laid, shared.precision)
     changed = replace(Claim(one.candidate.cause), acts=one.candidate.acts, given=True)
