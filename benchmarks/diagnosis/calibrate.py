@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import beta
 
-from benchmarks.rigs import CALIBRATE, NoCaseError, draw
+from benchmarks.rigs import CALIBRATE, draw
 from estimation import model_file
 from estimation.campaign import Campaign
 from estimation.causes.findings import Probability
@@ -128,11 +128,8 @@ def main() -> int:
     asked += [(kind, k) for k in range(options.cases) for kind in KINDS]
     done = []
     for number, (kind, k) in enumerate(asked, start=1):
-        try:
-            done.append(_searched(options.out, kind, options.seed + k, models))
-            sys.stderr.write(f"{number} of {len(asked)}: {done[-1].name}\n")
-        except NoCaseError as error:  # no rig of this seed can be drawn
-            sys.stderr.write(f"{number} of {len(asked)} left out: {error}\n")
+        done.append(_searched(options.out, kind, options.seed + k, models))
+        sys.stderr.write(f"{number} of {len(asked)}: {done[-1].name}\n")
     write_text_atomic(options.page, _page(done, options.seed))
     sys.stderr.write(f"{options.page} written\n")
     return 0

@@ -18,7 +18,8 @@ from estimation.campaign import Campaign
 from estimation.recording import Recording
 from rig.errors import RigError, UsageError
 
-ATTEMPTS = 40
+ATTEMPTS = 400
+"""Rigs that are drawn before a seed is given up: of a few seeds the first 40 fail."""
 
 
 class NoCaseError(RigError):
