@@ -52,8 +52,9 @@ def measure() -> dict[str, list[str]]:
     with tempfile.TemporaryDirectory() as folder:
         for name in CONFIGS:
             unasked |= heard(["live", "-c", name, "--plain", "--duration", "3"])
-        unasked |= heard(["record", "-p", "unloaded", "-o", f"{folder}/campaign"])
-    asked = heard(["live", "--plain", "--duration", "3", "--foxglove", "--foxglove-port", "8799"])
+        unasked |= heard(["record", "--sim", "-p", "unloaded", "-o", f"{folder}/campaign"])
+    watched = ["live", "--sim", "--plain", "--duration", "3"]
+    asked = heard([*watched, "--foxglove", "--foxglove-port", "8799"])
     return {"unasked": sorted(unasked), "asked": sorted(asked)}
 
 
