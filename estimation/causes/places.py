@@ -169,8 +169,9 @@ def _own(
     """Return the place of an equation, by the angles of its shafts and those of all."""
     angle = _own_angle(equation, angles)
     roles = _motion(angle) | _shared(angles, _position(angles, angle))
-    effort = next((n for n in equation.channels if n.endswith(EFFORTS)), equation.target)
-    roles |= {"load": (effort,)}
+    efforts = tuple(n for n in equation.channels if n.endswith(EFFORTS)) or (equation.target,)
+    effort = efforts[0]
+    roles |= {"load": efforts}
     if not angle:  # a curve over a force has the history of that force
         roles |= {"travel": (effort,)}
     if equation.of_angle:
@@ -196,7 +197,7 @@ def _own(
     if inputs := _inputs(layout, equation, known | set(everywhere)):
         others = (*others, inputs)
         pressed = (c for c in inputs if c.endswith("_pa"))  # a seal is, by a pressure
-        roles |= {"load": (effort, *pressed)}
+        roles |= {"load": (*efforts, *pressed)}
     return Place(equation.name, "loss", equation.name, enters, roles, others=others)
 
 

@@ -480,3 +480,45 @@ def test_what_depends_on_the_place_does_not_depend_on_the_load_by_its_estimate(s
     found = diagnose(runs, [model], split(runs)).findings
     assert "carriage_position" in found[0].depends_on
     assert not any("load" in one.depends_on for one in found)
+
+
+TWO_LOADS = """
+schema = "rig.machine/1"
+machine = { name = "press of two cells", cutoff_hz = 20.0, run_offsets = false }
+axis = [{ name = "ram", unit = "m" }]
+sensor = [
+  { name = "ram_position_m", axis = "ram", reads = "position" },
+  { name = "drive_force_n", reads = "other" },
+  { name = "left_force_n", reads = "other" },
+  { name = "right_force_n", reads = "other" },
+]
+[[equation]]
+name = "ram"
+target = "drive_force_n"
+effects = [
+  { id = "transmission.ratio", channels = { load = "left_force_n" } },
+  { id = "transmission.ratio", channels = { load = "right_force_n" } },
+  { id = "friction.coulomb", channels = { speed = "ram_velocity_m_s" } },
+  { id = "sensor.offset" },
+]
+"""
+
+
+@pytest.mark.parametrize("loaded", ["left", "right"])
+def test_friction_may_grow_with_either_of_two_loads(loaded):
+    def columns(k, random, position, speed, acceleration):
+        loads = {
+            "left": 40.0 + 20.0 * (k % 3) + 10.0 * position,
+            "right": 40.0 + 20.0 * ((k // 3) % 3) + 5.0 * speed,
+        }
+        drive = sum(loads.values()) + (4.0 + 0.08 * loads[loaded]) * np.tanh(speed / 0.05)
+        made = {"ram_position_m": 0.1 * position, "drive_force_n": drive}
+        made |= {f"{side}_force_n": load for side, load in loads.items()}
+        return {
+            name: values + (name != "ram_position_m") * random.normal(0.0, 0.1, len(values))
+            for name, values in made.items()
+        }
+
+    (finding,) = found_in(TWO_LOADS, recorded(columns))
+    assert (finding.verdict, finding.family) == ("identified", "friction.load")
+    assert finding.parameters["friction"].value == pytest.approx(0.08, rel=0.1)
