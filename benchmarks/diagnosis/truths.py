@@ -142,6 +142,7 @@ NOT_HIDDEN = {
     "coupling.torque": "needs another axis with a torque of its own",
     "unknown": "the answer to what no catalogue holds",
     "friction.condition": "friction.load: the rig's conditions are its loads",
+    "sensor.gain_by_position": "the simulated torque sensors are in line with their shafts",
     "sensor.thermal": "the rig measures no temperature",
     "transmission.thermal": "the rig measures no temperature",
 }

@@ -60,6 +60,7 @@ OF_KIND: Mapping[str, tuple[str, ...]] = {
     ),
     "torque sensor": (
         "sensor.gain_nonlinear",
+        "sensor.gain_by_position",
         "sensor.drift",
         "sensor.thermal",
         "sensor.creep",
@@ -106,6 +107,7 @@ OF_FEW = (
     "motor.dead_zone",  # of a command: the rig's motor is read by its measured current
     "motor.gain_by_side",
     "motor.gain_by_position",  # a rotating motor has a ripple of its constant instead
+    "sensor.gain_by_position",  # its torque sensors are in line with their shafts
 )
 """Families that the reference rig has in the equations that their effects name, and in no other."""
 

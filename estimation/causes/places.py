@@ -340,5 +340,7 @@ def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None
         **CLOCKS,
         "other_reading": tuple(n for n in others if n != channel),
     }
+    if not angle:
+        roles |= {"position": tuple(related(layout, layout.equations[home], angles))}
     kind: Kind = "angle sensor" if angle else "torque sensor"
     return Place(f"sensor {channel}", kind, home, tuple(enters), roles)

@@ -8,8 +8,8 @@ from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
 class GainByPosition(Pointwise):
     """A force or torque constant that depends on where the moving part is in the magnet's field.
 
-    Equation: torque = current (a position + b position^2), current in A, position in rad, a in
-    N m/(A rad), b in N m/(A rad^2).
+    Equation: torque = current (a position + b position^2 + c position^3), current in A, position in
+    rad, a in N m/(A rad), b in N m/(A rad^2), c in N m/(A rad^3).
 
     Check: measure the stall torque at one current at several positions.
 
@@ -25,10 +25,15 @@ class GainByPosition(Pointwise):
         Parameter(
             "bend", "target / current / position / position", "quadratic change with position"
         ),
+        Parameter(
+            "twist",
+            "target / current / position / position / position",
+            "cubic change with position",
+        ),
     )
     told_apart_by = "stall at one current at several positions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
-        along = inputs["current"] * inputs["position"]
-        return along, inputs["position"] * along
+        current, position = inputs["current"], inputs["position"]
+        return current * position, current * position**2, current * position**3

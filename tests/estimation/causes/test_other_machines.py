@@ -522,3 +522,23 @@ def test_friction_may_grow_with_either_of_two_loads(loaded):
     (finding,) = found_in(TWO_LOADS, recorded(columns))
     assert (finding.verdict, finding.family) == ("identified", "friction.load")
     assert finding.parameters["friction"].value == pytest.approx(0.08, rel=0.1)
+
+
+@pytest.mark.parametrize("changes", ["sensor", "motor"])
+def test_a_gain_that_changes_along_the_travel_is_that_of_the_sensor_or_of_the_drive(changes):
+    """The cell reads the load alone, the current has the friction too."""
+
+    def columns(k, random, position, speed, acceleration):
+        gain = 1.0 + 0.2 * position
+        load = 40.0 * (k % 3 + 1) + 10.0 * np.sin(0.7 * np.arange(len(position)) / RATE_HZ + k)
+        drive = load + 6.0 * np.tanh(speed / 0.05) + 4.0 * speed + 0.3 * acceleration
+        return {
+            "ram_position_m": 0.1 * position,
+            "motor_current_a": drive / 20.0 / (gain if changes == "motor" else 1.0)
+            + random.normal(0.0, 0.02, len(load)),
+            "load_force_n": load * (gain if changes == "sensor" else 1.0)
+            + random.normal(0.0, 0.2, len(load)),
+        }
+
+    (finding,) = found_in(PRESS, recorded(columns))
+    assert (finding.verdict, finding.family) == ("identified", f"{changes}.gain_by_position")
