@@ -20,6 +20,8 @@ from estimation.plant_models import declared
 from estimation.recording import FloatArray, Recording
 from tests.estimation.causes.synthetic import axis, turning
 
+pytestmark = pytest.mark.long
+
 RATE_HZ, SECONDS, RUNS = 100.0, 12.0, 10
 
 CYLINDER = """
