@@ -24,7 +24,6 @@ WAYS = {
     "process": ("pty", ""),
     "can": ("canopen_virtual", ""),
 }
-REAL_TIME = ("process", "can")
 Logs = dict[str, LogFile]
 COMMON = ("spindle_angle_rad", "target_angle_rad", "motor_angle_rad", "motor_current_a")
 
@@ -102,7 +101,5 @@ def test_every_way_is_shown_live(way, library, protocol, tmp_path, said):
     words = ("live --pace 0 --duration 1 --json -c", configured(way, tmp_path), "-p", protocol)
     *_, last = (json.loads(line) for line in said(*words).out.splitlines())
     assert last["summary"]["ended"] == "finished"
-    lost, samples = last["summary"]["lost"], last["summary"]["samples"]
-    assert lost == 0 or way in REAL_TIME  # a busy machine may read too late; no sample is uncounted
-    assert samples + lost >= 1000
-    assert samples > lost
+    assert last["summary"]["lost"] == 0
+    assert last["summary"]["samples"] >= 1000
