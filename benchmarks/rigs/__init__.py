@@ -5,7 +5,7 @@ rig, its controller and sensors, the protocol and the form of what is hidden are
 seed, over factors; a form is a random function, so no case repeats another's formula.
 """
 
-from benchmarks.rigs.case import Case, NoCaseError, draw
+from benchmarks.rigs.case import Case, draw
 from benchmarks.rigs.recipes import KINDS
 from benchmarks.rigs.seeds import CALIBRATE, DEVELOP, JUDGE, part_of
 from benchmarks.rigs.structure import HiddenTruth, Truth
@@ -17,7 +17,6 @@ __all__ = [
     "KINDS",
     "Case",
     "HiddenTruth",
-    "NoCaseError",
     "Truth",
     "draw",
     "part_of",

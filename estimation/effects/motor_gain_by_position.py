@@ -2,7 +2,8 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
+from estimation.effects.along import along, amplitudes_along
+from estimation.effects.effect import Inputs, Pointwise, Row, Shape
 
 
 class GainByPosition(Pointwise):
@@ -20,20 +21,9 @@ class GainByPosition(Pointwise):
     id = "motor.gain_by_position"
     balances: ClassVar = {"grasp": -1}
     roles: ClassVar = {"current": "motor_current_a", "position": "spindle_angle_rad"}
-    amplitudes = (
-        Parameter("slope", "target / current / position", "linear change with position"),
-        Parameter(
-            "bend", "target / current / position / position", "quadratic change with position"
-        ),
-        Parameter(
-            "twist",
-            "target / current / position / position / position",
-            "cubic change with position",
-        ),
-    )
+    amplitudes = amplitudes_along("current")
     told_apart_by = "stall at one current at several positions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
-        current, position = inputs["current"], inputs["position"]
-        return current * position, current * position**2, current * position**3
+        return along("current", inputs)

@@ -2,7 +2,8 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import Inputs, Parameter, Pointwise, Row, Shape
+from estimation.effects.along import along, amplitudes_along
+from estimation.effects.effect import Inputs, Pointwise, Row, Shape
 
 
 class SensorGainByPosition(Pointwise):
@@ -19,20 +20,9 @@ class SensorGainByPosition(Pointwise):
 
     id = "sensor.gain_by_position"
     roles: ClassVar = {"reading": "distal_torque_n_m", "position": "spindle_angle_rad"}
-    amplitudes = (
-        Parameter("slope", "target / reading / position", "linear change with position"),
-        Parameter(
-            "bend", "target / reading / position / position", "quadratic change with position"
-        ),
-        Parameter(
-            "twist",
-            "target / reading / position / position / position",
-            "cubic change with position",
-        ),
-    )
+    amplitudes = amplitudes_along("reading")
     told_apart_by = "one reference weight at several positions"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
-        reading, position = inputs["reading"], inputs["position"]
-        return reading * position, reading * position**2, reading * position**3
+        return along("reading", inputs)
