@@ -143,7 +143,8 @@ NOT_HIDDEN = {
     "unknown": "the answer to what no catalogue holds",
     "friction.condition": "friction.load: the rig's conditions are its loads",
     "sensor.gain_by_position": "the simulated torque sensors are in line with their shafts",
+    "ripple.sensor": "the simulated torque sensors are in line with their shafts",
     "sensor.thermal": "the rig measures no temperature",
-    "transmission.thermal": "the rig measures no temperature",
+    "transmission.thermal": "the rig measures no temperature, and its compliances stay constant",
 }
 """Families that no case hides, and why the simulated rig cannot."""

@@ -40,7 +40,16 @@ VARIABLE_OF_ROLE: Mapping[str, str] = {
 }
 """Role of an effect to the variable that a finding names."""
 
-BY_CHANNEL = ("position", "output_angle", "motor_angle", "encoder", "stop", "tilt", "condition")
+BY_CHANNEL = (
+    "position",
+    "output_angle",
+    "motor_angle",
+    "turning_angle",
+    "encoder",
+    "stop",
+    "tilt",
+    "condition",
+)
 """Roles of an angle, a position or a condition, which a finding names by its channel."""
 
 OTHER_ROLES = ("other_reading", "other_angle", "other_torque")
@@ -297,7 +306,7 @@ def variables_of(candidate: Candidate) -> tuple[str, ...]:
     found = [name for role, channel in cause.channels if (name := _variable(role, channel))]
     if cause.family == "friction.dwell":
         found = ["dwell" if v == "time" else v for v in found]
-    follows_speed = cause.effect.id.endswith(".viscous") or cause.family.endswith(
+    follows_speed = ".viscous" in cause.effect.id or cause.family.endswith(
         ("viscous_asymmetry", "drag", "stribeck", "load_viscous")
     )
     if cause.family.startswith("friction.") and not follows_speed:

@@ -145,6 +145,12 @@ def turns(layout: Layout, position: str) -> bool:
     return position.endswith("_angle_rad") and travel_of(layout, position) > 2.0 * math.pi
 
 
+def has_both_signs(layout: Layout, channel: str) -> bool:
+    """Whether a reading goes to either side, to the lesser one a tenth as far or more."""
+    low, high = _range(layout, channel)
+    return min(high, -low) > 0.1 * max(high, -low)
+
+
 def least_order(layout: Layout, angle: str) -> float:
     """Return the least order that repeats: with fewer periods any smooth form looks like a wave."""
     return LEAST_PERIODS * 2 * math.pi / travel_of(layout, angle)

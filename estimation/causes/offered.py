@@ -8,7 +8,7 @@ from dataclasses import replace
 from scipy.signal import detrend
 
 from estimation.causes.angles import angles_of, travel_of
-from estimation.causes.grids import axis, last_order, least_order, turns
+from estimation.causes.grids import axis, has_both_signs, last_order, least_order, turns
 from estimation.causes.layout import Layout
 from estimation.causes.orders import largest_orders, orders_elsewhere
 from estimation.causes.places import Place
@@ -34,6 +34,7 @@ is `friction.load`, the first one a factor of the load, which equations have.
 NOT_A_LOSS = (
     "motor.",
     "ripple.current",
+    "ripple.sensor",
     "sensor.",
     "transmission.",
     "hysteresis.bouc_wen.twist",
@@ -46,6 +47,7 @@ OF_KIND: Mapping[str, tuple[str, ...]] = {
         "motor.",
         "ripple.current",
         "sensor.delay",
+        "sensor.lag",
         "sensor.gain_nonlinear",
         "sensor.drift",
         "change.step.offset",
@@ -61,6 +63,7 @@ OF_KIND: Mapping[str, tuple[str, ...]] = {
     "torque sensor": (
         "sensor.gain_nonlinear",
         "sensor.gain_by_position",
+        "ripple.sensor",
         "sensor.drift",
         "sensor.thermal",
         "sensor.creep",
@@ -108,14 +111,24 @@ OF_FEW = (
     "motor.gain_by_side",
     "motor.gain_by_position",  # a rotating motor has a ripple of its constant instead
     "sensor.gain_by_position",  # its torque sensors are in line with their shafts
+    "ripple.sensor",
 )
 """Families that the reference rig has in the equations that their effects name, and in no other."""
 
-OF_ANY_ORDER = ("ripple.motor", "ripple.output", "ripple.current", "eccentric.load")
+OF_ANY_ORDER = (
+    "ripple.motor",
+    "ripple.output",
+    "ripple.sensor",
+    "ripple.current",
+    "eccentric.load",
+)
 """Waves that a shaft may make which turns by another ratio; an encoder is on its own shaft."""
 
-ZEROS = ("sensor.drift", "change.step.offset")
-"""Changes of a zero or of a constant force: of a drive that is an equation's target."""
+OF_TARGET = ("sensor.drift", "change.step.offset", "sensor.lag")
+"""Effects of a drive that is an equation's target: a zero, a constant force, a late reading."""
+
+BY_SIDE = ("motor.gain_by_side", "sensor.gain_nonlinear.by_side")
+"""Gains of either side: of a reading that is nearly always of one sign, these are one gain."""
 
 SERIES = ("inertia.position.harmonics",)
 """Effects of several harmonics of one turn: over less than a turn these are nearly the same."""
@@ -135,6 +148,8 @@ def sources_at(
             if any(c not in layout.runs[0].channels for _, c in channels):
                 continue
             if effect.id in SERIES and not turns(layout, dict(channels)["position"]):
+                continue
+            if effect.id in BY_SIDE and not has_both_signs(layout, channels[0][1]):
                 continue
             odd = _follows_noise(layout, place, effect, channels)
             axes = [axis(layout, place, effect, p, dict(channels)) for p in effect.shape]
@@ -217,11 +232,15 @@ def _acts(layout: Layout, effect: Effect, place: Place) -> bool:
         return False  # a drive that is stated as a force has a sensor's place, too
     if (place.home, place.kind) == ("calibration.encoder", "deflection"):
         return False  # slower than a count a sample, the pattern of the counts passes for a bend
-    if place.kind == "actuator" and effect.id.startswith(ZEROS):
+    if place.kind == "actuator" and effect.id.startswith(OF_TARGET):
         return layout.equations[place.home].target in place.roles["current"]
     is_known = kind in KNOWN and any(name in layout.measured for name in SENSORS)
     if effect.family in OF_FEW and is_known and kind not in effect.balances:
         return False  # a wrapped cable or a linkage, not a shaft in its bearings
+    if place.kind == "actuator" and effect.id == "sensor.gain_nonlinear.by_side":
+        return False  # the gain of a drive by its side
+    if effect.id == "ripple.sensor" and len(place.equations) < 2:
+        return False  # in one equation a torque at the shaft has the same form
     if (place.kind == "lever") != (effect.id == "eccentric.load.pulley"):
         return False
     if place.kind == "deflection" and effect.id.endswith(".lugre"):

@@ -341,6 +341,8 @@ def _sensor(layout: Layout, channel: str, angles: Sequence[str]) -> Place | None
         "other_reading": tuple(n for n in others if n != channel),
     }
     if not angle:
-        roles |= {"position": tuple(related(layout, layout.equations[home], angles))}
+        along = tuple(related(layout, layout.equations[home], angles))
+        roles |= {"position": along}
+        roles |= {"turning_angle": tuple(a for a in along if a.endswith("_angle_rad"))}
     kind: Kind = "angle sensor" if angle else "torque sensor"
     return Place(f"sensor {channel}", kind, home, tuple(enters), roles)

@@ -43,7 +43,7 @@ class Warmup(Remembering):
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "clock": "time_s"}
     amplitudes = (Parameter("friction", "target", "loss at the start minus the final loss"),)
-    shape = (
+    shape: ClassVar[tuple[Parameter, ...]] = (
         Parameter("time", "clock", "time after which 37 % remains", 0.5, 60.0, points=6),
         Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-2, 50.0, points=6),
     )
@@ -70,7 +70,7 @@ class CampaignWarmup(Pointwise):
     balances: ClassVar = {"motor": -1, "cable": 1, "grasp": -1, "joint": 1}
     roles: ClassVar = {"speed": "motor_velocity_rad_s", "campaign_clock": "campaign_time_s"}
     amplitudes = (Parameter("friction", "target", "loss at the start minus the final loss"),)
-    shape = (
+    shape: ClassVar[tuple[Parameter, ...]] = (
         Parameter("time", "campaign_clock", "time after which 37 % remains", 30, 2e4, points=6),
         Parameter("width", "speed", "speed at which friction reaches 76 %", 1e-2, 50.0, points=6),
     )
@@ -132,3 +132,55 @@ class ViscousWarmup(MeasuredWarmup):
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
         return ((REFERENCE_K - inputs["temperature"]) * inputs["speed"],)
+
+
+@numba.njit(cache=True)
+def _walk_viscous(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
+    for i in range(len(now)):
+        rows[i, 0] = np.exp(-age(now[i, 1], state) / shape[0]) * now[i, 0]
+
+
+class ViscousRunWarmup(Warmup):
+    """Viscous friction of cold grease or oil that decreases with warming, over a run.
+
+    Equation: torque = D exp(-t / time) speed, t from the run's first sample. D in N m s/rad, time
+    in s.
+
+    Check: let the rig run until it is warm and repeat the first run.
+
+    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010 (friction of a robot joint as
+    it warms), to first order in temperature.
+    """
+
+    id = "friction.warmup.viscous.run"
+    meaning = "viscous friction that changes over a run"
+    amplitudes = (
+        Parameter("damping", "target / speed", "damping at the start minus the final damping"),
+    )
+    shape = Warmup.shape[:1]
+    walk = _walk_viscous
+
+
+class ViscousCampaignWarmup(CampaignWarmup):
+    """Viscous friction of cold grease or oil that decreases with warming, over a campaign.
+
+    Equation: torque = D exp(-t / time) speed, t from the start of the first run. D in N m s/rad,
+    time in s.
+
+    Check: repeat the first run at the end of the campaign and after a night.
+
+    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010 (friction of a robot joint as
+    it warms), to first order in temperature.
+    """
+
+    id = "friction.warmup.viscous.campaign"
+    meaning = "viscous friction that changes over the hours of a campaign"
+    amplitudes = (
+        Parameter("damping", "target / speed", "damping at the start minus the final damping"),
+    )
+    shape = CampaignWarmup.shape[:1]
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        fade = np.exp(-np.maximum(inputs["campaign_clock"], 0.0) / shape[0])
+        return (fade * inputs["speed"],)

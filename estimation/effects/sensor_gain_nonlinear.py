@@ -24,7 +24,7 @@ class NonlinearGain(Pointwise):
     id = "sensor.gain_nonlinear"
     balances: ClassVar = {"motor": 1, "gearbox": 1, "cable": 1, "stretch": 1, "grasp": 1}
     roles: ClassVar = {"reading": "motor_load_n_m"}
-    amplitudes = (
+    amplitudes: ClassVar[tuple[Parameter, ...]] = (
         Parameter("square", "target / reading / reading", "quadratic term"),
         Parameter("cube", "target / reading / reading / reading", "cubic term"),
         Parameter("sided", "target / reading / reading", "signed square: gain by the load's size"),
@@ -36,3 +36,27 @@ class NonlinearGain(Pointwise):
         reading = inputs["reading"]
         square = reading * reading
         return square, square * reading, reading * np.abs(reading)
+
+
+class SensorGainBySide(NonlinearGain):
+    """A gain of its own for either sign of the load, as of a load cell in tension and compression.
+
+    Equation: error = a |reading|, a in the target's unit per unit of the reading: half the gain of
+    reading > 0 less that of reading < 0.
+
+    Check: load the sensor with the same reference weight in both directions.
+
+    Source: ISO 376:2011, which calibrates a force transducer in tension and in compression apart.
+    """
+
+    id = "sensor.gain_nonlinear.by_side"
+    meaning = "a sensor whose gain differs by the sign of its load"
+    balances: ClassVar = {}
+    amplitudes = (
+        Parameter("asymmetry", "target / reading", "half the gain of reading > 0 less < 0"),
+    )
+    told_apart_by = "the same reference weight in both directions"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        return (np.abs(inputs["reading"]),)

@@ -1,6 +1,8 @@
-"""Temperature of a transmission: a compliance that follows a measured temperature."""
+"""Temperature of a transmission: a compliance that changes with it, measured or over time."""
 
 from typing import ClassVar
+
+import numpy as np
 
 from estimation.effects.effect import REFERENCE_K, Inputs, Parameter, Pointwise, Row, Shape
 
@@ -28,3 +30,32 @@ class ThermalCompliance(Pointwise):
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
         return (inputs["load"] * (inputs["temperature"] - REFERENCE_K),)
+
+
+class CampaignCompliance(ThermalCompliance):
+    """A compliance that settles to its warm or seated value while a rig works for minutes or hours.
+
+    Equation: deflection = a load exp(-t / time), t from the start of the first run. a in the
+    target's unit per unit of the load, time in s.
+
+    Check: repeat the first run at the end of the campaign and after a night.
+
+    Source: Ferry 1980 (moduli of polymers over temperature), to first order, with Newton's law of
+    cooling.
+    """
+
+    id = "transmission.thermal.campaign"
+    meaning = "a compliance that changes over the minutes or hours of a campaign"
+    roles: ClassVar = {"load": "proximal_torque_n_m", "campaign_clock": "campaign_time_s"}
+    amplitudes = (
+        Parameter("compliance", "target / load", "compliance at the start less the final one"),
+    )
+    shape = (
+        Parameter("time", "campaign_clock", "time after which 37 % remains", 30, 2e4, points=6),
+    )
+    told_apart_by = "the first run repeated at the end, and again after a night"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        fade = np.exp(-np.maximum(inputs["campaign_clock"], 0.0) / shape[0])
+        return (inputs["load"] * fade,)

@@ -23,7 +23,13 @@ from rig.output.provenance import Provenance
 from rig.simulation.reference_roles import MOTOR_LOAD, candidates
 from rig.studies.loop.selection import Chosen, grid, selected
 
-TIMELESS = ("change.step", "friction.warmup", "sensor.drift", "motor.thermal")
+TIMELESS = (
+    "change.step",
+    "friction.warmup",
+    "motor.thermal",
+    "sensor.drift",
+    "transmission.thermal",
+)
 """Excluded families: they depend on the time since the start, which is irrelevant to a new load."""
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from estimation import plant_file
 from estimation.causes.candidates import candidates, every_claim
@@ -544,3 +545,89 @@ def test_a_gain_that_changes_along_the_travel_is_that_of_the_sensor_or_of_the_dr
 
     (finding,) = found_in(PRESS, recorded(columns))
     assert (finding.verdict, finding.family) == ("identified", f"{changes}.gain_by_position")
+
+
+ELASTIC = """
+schema = "rig.machine/1"
+machine = { name = "elastic joint", cutoff_hz = 20.0 }
+axis = [{ name = "motor", unit = "rad" }, { name = "joint", unit = "rad" }]
+transmission = [
+  { name = "gear", input = "motor", output = "joint", ratio = 10.0, compliant = true },
+]
+actuator = [{ name = "motor_current_a", axis = "motor" }]
+sensor = [
+  { name = "motor_angle_rad", axis = "motor", reads = "position" },
+  { name = "joint_angle_rad", axis = "joint", reads = "position" },
+  { name = "joint_torque_n_m", axis = "joint", reads = "effort" },
+]
+"""
+
+
+def _elastic(reads, *, bends=lambda k: 1.0, rubs=lambda k: 1.0):
+    """Return the columns of a joint behind a spring.
+
+    `reads` gives the cell's reading from torque and motor angle; the bend and the viscous friction
+    of run k have a factor.
+    """
+
+    def columns(k, random, position, speed, acceleration):
+        torque = 10.0 * (1 + k % 3) * np.sin(position) + 2.0 * acceleration
+        motor = 10.0 * (position + bends(k) * torque / 800.0)
+        turned = RATE_HZ * np.gradient(motor)
+        drive = torque / 10.0 + 0.2 * np.tanh(turned / 0.5) + 0.03 * rubs(k) * turned
+        made = {
+            "motor_angle_rad": (motor, 1e-4),
+            "joint_angle_rad": (position, 1e-5),
+            "joint_torque_n_m": (reads(torque, motor), 0.05),
+            "motor_current_a": (drive / 0.2, 0.02),
+        }
+        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+
+    return recorded(columns)
+
+
+@pytest.mark.parametrize(
+    ("reads", "family"),
+    [
+        (lambda torque, motor: torque + 0.2 * np.abs(torque), "sensor.gain_nonlinear"),
+        (lambda torque, motor: torque + 0.8 * np.sin(2.0 * motor), "ripple.sensor"),
+    ],
+    ids=["gain by side", "ripple"],
+)
+def test_an_error_of_a_cell_that_two_equations_read_is_one_finding(reads, family):
+    """As a torque and as a bend it would be two effects."""
+    (finding,) = found_in(ELASTIC, _elastic(reads))
+    assert (finding.verdict, finding.family) == ("identified", family)
+    assert finding.place == "sensor joint_torque_n_m"
+
+
+def _cold(k: int) -> float:
+    return float(1.0 + 0.4 * np.exp(-k / 4.0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "form"),
+    [
+        ({"bends": _cold}, "transmission.thermal.campaign"),
+        ({"rubs": _cold}, "friction.warmup.viscous.campaign"),
+    ],
+    ids=["compliance", "damping"],
+)
+def test_a_bend_or_a_viscous_friction_may_settle_over_a_campaign(changes, form):
+    (finding,) = found_in(ELASTIC, _elastic(lambda torque, motor: torque, **changes))
+    assert (finding.verdict, finding.form) == ("identified", form)
+
+
+def test_a_pressure_behind_a_filter_is_late_by_a_lag():
+    def columns(k, random, position, speed, acceleration):
+        rod = 1e5 * (60.0 + 40.0 * (k % 3)) + 2e5 * position
+        head = 0.6 * rod + 5e4 * np.tanh(speed / 0.05) + 2e4 * speed
+        late = lfilter([0.25], [1.0, -0.75], head - head[0]) + head[0]  # 30 ms
+        return {
+            "piston_position_m": 0.1 * position,
+            "rod_pressure_pa": rod + random.normal(0.0, 1e3, len(rod)),
+            "head_pressure_pa": late + random.normal(0.0, 1e3, len(rod)),
+        }
+
+    (finding,) = found_in(CYLINDER, recorded(columns))
+    assert "sensor.lag" in (finding.family, *finding.alternatives)
