@@ -134,33 +134,6 @@ class ViscousWarmup(MeasuredWarmup):
         return ((REFERENCE_K - inputs["temperature"]) * inputs["speed"],)
 
 
-@numba.njit(cache=True)
-def _walk_viscous(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    for i in range(len(now)):
-        rows[i, 0] = np.exp(-age(now[i, 1], state) / shape[0]) * now[i, 0]
-
-
-class ViscousRunWarmup(Warmup):
-    """Viscous friction of cold grease or oil that decreases with warming, over a run.
-
-    Equation: torque = D exp(-t / time) speed, t from the run's first sample. D in N m s/rad, time
-    in s.
-
-    Check: let the rig run until it is warm and repeat the first run.
-
-    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010 (friction of a robot joint as
-    it warms), to first order in temperature.
-    """
-
-    id = "friction.warmup.viscous.run"
-    meaning = "viscous friction that changes over a run"
-    amplitudes = (
-        Parameter("damping", "target / speed", "damping at the start minus the final damping"),
-    )
-    shape = Warmup.shape[:1]
-    walk = _walk_viscous
-
-
 class ViscousCampaignWarmup(CampaignWarmup):
     """Viscous friction of cold grease or oil that decreases with warming, over a campaign.
 
