@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -14,6 +15,7 @@ from estimation.channels import unit_or_none
 from estimation.derived import CAMPAIGN_TIME, measured_channels
 from estimation.errors import EstimationError
 from estimation.filters import FilterError
+from estimation.fit_problem import prepared as prepared_runs
 from estimation.fitting import fit
 from estimation.model import Model
 from estimation.opposed import FIX, opposed
@@ -104,7 +106,7 @@ def lay_out(
                     "A deflection from another ratio is mostly travel.",
                     "Correct the ratio in the machine file, or the counts of one of the sensors.",
                 )
-            fitted = fit(model, campaign, bootstrap=0, every=None)
+            fitted = _fitted(model, campaign)
             if contradicted := opposed(fitted, campaign):
                 raise LayoutError(
                     contradicted,
@@ -119,6 +121,38 @@ def lay_out(
     runs, lost = _laid_out(timed, equations, measured)
     reasons = {name: str(error) for name, error in undecided.items()}
     return Layout(equations, runs, measured, conditions=differ, undecided=reasons, left_out=lost)
+
+
+def _fitted(model: Model, campaign: Campaign) -> Model:
+    """Return a model fitted on all runs, with the shapes that the motion within runs shows.
+
+    A level that differs between runs, such as the zero of a sensor, would draw the shapes too.
+    """
+    fitted = fit(model, campaign, bootstrap=0, every=None)
+    if model.run_offsets or not _varies_within_runs(fitted, campaign):
+        return fitted
+    with suppress(EstimationError):  # a load that is held in each run
+        within = fit(replace(model, run_offsets=True), campaign, bootstrap=0, every=None)
+        kept = replace(within, run_offsets=False)
+        return fit(kept, campaign, bootstrap=0, every=None, shapes="keep")
+    return fitted
+
+
+def _varies_within_runs(model: Model, campaign: Campaign) -> bool:
+    """Whether each term with a shape varies more within runs than its level is.
+
+    Friction does not where no run turns back, and what the shape then shows is another effect.
+    """
+    shaped = [term for term in model.terms if term.effect.shape]
+    for term in shaped:
+        level = varying = 0.0
+        for run in prepared_runs(model, campaign):
+            columns = run.columns(term, term.numbers(term.effect.shape))
+            level += float(np.sum(columns.mean(axis=0) ** 2) * len(columns))
+            varying += float(np.sum(columns.var(axis=0)) * len(columns))
+        if varying <= level:
+            return False
+    return bool(shaped)
 
 
 def _is_whole(recording: Recording, channel: str) -> bool:

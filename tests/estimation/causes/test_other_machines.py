@@ -631,3 +631,20 @@ def test_a_pressure_behind_a_filter_is_late_by_a_lag():
 
     (finding,) = found_in(CYLINDER, recorded(columns))
     assert "sensor.lag" in (finding.family, *finding.alternatives)
+
+
+def test_a_zero_that_moved_between_runs_does_not_draw_the_width_of_friction():
+    """With one zero for all runs, friction would change its sign over a far wider range."""
+
+    def columns(k, random, position, speed, acceleration):
+        rope = (1.5, 4.5, 9.0, 15.0)[k % 4] * (1.0 + 0.02 * acceleration)
+        drive = rope + 2.4 * np.tanh(speed / 0.1) + speed + 0.2 * acceleration
+        made = {"motor_angle_rad": (position, 1e-5), "motor_current_a": (drive / 2.4, 0.01)}
+        made |= {"rope_torque_n_m": (rope + 2.0 * (k >= RUNS // 2), 0.05)}
+        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+
+    runs = recorded(columns)
+    laid = lay_out(declared(plant_file.parse(WINCH)), runs, [run.name for run in runs])
+    assert laid.equations["motor"].width == pytest.approx(0.1, rel=0.2)
+    found = diagnose(runs, declared(plant_file.parse(WINCH)), split(runs)).findings
+    assert any("sensor.offset" in (f.family, *f.alternatives) for f in found)
