@@ -7,8 +7,9 @@ Along the chain of axes that an actuator drives:
 - without a sensor of effort: drive = weights + inertia + friction, in the unit of the drive;
   a second drive of the axis is taken off, times the ratio of their gains; what a compliant
   transmission drives has an inertia of its own where its travel is read;
-- across a compliant transmission with its travel read at both ends and its effort at one: the bend
-  of known ratio, or the output's travel where the ratio is fitted, = compliance x effort.
+- across a compliant transmission with its travel read at both ends, there or a rigid transmission
+  away, and its effort at one: the bend of known ratio, or the output's travel where the ratio is
+  fitted, = compliance x effort.
 
 Each has an offset. Friction goes with the speed of the axis on the driving side of what loses it:
 a gearbox winds up before its output turns. Acceleration is taken from the driven axis, whose sensor
@@ -32,7 +33,7 @@ from estimation.plant import (
     Transmission,
     Written,
 )
-from estimation.signals import Combination, Reading, Share, Signals
+from estimation.signals import Combination, Reading, Signals
 
 OFFSET = Part("sensor.offset")
 RATE = {"N m": "_rate_n_m_s"}
@@ -149,13 +150,13 @@ def _onward(plant: Plant, chain: Chain) -> Iterator[Chain]:
 
 def bend_channel(plant: Plant, joint: Transmission) -> Combination | None:
     """Return the channel of a transmission's bend, None where no sensors or no ratio give it."""
-    driving, driven = plant.position(joint.input), plant.position(joint.output)
+    read = positions.rigidly(plant)
+    driving, driven = read.get(joint.input), read.get(joint.output)
     if not joint.compliant or joint.ratio is None or driving is None or driven is None:
         return None
     name = f"{joint.name}_differential_{plant.axis(joint.output).unit}"
-    return Combination(
-        name, (Share(driving.name, over=joint.ratio), Share(driven.name, times=-1.0))
-    )
+    before = replace(driving, over=driving.over * joint.ratio)
+    return Combination(name, (before, replace(driven, times=-driven.times)))
 
 
 def _bend_name(plant: Plant, joint: Transmission) -> str:
@@ -207,17 +208,12 @@ def _efforts(plant: Plant, chain: Chain) -> Iterator[Written]:
             for load in plant.loads
             if load.axis in chain.axes
         ]
-        others = [Part("transmission.ratio", -1, {"load": one.name}) for one in chain.also]
+        others = [_gain(one, -1) for one in chain.also]
         parts = (*weights, *_motion(plant, driven, driven, 1), *_swung(plant, chain, driven))
         if parts:
             yield Written(chain.actuator.axis, drive, (*others, *parts, OFFSET))
         return
-    gains = [
-        Part("transmission.ratio", 1, {"load": one.name})
-        if unit_of(one.name) in EFFORT.values()
-        else Part("motor.torque_constant", 1, {"source": one.name})
-        for one in (chain.actuator, *chain.also)
-    ]
+    gains = [_gain(one, 1) for one in (chain.actuator, *chain.also)]
     at, first = reading[0]
     own = _driven(plant, chain.axes[: at + 1]) or driven
     losses = _motion(plant, own, own, -1)
@@ -229,23 +225,34 @@ def _efforts(plant: Plant, chain: Chain) -> Iterator[Written]:
         yield Written(chain.joints[far - 1].name, here.name, parts)
 
 
+def _gain(drive: Actuator, sign: int) -> Part:
+    """Return a drive times a gain."""
+    if unit_of(drive.name) in EFFORT.values():
+        return Part("transmission.ratio", sign, {"load": drive.name})
+    return Part("motor.torque_constant", sign, {"source": drive.name})
+
+
 def _deflections(plant: Plant, chain: Chain) -> Iterator[Written]:
     """Yield the equations of the bends of a chain's transmissions."""
     for joint in chain.joints:
         driving, driven = plant.position(joint.input), plant.position(joint.output)
         load = plant.effort(joint.output) or plant.effort(joint.input)
-        if not (joint.compliant and driving and driven and load):
-            continue
         bend = bend_channel(plant, joint)
+        if not joint.compliant or load is None:
+            continue
         sign = 1 if bend else -1
         parts = [Part("compliance.link", sign, {"load": load.name})]
         unit = unit_of(load.name)
         if joint.damped and unit in RATE:
             rate = load.name.removesuffix("_n_m") + RATE[unit]
             parts.append(Part("transmission.damping", -sign, {"rate": rate}))
-        if bend is None:
+        if bend is not None:
+            target = bend.name
+        elif driving is not None and driven is not None:
+            target = driven.name
             parts.insert(0, Part("transmission.ratio", 1, {"load": driving.name}))
-        target = bend.name if bend else driven.name
+        else:
+            continue
         yield Written(_bend_name(plant, joint), target, (*parts, OFFSET))
 
 
@@ -293,9 +300,10 @@ def missing(plant: Plant) -> Iterator[Missing]:
             " it cannot be compared between runs.",
             f"A sensor of position on {axis_of[speed]}.",
         )
+    read = positions.rigidly(plant)
     for joint in plant.transmissions:
         ends = (joint.input, joint.output)
-        absent = [f"of position on {axis}" for axis in ends if not plant.position(axis)]
+        absent = [f"of position on {axis}" for axis in ends if axis not in read]
         if not any(plant.effort(axis) for axis in ends):
             absent.append(f"of effort on {joint.output} or {joint.input}")
         if joint.compliant and absent:

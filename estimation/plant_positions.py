@@ -4,10 +4,10 @@ An axis without an encoder has the position that a transmission of known ratio g
 there is none is its speed integrated: an integral drifts and begins at 0 in each run.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from estimation.plant import ACCELERATION, POSITION, SPEED, Plant
+from estimation.plant import ACCELERATION, POSITION, SPEED, Plant, Transmission
 from estimation.signals import Combination, Share
 
 BY_SPEED = "_by_speed"
@@ -21,18 +21,19 @@ def joined(plant: Plant) -> tuple[Combination, ...]:
     The other way round the bend would count as many times as the ratio.
     """
     shares = _encoders(plant)
-    found = _along(plant, shares)
+    found = _along(plant.transmissions, plant, shares)
     for axis in plant.axes:
         if axis.name not in shares and plant.speed(axis.name) is not None:
             shares[axis.name] = Share(plant.moved(axis.name, POSITION))
-    return (*found, *(c for c in _along(plant, shares) if c.name not in {f.name for f in found}))
+    known = {c.name for c in found}
+    return (*found, *(c for c in _along(plant.transmissions, plant, shares) if c.name not in known))
 
 
 def followers(plant: Plant) -> set[str]:
     """Return the axes without an encoder whose position follows from one that has one."""
     shares = _encoders(plant)
     read = {*shares}
-    _along(plant, shares)
+    _along(plant.transmissions, plant, shares)
     return {*shares} - read
 
 
@@ -77,16 +78,25 @@ def speeds(plant: Plant, integrated: Mapping[str, str]) -> tuple[Combination, ..
     )
 
 
+def rigidly(plant: Plant) -> dict[str, Share]:
+    """Return the axes with an encoder, or with one a rigid transmission away, to their position."""
+    shares = _encoders(plant)
+    _along([joint for joint in plant.transmissions if not joint.compliant], plant, shares)
+    return shares
+
+
 def _encoders(plant: Plant) -> dict[str, Share]:
     """Return the axes with a sensor of position, to that position."""
     read = {axis.name: plant.position(axis.name) for axis in plant.axes}
     return {axis: Share(sensor.name) for axis, sensor in read.items() if sensor is not None}
 
 
-def _along(plant: Plant, shares: dict[str, Share]) -> list[Combination]:
-    """Return the positions that follow from those of axes, and add their axes to these."""
+def _along(
+    joints: Sequence[Transmission], plant: Plant, shares: dict[str, Share]
+) -> list[Combination]:
+    """Return the positions that transmissions give from those of axes; add their axes to these."""
     found: dict[str, Combination] = {}
-    for joint in plant.transmissions * len(plant.transmissions):  # along a chain of any order
+    for joint in [*joints] * len(joints):  # along a chain of any order
         ways = [(joint.input, joint.output, joint.ratio)]
         if joint.ratio and not joint.compliant:
             ways.append((joint.output, joint.input, 1.0 / joint.ratio))

@@ -142,6 +142,11 @@ NOT_HIDDEN = {
     "coupling.torque": "needs another axis with a torque of its own",
     "unknown": "the answer to what no catalogue holds",
     "friction.condition": "friction.load: the rig's conditions are its loads",
+    **dict.fromkeys(
+        ("inertia.condition", "motor.condition"),
+        "the rig's conditions are its loads, which have neither a mass nor a supply",
+    ),
+    "sensor.hysteresis": "the simulated torque sensors have no loop",
     "sensor.gain_by_position": "the simulated torque sensors are in line with their shafts",
     "ripple.sensor": "the simulated torque sensors are in line with their shafts",
     "sensor.thermal": "the rig measures no temperature",

@@ -170,7 +170,8 @@ class Moved(Source):
     """A declared term with another factor.
 
     Attributes:
-        column: Number of its equation's declared column; None of an offset or a sensor's gain.
+        column: Number of its equation's declared column; None of an offset, and of the gain of a
+            sensor that several equations read.
         of_all: Whether all terms of its equation differ alike.
     """
 
@@ -179,7 +180,7 @@ class Moved(Source):
 
     @property
     def is_declared(self) -> bool:
-        """A declared term, or all; an offset and another sensor's gain are in no column."""
+        """A declared term, or all; other offsets and gains are in no column."""
         return self.column is not None or self.of_all
 
     @property
@@ -256,16 +257,29 @@ def amplitudes_of(layout: Layout) -> Iterator[Moved]:
 def gains_of(layout: Layout) -> Iterator[Moved]:
     """Yield the gains of drives that are targets, and of all sensors of a torque or a force.
 
-    By that of a target which no other equation reads, all terms of its equation differ.
+    By that of a target which no other equation reads, all terms of its equation differ. That of
+    another one which one equation reads is the factor of its declared term, by another name.
     """
     for place in places_of(layout):
         target, of_all = layout.equations[place.home].target, reads_target_alone(layout, place)
         if place.name == f"actuator {target}" and of_all and not target.endswith(EFFORTS):
             constant, source = effect("motor.torque_constant"), (("source", target),)
             yield Moved(place, constant, source, (), (0,), of_all=True)
-        elif place.kind == "torque sensor" and (of_all or len(place.enters) > 1):
-            reading = (("reading", place.roles["reading"][0]),)
-            yield Moved(place, effect("sensor.gain"), reading, (), (0,), of_all=of_all)
+        elif place.kind == "torque sensor":
+            (reading,) = place.roles["reading"]
+            alone = len(place.enters) == 1 and not of_all
+            column = _column_of(layout, place.home, reading) if alone else None
+            if alone and column is None:  # it is read as a share of another channel
+                continue
+            gain, channels = effect("sensor.gain"), (("reading", reading),)
+            yield Moved(place, gain, channels, (), (0,), column=column, of_all=of_all)
+
+
+def _column_of(layout: Layout, equation: str, channel: str) -> int | None:
+    """Return the number of the declared column that a channel is a constant times."""
+    kinds = layout.equations[equation].kinds
+    found = (k for k, kind in enumerate(kinds) if kind.channel == channel and not kind.of_shape)
+    return next(found, None)
 
 
 def reads_target_alone(layout: Layout, place: Place) -> bool:
@@ -284,7 +298,7 @@ def moved_terms(joint: Joint) -> list[tuple[Claim, Products]]:
     usual, weights = joint.left_out([[]]).base[0], joint.weights
     out = []
     for one in (*amplitudes_of(joint.layout), *gains_of(joint.layout)):
-        if one.effect.id == "sensor.gain" and not one.of_all:
+        if one.effect.id == "sensor.gain" and not one.is_declared:
             out.append((Claim(one), _products(joint, one, usual)))
             continue
         is_offset = one.effect.id == OFFSET and not joint.has_offsets(one.place.home)

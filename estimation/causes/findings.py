@@ -32,6 +32,7 @@ VARIABLE_OF_ROLE: Mapping[str, str] = {
     "creeping": "load",
     "current": "current",
     "drive": "current",
+    "source": "current",
     "clock": "time",
     "elapsed": "time",
     "campaign_clock": "time",

@@ -127,6 +127,8 @@ def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
     for others in place.others:  # a joint carries the joints behind it, and is carried
         chosen += [(v,) for v in others]
         chosen += [*itertools.product(own, others), *((others[0], v) for v in others[1:])]
+    if place.kind == "actuator" and len(place.equations) == 1:
+        chosen = [v for v in chosen if "current" in v]  # the others are those of its equation
     tried = _contacts(layout, place) if "dwell" in known else []
     for variables in chosen:
         if "dwell" not in variables:

@@ -67,6 +67,7 @@ OF_KIND: Mapping[str, tuple[str, ...]] = {
         "sensor.drift",
         "sensor.thermal",
         "sensor.creep",
+        "sensor.hysteresis",
         "sensor.lag",
         "sensor.delay",
         "sensor.crosstalk",
@@ -107,6 +108,8 @@ SENSORS = ("proximal_torque_n_m", "distal_torque_n_m")
 OF_FEW = (
     "friction.capstan",
     "inertia.position",
+    "inertia.condition",  # its conditions are its loads, and its load has no mass
+    "motor.condition",
     "motor.dead_zone",  # of a command: the rig's motor is read by its measured current
     "motor.gain_by_side",
     "motor.gain_by_position",  # a rotating motor has a ripple of its constant instead

@@ -101,7 +101,7 @@ def places_of(layout: Layout) -> list[Place]:
     for k, place in enumerate(found):
         if warmth and place.kind in WARMED:
             place = replace(place, roles={**place.roles, "temperature": warmth})
-        if layout.conditions and place.kind == "loss":
+        if layout.conditions and place.kind in ("loss", "actuator"):
             place = replace(place, roles={**place.roles, "condition": layout.conditions})
         found[k] = place
     return found

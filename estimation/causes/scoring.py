@@ -197,7 +197,9 @@ def _turned(joint: Joint, group: Group, outcome: Outcome) -> NDArray[np.bool_]:
             continue
         at = joint.bounded_at(home, cause.column)
         if at is not None:
-            change = float(outcome.amplitudes[k, 0] / one.size[0])
+            column = joint.layout.equations[home].kinds[cause.column or 0]
+            unit = column.sign * cause.place.enters[0].gain  # a sensor's gain is a share of it
+            change = unit * float(outcome.amplitudes[k, 0] / one.size[0])
             found[k] = outcome.declared[k, at] + change < -TURNED * abs(change)
         if joint.layout.equations[home].target in cause.reads and outcome.promising[k]:
             factor = outcome.factor(k, np.flatnonzero(one.acts))

@@ -14,7 +14,7 @@ from estimation.effects.effect import (
     Row,
     Shape,
 )
-from estimation.effects.memory import BEGINNING, age
+from estimation.effects.memory import BEGINNING, age, not_settled
 from estimation.recording import FloatArray
 
 
@@ -78,8 +78,7 @@ class CampaignWarmup(Pointwise):
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
-        fade = np.exp(-np.maximum(inputs["campaign_clock"], 0.0) / shape[0])
-        return (fade * np.tanh(inputs["speed"] / shape[1]),)
+        return (not_settled(inputs, shape[0]) * np.tanh(inputs["speed"] / shape[1]),)
 
 
 class MeasuredWarmup(Pointwise):
@@ -155,5 +154,4 @@ class ViscousCampaignWarmup(CampaignWarmup):
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
-        fade = np.exp(-np.maximum(inputs["campaign_clock"], 0.0) / shape[0])
-        return (fade * inputs["speed"],)
+        return (not_settled(inputs, shape[0]) * inputs["speed"],)

@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 
-from estimation.effects.effect import Parameter
+from estimation.effects.effect import Inputs, Parameter
 from estimation.recording import FloatArray
 
 BEGINNING = (0.0, 0.0)
@@ -16,6 +16,12 @@ def age(time: float, state: FloatArray) -> float:
     if not state[0]:
         state[0], state[1] = 1.0, time
     return float(time - state[1])
+
+
+def not_settled(inputs: Inputs, time_s: float) -> FloatArray:
+    """Return the share of a change over a campaign that is yet to come, 1 at its start."""
+    share: FloatArray = np.exp(-np.maximum(inputs["campaign_clock"], 0.0) / time_s)
+    return share
 
 
 @numba.njit(cache=True)

@@ -14,7 +14,7 @@ from estimation.effects.effect import (
     Row,
     Shape,
 )
-from estimation.effects.memory import BEGINNING, age
+from estimation.effects.memory import BEGINNING, age, not_settled
 from estimation.recording import FloatArray
 
 
@@ -82,7 +82,7 @@ class CampaignWarming(Pointwise):
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
-        return (-inputs["current"] * np.expm1(-np.maximum(inputs["campaign_clock"], 0) / shape[0]),)
+        return (inputs["current"] * (1.0 - not_settled(inputs, shape[0])),)
 
 
 class MeasuredThermalLoss(Pointwise):

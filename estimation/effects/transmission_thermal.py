@@ -2,9 +2,8 @@
 
 from typing import ClassVar
 
-import numpy as np
-
 from estimation.effects.effect import REFERENCE_K, Inputs, Parameter, Pointwise, Row, Shape
+from estimation.effects.memory import not_settled
 
 
 class ThermalCompliance(Pointwise):
@@ -57,5 +56,4 @@ class CampaignCompliance(ThermalCompliance):
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
-        fade = np.exp(-np.maximum(inputs["campaign_clock"], 0.0) / shape[0])
-        return (inputs["load"] * fade,)
+        return (inputs["load"] * not_settled(inputs, shape[0]),)

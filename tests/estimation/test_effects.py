@@ -181,7 +181,7 @@ def excited(names, index: int) -> Recording:
             columns[name] = 35.0 * angle
         elif name in ("spindle_angle_rad", "jaw_angle_rad", "joint_2_angle_rad"):
             columns[name] = angle * {"s": 1.0, "j": 0.9}[name[0]]
-        elif name.endswith("_kg"):
+        elif name.endswith(("_kg", "_v")):
             columns[name] = np.full(len(time_s), 0.2 * (1 + index))
         elif name.endswith("_k"):
             columns[name] = 300.0 + 10 * (1 - np.exp(-time_s / 3)) + 2 * index

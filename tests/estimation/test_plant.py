@@ -341,7 +341,10 @@ def test_two_drives_of_one_axis_are_in_one_equation():
     drives = tuple(Actuator(f"{side}_current_a", "carriage") for side in ("left", "right"))
     (equation,) = equations(replace(SLIDE, actuators=drives))
     assert equation.target == "left_current_a"
-    assert (equation.parts[0].sign, equation.parts[0].channels) == (-1, {"load": "right_current_a"})
+    assert (equation.parts[0].sign, equation.parts[0].channels) == (
+        -1,
+        {"source": "right_current_a"},
+    )
     cell = Sensor("carriage_force_n", "carriage", "effort")
     (equation,) = equations(replace(SLIDE, actuators=drives, sensors=(*SLIDE.sensors, cell)))
     sources = [p.channels["source"] for p in equation.parts if p.id == "motor.torque_constant"]

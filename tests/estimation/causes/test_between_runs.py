@@ -71,6 +71,31 @@ def test_friction_that_follows_a_stated_condition_is_named_with_the_condition() 
     assert finding.parameters["slope"].value == pytest.approx(0.03, rel=0.1)
 
 
+def test_an_inertia_that_follows_a_payload_is_named_with_the_payload() -> None:
+    def swung(speed: FloatArray, payload_kg: float, _: float) -> FloatArray:
+        return np.asarray(0.004 * payload_kg * np.gradient(speed) * RATE_HZ)
+
+    (finding,) = diagnosed(swung).findings
+    assert (finding.verdict, finding.family) == ("identified", "inertia.condition")
+    assert {*finding.depends_on} == {"acceleration", "payload_kg"}
+    assert finding.parameters["slope"].value == pytest.approx(0.004, rel=0.1)
+
+
+def test_a_gain_that_follows_a_supply_voltage_is_named_with_the_voltage() -> None:
+    """A command is a share of the supply, which the machine file does not have."""
+    runs = []
+    for k, run in enumerate(turning()):
+        supply_v = (10.5, 11.4, 12.3)[k % 3]
+        random = np.random.default_rng(k)
+        command = run["crank_torque_n_m"] / (0.1 * supply_v) + random.normal(0, 2e-3, len(run))
+        known = replace(run, conditions={"supply_voltage_v": supply_v})
+        runs.append(known.with_columns(crank_duty_ratio=command))
+    models = declared(plant_file.parse(AXIS.replace("DRIVE", "crank_duty_ratio")))
+    (finding,) = diagnose(runs, list(models), split(runs)).findings
+    assert (finding.verdict, finding.family) == ("identified", "motor.condition")
+    assert {*finding.depends_on} == {"current", "supply_voltage_v"}
+
+
 def test_a_condition_and_a_temperature_that_rise_together_are_not_distinguished() -> None:
     (finding,) = diagnosed(of_payload, together=True).findings
     named = {finding.family, *finding.alternatives}

@@ -601,6 +601,36 @@ def test_an_error_of_a_cell_that_two_equations_read_is_one_finding(reads, family
     assert finding.place == "sensor joint_torque_n_m"
 
 
+def _looped(load: FloatArray, reach: float) -> FloatArray:
+    """Return a loop over the load, -1 to 1, that follows it exponentially."""
+    state, loop = 0.0, np.zeros(len(load))
+    for k, step in enumerate(np.diff(load, prepend=load[0])):
+        state += (step - abs(step) * state) / reach
+        loop[k] = state
+    return loop
+
+
+def test_a_cell_with_hysteresis_that_two_equations_read_is_one_finding():
+    def reads(torque, motor):
+        return torque - 0.6 * _looped(torque, 2.0)
+
+    (finding,) = found_in(ELASTIC, _elastic(reads))
+    assert (finding.verdict, finding.family) == ("identified", "sensor.hysteresis")
+    assert finding.place == "sensor joint_torque_n_m"
+
+
+def test_hysteresis_of_a_cell_is_among_the_causes_where_one_equation_reads_it():
+    def columns(k, random, position, speed, acceleration):
+        rope = (1.5, 4.5, 9.0)[k % 3] + 3.0 * np.sin(2.0 * position) + 0.2 * acceleration
+        drive = rope + 0.4 * np.tanh(speed / 0.1) + speed
+        made = {"motor_angle_rad": (position, 1e-5), "motor_current_a": (drive / 2.4, 0.01)}
+        made |= {"rope_torque_n_m": (rope - 0.5 * _looped(rope, 0.5), 0.05)}
+        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+
+    (finding,) = found_in(WINCH, recorded(columns))
+    assert "sensor.hysteresis" in {finding.family, *finding.alternatives}
+
+
 def _cold(k: int) -> float:
     return float(1.0 + 0.4 * np.exp(-k / 4.0))
 
@@ -648,3 +678,91 @@ def test_a_zero_that_moved_between_runs_does_not_draw_the_width_of_friction():
     assert laid.equations["motor"].width == pytest.approx(0.1, rel=0.2)
     found = diagnose(runs, declared(plant_file.parse(WINCH)), split(runs)).findings
     assert any("sensor.offset" in (f.family, *f.alternatives) for f in found)
+
+
+FINGER = """
+schema = "rig.machine/1"
+machine = { name = "finger", cutoff_hz = 20.0 }
+axis = [
+  { name = "motor", unit = "rad" },
+  { name = "spool", unit = "rad" },
+  { name = "joint", unit = "rad" },
+]
+transmission = [
+  { name = "gear", input = "motor", output = "spool", ratio = 20.0 },
+  { name = "tendon", input = "spool", output = "joint", ratio = 2.0, compliant = true },
+]
+actuator = [{ name = "motor_current_a", axis = "motor" }]
+sensor = [
+  { name = "motor_angle_rad", axis = "motor", reads = "position" },
+  { name = "joint_angle_rad", axis = "joint", reads = "position" },
+  { name = "spool_torque_n_m", axis = "spool", reads = "effort" },
+  { name = "joint_torque_n_m", axis = "joint", reads = "effort" },
+]
+"""
+
+
+def _pulled(*, bends=lambda k: 1.0, read=lambda k: 1.0):
+    """Return the columns of a finger; the bend and the reading at the joint have a factor a run."""
+
+    def columns(k, random, position, speed, acceleration):
+        torque = (0.3, 0.8, 1.5)[k % 3] * (1.2 + np.sin(2.0 * position)) + 0.02 * acceleration
+        pull = torque / 1.8 + 0.05 * np.tanh(speed / 0.02) + 0.02 * speed
+        motor = 20.0 * (2.0 * position + bends(k) * torque / 25.0)
+        turned = RATE_HZ * np.gradient(motor)
+        drive = pull / 20.0 + 1e-4 * turned + 0.008 * np.tanh(turned / 0.3)
+        made = {
+            "motor_angle_rad": (motor, 2e-3),
+            "joint_angle_rad": (position, 2e-4),
+            "spool_torque_n_m": (pull, 0.004),
+            "joint_torque_n_m": (read(k) * torque, 0.008),
+            "motor_current_a": (drive / 0.02, 0.02),
+        }
+        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+
+    return recorded(columns)
+
+
+def test_a_tendon_bends_whose_spool_turns_with_a_geared_motor():
+    """The spool has no encoder: its angle is the motor's over the ratio of a rigid gear."""
+    (finding,) = found_in(FINGER, _pulled(bends=lambda k: 1.4 if k >= RUNS // 2 else 1.0))
+    assert (finding.verdict, finding.family) == ("identified", "compliance.link")
+    assert "_differential_" in declared(plant_file.parse(FINGER))[-1].target
+
+
+def test_another_gain_of_a_cell_that_one_equation_reads_is_that_of_the_cell_or_of_its_term():
+    found = found_in(BEFORE_TENDON, _pulled(read=lambda k: 1.2 if k >= RUNS // 2 else 1.0))
+    (finding,) = found
+    assert finding.verdict == "one_of"
+    assert {finding.family, *finding.alternatives} == {"sensor.gain", "transmission.ratio"}
+
+
+BEFORE_TENDON = FINGER.replace(", compliant = true", "")
+
+GANTRY = """
+schema = "rig.machine/1"
+machine = { name = "gantry", cutoff_hz = 20.0, run_offsets = false }
+axis = [{ name = "beam", unit = "m" }]
+actuator = [
+  { name = "left_current_a", axis = "beam" },
+  { name = "right_current_a", axis = "beam" },
+]
+sensor = [{ name = "beam_position_m", axis = "beam", reads = "position" }]
+"""
+
+
+def test_another_gain_of_a_second_drive_is_its_torque_constant():
+    def columns(k, random, position, speed, acceleration):
+        force = 40.0 * acceleration + 120.0 * speed + 50.0 * np.tanh(speed / 0.02)
+        share = 0.5 + 0.1 * position
+        right = 0.8 if k >= RUNS // 2 else 1.0
+        made = {
+            "beam_position_m": (position, 1e-5),
+            "left_current_a": (share * force / 60.0, 0.02),
+            "right_current_a": ((1.0 - share) * force / 60.0 / right, 0.02),
+        }
+        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+
+    (finding,) = found_in(GANTRY, recorded(columns))
+    assert (finding.verdict, finding.family) == ("identified", "motor.torque_constant")
+    assert finding.depends_on == ("current",)
