@@ -15,7 +15,6 @@ from estimation.channels import unit_or_none
 from estimation.derived import CAMPAIGN_TIME, measured_channels
 from estimation.errors import EstimationError
 from estimation.filters import FilterError
-from estimation.fit_problem import prepared as prepared_runs
 from estimation.fitting import fit
 from estimation.model import Model
 from estimation.opposed import FIX, opposed
@@ -124,35 +123,21 @@ def lay_out(
 
 
 def _fitted(model: Model, campaign: Campaign) -> Model:
-    """Return a model fitted on all runs, with the shapes that the motion within runs shows.
+    """Return a model fitted on all runs.
 
-    A level that differs between runs, such as the zero of a sensor, would draw the shapes too.
+    Where most of the error is a level of each run, such as the zero of a sensor that moved, its
+    shapes are those that the motion within runs shows: the levels would draw them.
     """
     fitted = fit(model, campaign, bootstrap=0, every=None)
-    if model.run_offsets or not _varies_within_runs(fitted, campaign):
+    error = fitted.evidence
+    has_levels = error is not None and error.rmse_with_means**2 > 2.0 * error.rmse**2
+    if model.run_offsets or not has_levels or not any(term.effect.shape for term in model.terms):
         return fitted
     with suppress(EstimationError):  # a load that is held in each run
         within = fit(replace(model, run_offsets=True), campaign, bootstrap=0, every=None)
         kept = replace(within, run_offsets=False)
         return fit(kept, campaign, bootstrap=0, every=None, shapes="keep")
     return fitted
-
-
-def _varies_within_runs(model: Model, campaign: Campaign) -> bool:
-    """Whether each term with a shape varies more within runs than its level is.
-
-    Friction does not where no run turns back, and what the shape then shows is another effect.
-    """
-    shaped = [term for term in model.terms if term.effect.shape]
-    for term in shaped:
-        level = varying = 0.0
-        for run in prepared_runs(model, campaign):
-            columns = run.columns(term, term.numbers(term.effect.shape))
-            level += float(np.sum(columns.mean(axis=0) ** 2) * len(columns))
-            varying += float(np.sum(columns.var(axis=0)) * len(columns))
-        if varying <= level:
-            return False
-    return bool(shaped)
 
 
 def _is_whole(recording: Recording, channel: str) -> bool:

@@ -199,7 +199,7 @@ def _follows_noise(
     readings = [c for _, c in channels if c in layout.measured]
     if effect.id.startswith(LOOPS) and effect.start() and place.kind == "deflection":
         readings = [c for c in readings if not c.endswith(ANGLES)]
-    elif not effect.id.startswith(FILTERS):
+    elif not effect.id.startswith((*FILTERS, "sensor.hysteresis")):
         return False
     return any(
         (c, entry.equation) not in layout.independent for c in readings for entry in place.enters
