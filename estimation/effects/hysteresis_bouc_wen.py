@@ -84,8 +84,11 @@ class BoucWen(Remembering):
 
 
 @numba.njit(cache=True)
-def _walk_twist(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Fill the rows; the state is that of `walk_loop`."""
+def walk_from_load(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
+    """Fill the rows of a loop that begins on the single loading from `settled` of the first load.
+
+    The state is that of `walk_loop`.
+    """
     if not state[0]:
         state[0], state[1] = 1.0, shape[2] * now[0, 0]
     walk_loop(now, shape, state, rows)
@@ -115,5 +118,5 @@ class Twist(BoucWen):
         Parameter("sharpness", "1", "sharpness of the corners", 1.0, 4.0, points=3),
         SETTLED,
     )
-    walk = _walk_twist
+    walk = walk_from_load
     told_apart_by = "loads of slowly growing and shrinking amplitude, and the same ten times slower"

@@ -2,20 +2,9 @@
 
 from typing import ClassVar
 
-import numba
-
 from estimation.effects.effect import Parameter, Remembering
-from estimation.effects.hysteresis_bouc_wen import walk_loop
+from estimation.effects.hysteresis_bouc_wen import walk_from_load
 from estimation.effects.transmission_relaxation import SETTLED
-from estimation.recording import FloatArray
-
-
-@numba.njit(cache=True)
-def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArray) -> None:
-    """Fill the rows; the state is that of `walk_loop`."""
-    if not state[0]:
-        state[0], state[1] = 1.0, shape[2] * now[0, 0]
-    walk_loop(now, shape, state, rows)
 
 
 class SensorHysteresis(Remembering):
@@ -41,6 +30,6 @@ class SensorHysteresis(Remembering):
         Parameter("sharpness", "1", "sharpness of the corners", 1.0, 4.0, points=3),
         SETTLED,
     )
-    walk = _walk
+    walk = walk_from_load
     rest = (0.0, 0.0, 0.0)
     told_apart_by = "steps of load up and down again"
