@@ -1,8 +1,7 @@
 """The calls of a notebook: read, declare, fit, diagnose, compare, predict, plot.
 
-`import rig` gives all of them. Nothing is loaded before it is used, and results are dataclasses of
-plain arrays; pandas and xarray are used only where asked for, and are not installed with this
-project.
+`import rig` gives all of them. Nothing is loaded before it is used. Results are dataclasses of
+plain arrays; pandas and xarray are used only where asked for, and are installed apart.
 
     import rig
 

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from estimation.causes.acting import Moved
+from estimation.causes.addition import Addition
 from estimation.causes.candidates import Candidate
 from estimation.causes.equations import sensitivity
 from estimation.causes.functions import Function, name_of_channel, names
 from estimation.causes.numbers import Numbers
-from estimation.causes.refit import Addition
 from estimation.causes.refits import Refits
 from estimation.causes.scoring import Scored, posterior
 from estimation.causes.sources import LATE, Source

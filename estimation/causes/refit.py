@@ -8,7 +8,7 @@ standstill friction takes any value.
 """
 
 import itertools
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from estimation.campaign import Campaign
 from estimation.causes import shapes
+from estimation.causes.addition import Addition
 from estimation.causes.numbers import DEFAULT, Numbers
+from estimation.causes.run_errors import Errors
 from estimation.derived import settled_places
 from estimation.fit_problem import OFFSET, FitError, FitRun, one_constant, prepared
 from estimation.fitting import fit
@@ -32,33 +34,6 @@ MOVES = 4
 
 DRAWS = 200
 """Campaigns drawn for the spreads of a written model."""
-
-Unwritten = Callable[[str, FloatArray], FloatArray]
-"""Name of a run and times in it to the columns of a cause that no model file holds, (n, k)."""
-
-
-@dataclass(frozen=True)
-class Addition:
-    """What one cause adds to an equation: a term of its model, or columns that no file can hold.
-
-    Attributes:
-        term: The term, or None.
-        acts: Names of the runs in which the term acts; in all when None.
-        unwritten: The columns if the term is None.
-        precision: Prior precision of an amplitude of these, in units of the inverse squared column.
-        is_change: Whether the term is a declared one whose factor differs, to either side.
-    """
-
-    term: Term | None = None
-    acts: frozenset[str] | None = None
-    unwritten: Unwritten | None = None
-    precision: float = 0.0
-    is_change: bool = False
-
-    @property
-    def is_written(self) -> bool:
-        """Whether a model file holds it."""
-        return self.term is not None and self.acts is None
 
 
 @dataclass(frozen=True)
@@ -78,55 +53,6 @@ class Solved:
     weights: FloatArray
     level: float
     squared: float
-
-
-@dataclass(frozen=True)
-class Errors:
-    """Squared errors of runs.
-
-    Attributes:
-        centred: Run to the sum of squares, its mean removed.
-        raw: The same with the mean left in.
-        samples: Run to its samples.
-    """
-
-    centred: Mapping[str, float]
-    raw: Mapping[str, float]
-    samples: Mapping[str, int]
-
-    @property
-    def rmse(self) -> float:
-        """Root mean square over all samples, each run's mean removed."""
-        return _rms(self.centred, self.samples)
-
-    @property
-    def rmse_with_means(self) -> float:
-        """Root mean square over all samples."""
-        return _rms(self.raw, self.samples)
-
-    @property
-    def by_run(self) -> dict[str, float]:
-        """Root mean square of each run, its mean removed."""
-        return {n: float(np.sqrt(x / self.samples[n])) for n, x in self.centred.items()}
-
-    def with_means(self) -> "Errors":
-        """Return the errors that count where runs have no offsets of their own."""
-        return replace(self, centred=self.raw)
-
-
-def that_falls(
-    before: Errors, after: Errors, with_means: bool, least: float
-) -> tuple[Errors, Errors, bool]:
-    """Return errors without and with a cause, of the kind by which it is confirmed.
-
-    That is the kind stated, with the means of runs left in or removed, or the other one where the
-    logarithm of that stated falls by less than `least`. Also whether the means are left in.
-    """
-    kinds = {False: (before, after), True: (before.with_means(), after.with_means())}
-    old, new = kinds[with_means]
-    if new.rmse > old.rmse * np.exp(-least):
-        with_means = not with_means
-    return *kinds[with_means], with_means
 
 
 class Refit:
@@ -379,10 +305,6 @@ def _contains(term: Term, declared: Term) -> bool:
     same_place = (declared.sign, declared.channels) == (term.sign, term.channels)
     inside = {*own.amplitudes} < {*other.amplitudes} and not own.shape
     return own.family == other.family and same_place and inside
-
-
-def _rms(squares: Mapping[str, float], samples: Mapping[str, int]) -> float:
-    return float(np.sqrt(sum(squares.values()) / max(1, sum(samples.values()))))
 
 
 def _terms(solved: Solved) -> list[tuple[Term, shapes.Moving]]:

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.causes.acting import Moved
+from estimation.causes.addition import Addition
 from estimation.causes.candidates import Candidate
 from estimation.causes.equations import Equation
 from estimation.causes.instruments import CLEAN, noise_share
 from estimation.causes.layout import Layout
 from estimation.causes.numbers import Numbers
-from estimation.causes.refit import MOVES, Addition, Errors, Refit, Solved
+from estimation.causes.refit import MOVES, Refit, Solved
+from estimation.causes.run_errors import Errors
 from estimation.causes.run_signals import RunSignals
 from estimation.causes.sources import LATE, Source
 from estimation.derived import origin_of

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from estimation.causes import remarks
 from estimation.causes.acting import Moved
+from estimation.causes.addition import Addition
 from estimation.causes.angles import signals_of
 from estimation.causes.apart import Apart, wrong_runs
 from estimation.causes.candidates import Candidate
@@ -28,8 +29,8 @@ from estimation.causes.instruments import add_instruments
 from estimation.causes.layout import Layout, lay_out, prepared
 from estimation.causes.levels import with_levels
 from estimation.causes.numbers import DEFAULT, Numbers
-from estimation.causes.refit import Addition, that_falls
 from estimation.causes.refits import Refits
+from estimation.causes.run_errors import that_falls
 from estimation.causes.scoring import DIGITS, probabilities
 from estimation.causes.search import Found, search
 from estimation.causes.unsteady import unsteady

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from estimation.causes.isolability import NOTHING, Isolable
-from estimation.causes.refit import Errors, that_falls
+from estimation.causes.run_errors import Errors, that_falls
 from estimation.changes.difference import Change, Difference
 from estimation.diagnosis.result import Diagnosis, Finding, Value
 from estimation.diagnosis.split import Sealed
