@@ -81,8 +81,13 @@ def left(
         equation, error = layout.equations[name], errors[name]
         if name in explained and not is_unexplained(ratio):
             continue
-        which = "left on" if name in explained else "on"
-        rest = "Most of it has no explanation here."
+        which, rest = "on", "Most of it has no explanation here."
+        if name in explained:
+            which = "left on"
+            rest = (
+                "Most of it has no explanation here; a diagnosis with the file of --model-out as"
+                " --model searches next to the findings."
+            )
         yield (
             f"{name}: the error {which} the test runs is {ratio:.2g} times the noise that"
             f" its readings show. {rest if is_unexplained(ratio) else 'Most of it is noise.'}"

@@ -149,7 +149,7 @@ def _importer(path: Path, format_name: str | None) -> Importer:
                 f"There is no importer {format_name!r}.", f"Installed: {', '.join(known)}."
             )
         return known[format_name]
-    if (name := _format_of(path)) is not None:
+    if (name := format_of(path)) is not None:
         return known[name]
     raise DataError(
         f"{path} holds no recording that rig reads by itself.",
@@ -179,10 +179,10 @@ def left_out(path: Path, campaign: Campaign) -> list[str]:
     taken = {run.source for run in campaign.runs}
     if None in taken:  # a table, whose machine file states which files are read
         return lines
-    formats = {_format_of(source) for source in taken if source is not None}
+    formats = {format_of(source) for source in taken if source is not None}
     reasons: dict[str, list[str]] = {}
     for file in files_below(path):
-        if file in taken or (name := _format_of(file)) is None:
+        if file in taken or (name := format_of(file)) is None:
             continue
         reason = (
             "an earlier attempt of a run, or repaired"
@@ -195,7 +195,8 @@ def left_out(path: Path, campaign: Campaign) -> list[str]:
     ]
 
 
-def _format_of(file: Path) -> str | None:
+def format_of(file: Path) -> str | None:
+    """Return the name of the importer that recognises a path, None where none does."""
     return next((name for name, one in importers().items() if one.recognises(file)), None)
 
 

@@ -1,5 +1,6 @@
 """Recordings of a machine that a file describes, and which of them have it in motion."""
 
+import csv
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -16,8 +17,9 @@ from estimation.plant import Plant
 from estimation.plant_equations import integrals
 from estimation.recording import Recording
 from rig.importers.log import IMPORTER as LOGS
-from rig.importers.registry import open_campaign
-from rig.importers.table.mapping import read_mapping
+from rig.importers.registry import format_of, open_campaign
+from rig.importers.table.data import TIME, Data
+from rig.importers.table.mapping import ColumnMapping, read_mapping
 from rig.importers.table.open import open_table
 from rig.machines.shipped import place_of, read_machine
 
@@ -30,6 +32,8 @@ def open_recordings(
 ) -> Campaign:
     """Open recordings as `open_campaign` does, those of a foreign table by the file's `[data]`.
 
+    Without `[data]`, CSV files are read whose columns are called as the machine's channels are.
+
     The machine is a file or the name of a shipped one; None is the reference rig.
 
     Raises:
@@ -38,11 +42,38 @@ def open_recordings(
     if machine is None:
         return open_campaign(path, format_name, skip_bad)
     file = place_of(machine)
-    if format_name is not None or LOGS.recognises(path) or not has_data(file):
+    plant, mapping = read_machine(file), None
+    if format_name is None and not LOGS.recognises(path):
+        mapping = read_mapping(file, ()) if has_data(file) else _by_name(path, plant, file)
+    if mapping is None:
         campaign = open_campaign(path, format_name, skip_bad)
     else:
-        campaign = open_table(path, read_mapping(file, ()), skip_bad)
-    return with_positions(campaign, read_machine(file))
+        campaign = open_table(path, mapping, skip_bad)
+    return with_positions(campaign, plant)
+
+
+def _by_name(path: Path, plant: Plant, file: Path) -> ColumnMapping | None:
+    """Return the mapping of CSV files whose columns are called as the machine's channels are.
+
+    None where a file lacks one of these, or the time in seconds: its columns have to be stated.
+    And None where an importer recognises the files, such as that of a table that rig wrote.
+    """
+    if format_of(path) is not None:
+        return None
+    of_loads = [load.name for load in plant.loads]
+    drives, sensors = ([part.name for part in of] for of in (plant.actuators, plant.sensors))
+    columns = {name: name for name in (TIME, *drives, *sensors, *of_loads)}
+    tables = sorted(path.glob("*.csv")) if path.is_dir() else [path] * path.is_file()
+    if not tables or not all(columns.keys() <= _head(table) for table in tables):
+        return None
+    data = Data.model_validate({"files": "*.csv", "columns": columns})
+    return ColumnMapping(data, file)
+
+
+def _head(table: Path) -> set[str]:
+    """Return the cells of a table's first line."""
+    with table.open(encoding="utf-8-sig", errors="replace", newline="") as stream:
+        return {cell.strip() for cell in next(csv.reader(stream), [])}
 
 
 def with_positions(campaign: Campaign, plant: Plant) -> Campaign:

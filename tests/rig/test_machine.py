@@ -379,6 +379,48 @@ def test_the_nearest_equation_is_proposed(slide, said):
     assert "Did you mean 'carriage'?" in printed
 
 
+def named_by_channel(folder: Path, rename: str = "") -> None:
+    """Write tables whose columns are called as the channels of the slide are."""
+    for k in range(4):
+        time_s = np.arange(0.0, 6.0, 0.01)
+        position_m = 0.1 * np.sin(time_s * (1.0 + 0.2 * k))
+        force_n = 10.0 * np.gradient(np.gradient(position_m, time_s), time_s) + 2.0 * np.sign(
+            np.gradient(position_m, time_s)
+        )
+        head = "carriage_position_m,time_s,drive_force_n,note_1".replace(rename or "?", "other")
+        table = np.column_stack([position_m, time_s, force_n, np.zeros(len(time_s))])
+        np.savetxt(folder / f"run-{k}.csv", table, delimiter=",", header=head, comments="")
+
+
+BARE = """
+schema = "rig.machine/1"
+machine = { name = "slide", cutoff_hz = 20.0 }
+axis = [{ name = "carriage", unit = "m" }]
+actuator = [{ name = "drive_force_n", axis = "carriage" }]
+sensor = [{ name = "carriage_position_m", axis = "carriage", reads = "position" }]
+"""
+
+
+def bare(folder: Path) -> Path:
+    """Write the slide's machine file without a mapping."""
+    (folder / "slide.toml").write_text(BARE)
+    return folder / "slide.toml"
+
+
+def test_columns_that_are_called_as_the_channels_need_no_mapping(tmp_path, said):
+    file = bare(tmp_path)
+    named_by_channel(tmp_path)
+    out = said("machine check", file, tmp_path).out
+    assert float(re.search(r"inertia = ([\d.]+)", out).group(1)) == pytest.approx(10.0, rel=0.05)
+    assert "inertia = " in said("machine check", file, tmp_path / "run-2.csv").out
+
+
+def test_a_table_that_lacks_a_channel_of_the_machine_needs_a_mapping(tmp_path, said):
+    file = bare(tmp_path)
+    named_by_channel(tmp_path, rename="drive_force_n")
+    assert "[data]" in said("machine check", file, tmp_path, code=ExitCode.DATA).err
+
+
 def test_a_table_without_a_machine_file_is_answered_with_the_option_that_reads_it(slide, said):
     _, table = slide
     assert "--machine FILE" in said("diagnose", table, code=5).err
