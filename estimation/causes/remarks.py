@@ -84,9 +84,9 @@ def left(
         which, rest = "on", "Most of it has no explanation here."
         if name in explained:
             which = "left on"
-            rest = (
-                "Most of it has no explanation here; a diagnosis with the file of --model-out as"
-                " --model searches next to the findings."
+            rest += (
+                " A diagnosis with the file of --model-out as --model searches next to the"
+                " findings."
             )
         yield (
             f"{name}: the error {which} the test runs is {ratio:.2g} times the noise that"
