@@ -92,6 +92,7 @@ def import_(
     from rig.importers.table.open import read_largest, read_runs, require_runs
     from rig.importers.table.preview import preview as look
     from rig.importers.table.raw import Remark
+    from rig.machines.recordings import by_name, has_data
     from rig.machines.shipped import place_of
 
     _require_a_table(path)
@@ -101,7 +102,9 @@ def import_(
             fix="Add --out FOLDER, or look at the table first with --preview.",
         )
     flags = _flags(column, condition, runs, set_, rate)
-    mapping = read_mapping(None if machine is None else place_of(machine), flags)
+    file = None if machine is None else place_of(machine)
+    named = None if file is None or flags or has_data(file) else by_name(path, file)
+    mapping = named or read_mapping(file, flags)
     said: list[Remark] = []
     try:
         recordings = read_runs(path, mapping, said, asks=preview)

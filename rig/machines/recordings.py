@@ -44,7 +44,7 @@ def open_recordings(
     file = place_of(machine)
     plant, mapping = read_machine(file), None
     if format_name is None and not LOGS.recognises(path):
-        mapping = read_mapping(file, ()) if has_data(file) else _by_name(path, plant, file)
+        mapping = read_mapping(file, ()) if has_data(file) else by_name(path, file)
     if mapping is None:
         campaign = open_campaign(path, format_name, skip_bad)
     else:
@@ -52,14 +52,15 @@ def open_recordings(
     return with_positions(campaign, plant)
 
 
-def _by_name(path: Path, plant: Plant, file: Path) -> ColumnMapping | None:
-    """Return the mapping of CSV files whose columns are called as the machine's channels are.
+def by_name(path: Path, file: Path) -> ColumnMapping | None:
+    """Return the mapping of CSV files whose columns are called as a machine's channels are.
 
     None where a file lacks one of these, or the time in seconds: its columns have to be stated.
     And None where an importer recognises the files, such as that of a table that rig wrote.
     """
     if format_of(path) is not None:
         return None
+    plant = read_machine(file)
     of_loads = [load.name for load in plant.loads]
     drives, sensors = ([part.name for part in of] for of in (plant.actuators, plant.sensors))
     columns = {name: name for name in (TIME, *drives, *sensors, *of_loads)}

@@ -413,6 +413,7 @@ def test_columns_that_are_called_as_the_channels_need_no_mapping(tmp_path, said)
     out = said("machine check", file, tmp_path).out
     assert float(re.search(r"inertia = ([\d.]+)", out).group(1)) == pytest.approx(10.0, rel=0.05)
     assert "inertia = " in said("machine check", file, tmp_path / "run-2.csv").out
+    assert "carriage_position_m" in said("import", tmp_path, "--machine", file, "--preview").out
 
 
 def test_a_table_that_lacks_a_channel_of_the_machine_needs_a_mapping(tmp_path, said):

@@ -94,7 +94,7 @@ def read_runs(
         return runs
     if len(runs) > 1:
         clock = "no column holds the time" if None in starts else "the time begins again in a run"
-        remarks.append((path.name, f"{clock}, so the pauses between runs are not known"))
+        remarks.append((path.resolve().name, f"{clock}, so the pauses between runs are not known"))
     return [replace(r, started_at_ns=None) for r in runs]
 
 
