@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from io import TextIOWrapper
+from pathlib import Path
 from types import FrameType
 from typing import Annotated, Any
 
@@ -156,6 +157,8 @@ def _report(error: Exception, words: list[str]) -> int:
     if isinstance(error, TyperException):
         # a word on the command line that typer itself refused
         getattr(error, "show", lambda **_: None)(file=sys.stderr)
+        if "extra argument" in str(error) and sum(Path(word).exists() for word in words) > 1:
+            sys.stderr.write("fix: A command reads one path: name the folder of these files.\n")
         return int(ExitCode.USAGE)
     if "--debug" not in words and isinstance(error, OSError):
         error = _of_the_computer(error)

@@ -416,6 +416,13 @@ def test_columns_that_are_called_as_the_channels_need_no_mapping(tmp_path, said)
     assert "carriage_position_m" in said("import", tmp_path, "--machine", file, "--preview").out
 
 
+def test_several_files_on_the_command_line_are_answered_with_their_folder(tmp_path, said):
+    file = bare(tmp_path)
+    named_by_channel(tmp_path)
+    tables = sorted(tmp_path.glob("*.csv"))
+    assert "name the folder" in said("machine check", file, *tables, code=ExitCode.USAGE).err
+
+
 def test_a_table_that_lacks_a_channel_of_the_machine_needs_a_mapping(tmp_path, said):
     file = bare(tmp_path)
     named_by_channel(tmp_path, rename="drive_force_n")
