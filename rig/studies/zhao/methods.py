@@ -13,6 +13,7 @@ from scipy import ndimage
 
 from estimation.campaign import Campaign
 from estimation.causes.verdict import answer
+from estimation.derived import CAMPAIGN_TIME
 from estimation.diagnosis.split import split
 from estimation.effects import effect
 from estimation.filters import LowPass
@@ -150,7 +151,11 @@ def lacking(dof: str, axes: Axes, seed: int) -> Lacking:
     model = replace(model, terms=(*model.terms, rubs))
     found = answer(runs, [model], split(runs, seed))
     (written,) = found.models
-    terms = (*declared(dof).terms, *written.terms[len(model.terms) :])
+    # another grasper's campaign is another one: its time states nothing there
+    of_any = (
+        t for t in written.terms[len(model.terms) :] if CAMPAIGN_TIME not in t.channels.values()
+    )
+    terms = (*declared(dof).terms, *of_any)
     return Lacking(
         tuple((finding.family, finding.verdict) for finding in found.diagnosis.findings),
         to_toml(replace(written, terms=terms, evidence=None)),
