@@ -77,6 +77,9 @@ class Place:
         return tuple(dict.fromkeys(entry.equation for entry in self.enters))
 
 
+SUPPLIES = ("_v", "_pa")
+"""Endings of the conditions that a drive takes its effort from: a voltage or a pressure."""
+
 WARMED = ("loss", "actuator", "deflection", "torque sensor")
 """Kinds of places whose effects may follow a measured temperature."""
 
@@ -101,10 +104,18 @@ def places_of(layout: Layout) -> list[Place]:
     for k, place in enumerate(found):
         if warmth and place.kind in WARMED:
             place = replace(place, roles={**place.roles, "temperature": warmth})
-        if layout.conditions and place.kind in ("loss", "actuator"):
-            place = replace(place, roles={**place.roles, "condition": layout.conditions})
+        stated = _stated_at(layout, place)
+        if stated:
+            place = replace(place, roles={**place.roles, "condition": stated})
         found[k] = place
     return found
+
+
+def _stated_at(layout: Layout, place: Place) -> tuple[str, ...]:
+    """Return the stated conditions that effects at a place may follow: of a drive, its supply."""
+    if place.kind == "loss":
+        return layout.conditions
+    return tuple(n for n in layout.conditions if place.kind == "actuator" and n.endswith(SUPPLIES))
 
 
 def direction_width(layout: Layout, place: Place) -> float:

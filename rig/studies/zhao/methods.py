@@ -151,10 +151,9 @@ def lacking(dof: str, axes: Axes, seed: int) -> Lacking:
     model = replace(model, terms=(*model.terms, rubs))
     found = answer(runs, [model], split(runs, seed))
     (written,) = found.models
-    # another grasper's campaign is another one: its time states nothing there
-    of_any = (
-        t for t in written.terms[len(model.terms) :] if CAMPAIGN_TIME not in t.channels.values()
-    )
+    # of another grasper's campaign: its time and its conditions state nothing elsewhere
+    stated = {CAMPAIGN_TIME, *runs[0].conditions}
+    of_any = (t for t in written.terms[len(model.terms) :] if not stated & {*t.channels.values()})
     terms = (*declared(dof).terms, *of_any)
     return Lacking(
         tuple((finding.family, finding.verdict) for finding in found.diagnosis.findings),
