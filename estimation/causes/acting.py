@@ -267,12 +267,11 @@ def gains_of(layout: Layout) -> Iterator[Moved]:
             yield Moved(place, constant, source, (), (0,), of_all=True)
         elif place.kind == "torque sensor":
             (reading,) = place.roles["reading"]
-            alone = len(place.enters) == 1 and not of_all
-            column = _column_of(layout, place.home, reading) if alone else None
-            if alone and column is None:  # it is read as a share of another channel
-                continue
-            gain, channels = effect("sensor.gain"), (("reading", reading),)
-            yield Moved(place, gain, channels, (), (0,), column=column, of_all=of_all)
+            of_several = of_all or len(place.enters) > 1
+            column = None if of_several else _column_of(layout, place.home, reading)
+            if of_several or column is not None:  # else it is a share of what a term reads
+                gain, channels = effect("sensor.gain"), (("reading", reading),)
+                yield Moved(place, gain, channels, (), (0,), column=column, of_all=of_all)
 
 
 def _column_of(layout: Layout, equation: str, channel: str) -> int | None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from estimation.causes.angles import signals_of, travel_of
 from estimation.causes.layout import Layout
-from estimation.causes.places import Place, direction_width
+from estimation.causes.places import Place
 from estimation.effects import Effect, Parameter, Waves
 from estimation.rest import longest_rest_s
 
@@ -36,7 +36,7 @@ def axis(
     """Return the values of one shape parameter to try, over the range that the data cover."""
     if parameter.name == "width" and "speed" in effect.roles:
         usual = NARROW * _range(layout, channels["speed"])[1]
-        return [direction_width(layout, place) or usual or 1.0]
+        return [layout.direction_width(place.home) or usual or 1.0]
     if parameter.name == "middle":
         return [0.0]  # play is crossed where the load changes its side
     if parameter.name == "harmonic":
@@ -49,7 +49,7 @@ def axis(
     if parameter.name == "fall" and relative is not None:
         # one that falls faster is another form of the change of sign
         usual = _range(layout, channels["speed"])[1] or 1.0
-        least = max(relative[0], 2.0 * direction_width(layout, place) / usual)
+        least = max(relative[0], 2.0 * layout.direction_width(place.home) / usual)
         count = len(relative) if least < relative[-1] else 0
         relative = tuple(np.geomspace(least, relative[-1], count))
     if parameter.unit in channels and relative is not None:

@@ -93,8 +93,11 @@ FILTERS = (
 A creep does too, but so slowly that it takes much of the motion off with the noise.
 """
 
-LOOPS = ("hysteresis.", "transmission.backlash")
+LOOPS = ("hysteresis.", "transmission.backlash", "sensor.hysteresis")
 """Effects with a loop: at a constant load they follow the noise of its reading."""
+
+OF_LOAD = ("deflection", "torque sensor")
+"""Kinds of places whose loops go over the reading of a load; others go over a travel."""
 
 OVER_TIME = ("friction.warmup", "sensor.drift", "change.step", "motor.thermal")
 """Effects that a time in the run stands for."""
@@ -197,9 +200,9 @@ def _follows_noise(
     An angle has so little noise that only a linear filter shows it.
     """
     readings = [c for _, c in channels if c in layout.measured]
-    if effect.id.startswith(LOOPS) and effect.start() and place.kind == "deflection":
+    if effect.id.startswith(LOOPS) and effect.start() and place.kind in OF_LOAD:
         readings = [c for c in readings if not c.endswith(ANGLES)]
-    elif not effect.id.startswith((*FILTERS, "sensor.hysteresis")):
+    elif not effect.id.startswith(FILTERS):
         return False
     return any(
         (c, entry.equation) not in layout.independent for c in readings for entry in place.enters

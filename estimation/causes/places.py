@@ -101,29 +101,15 @@ def places_of(layout: Layout) -> list[Place]:
             found += [_behind(layout, sensor, *both, angles), *_levers(sensor, *both, angles)]
     found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
     warmth = tuple(n for n in signals.temperatures if n in layout.measured)
+    supplies = tuple(n for n in layout.conditions if n.endswith(SUPPLIES))
+    conditions = {"loss": layout.conditions, "actuator": supplies}
     for k, place in enumerate(found):
         if warmth and place.kind in WARMED:
             place = replace(place, roles={**place.roles, "temperature": warmth})
-        stated = _stated_at(layout, place)
-        if stated:
+        if stated := conditions.get(place.kind):
             place = replace(place, roles={**place.roles, "condition": stated})
         found[k] = place
     return found
-
-
-def _stated_at(layout: Layout, place: Place) -> tuple[str, ...]:
-    """Return the stated conditions that effects at a place may follow: of a drive, its supply."""
-    if place.kind == "loss":
-        return layout.conditions
-    return tuple(n for n in layout.conditions if place.kind == "actuator" and n.endswith(SUPPLIES))
-
-
-def direction_width(layout: Layout, place: Place) -> float:
-    """Return the speed over which friction changes its sign at a place."""
-    equation = layout.equations[place.home]
-    if equation.width:
-        return equation.width
-    return max((e.width for e in layout.equations.values()), default=0.0)
 
 
 def _computed(layout: Layout) -> set[str]:

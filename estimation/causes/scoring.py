@@ -196,8 +196,8 @@ def _turned(joint: Joint, group: Group, outcome: Outcome) -> NDArray[np.bool_]:
         if not isinstance(cause, Source) or one.acts is None:
             continue
         at = joint.bounded_at(home, cause.column)
-        if at is not None:
-            column = joint.layout.equations[home].kinds[cause.column or 0]
+        if at is not None and cause.column is not None:
+            column = joint.layout.equations[home].kinds[cause.column]
             unit = column.sign * cause.place.enters[0].gain  # a sensor's gain is a share of it
             change = unit * float(outcome.amplitudes[k, 0] / one.size[0])
             found[k] = outcome.declared[k, at] + change < -TURNED * abs(change)

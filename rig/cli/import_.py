@@ -88,12 +88,9 @@ def import_(
     is guessed: a column without a unit is in the SI unit that the channel's name ends in.
     """
     from rig.importers.table.channels import NotMappedError
-    from rig.importers.table.mapping import read_mapping
     from rig.importers.table.open import read_largest, read_runs, require_runs
     from rig.importers.table.preview import preview as look
     from rig.importers.table.raw import Remark
-    from rig.machines.recordings import by_name, has_data
-    from rig.machines.shipped import place_of
 
     _require_a_table(path)
     if not preview and out is None:
@@ -102,9 +99,7 @@ def import_(
             fix="Add --out FOLDER, or look at the table first with --preview.",
         )
     flags = _flags(column, condition, runs, set_, rate)
-    file = None if machine is None else place_of(machine)
-    named = None if file is None or flags or has_data(file) else by_name(path, file)
-    mapping = named or read_mapping(file, flags)
+    mapping = _mapping(path, machine, flags)
     said: list[Remark] = []
     try:
         recordings = read_runs(path, mapping, said, asks=preview)
@@ -126,6 +121,18 @@ def import_(
         remarks().print(f"Check: {line}")
     data = {"preview": found, "written": written, "plots": plots}
     present(json, data, *_tables(found, mapping), *lines)
+
+
+def _mapping(path: Path, machine: Path | None, flags: list[Flag]) -> "ColumnMapping":
+    """Return the mapping of a machine's file, of its channels' names, or of the command line."""
+    from rig.importers.table.mapping import read_mapping
+    from rig.machines.recordings import mapping_of
+    from rig.machines.shipped import place_of
+
+    if machine is None:
+        return read_mapping(None, flags)
+    file = place_of(machine)
+    return (None if flags else mapping_of(path, file)) or read_mapping(file, flags)
 
 
 def _plant_of(machine: Path) -> "Plant | None":

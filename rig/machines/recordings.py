@@ -32,7 +32,7 @@ def open_recordings(
 ) -> Campaign:
     """Open recordings as `open_campaign` does, those of a foreign table by the file's `[data]`.
 
-    Without `[data]`, CSV files are read whose columns are called as the machine's channels are.
+    Without `[data]`, CSV files are read whose columns have the names of the machine's channels.
 
     The machine is a file or the name of a shipped one; None is the reference rig.
 
@@ -42,30 +42,30 @@ def open_recordings(
     if machine is None:
         return open_campaign(path, format_name, skip_bad)
     file = place_of(machine)
-    plant, mapping = read_machine(file), None
-    if format_name is None and not LOGS.recognises(path):
-        mapping = read_mapping(file, ()) if has_data(file) else by_name(path, file)
-    if mapping is None:
-        campaign = open_campaign(path, format_name, skip_bad)
-    else:
+    foreign = format_name is None and not LOGS.recognises(path)
+    if foreign and (mapping := mapping_of(path, file)) is not None:
         campaign = open_table(path, mapping, skip_bad)
-    return with_positions(campaign, plant)
+    else:
+        campaign = open_campaign(path, format_name, skip_bad)
+    return with_positions(campaign, read_machine(file))
 
 
-def by_name(path: Path, file: Path) -> ColumnMapping | None:
-    """Return the mapping of CSV files whose columns are called as a machine's channels are.
+def mapping_of(path: Path, file: Path) -> ColumnMapping | None:
+    """Return how tables are read: by `[data]` of a machine file, or by the names of its channels.
 
-    None where a file lacks one of these, or the time in seconds: its columns have to be stated.
-    And None where an importer recognises the files, such as that of a table that rig wrote.
+    Without `[data]`, None where a CSV file lacks a channel or the time in seconds: its columns have
+    to be stated. And None where an importer recognises the files, such as a table that rig wrote.
     """
-    if format_of(path) is not None:
-        return None
+    if has_data(file):
+        return read_mapping(file, ())
     plant = read_machine(file)
     of_loads = [load.name for load in plant.loads]
     drives, sensors = ([part.name for part in of] for of in (plant.actuators, plant.sensors))
     columns = {name: name for name in (TIME, *drives, *sensors, *of_loads)}
     tables = sorted(path.glob("*.csv")) if path.is_dir() else [path] * path.is_file()
     if not tables or not all(columns.keys() <= _head(table) for table in tables):
+        return None
+    if format_of(path) is not None:
         return None
     data = Data.model_validate({"files": "*.csv", "columns": columns})
     return ColumnMapping(data, file)

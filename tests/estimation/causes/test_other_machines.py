@@ -1,6 +1,6 @@
 """Machines other than the reference rig: cylinders, winches, belts, joints with a torque cell."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -119,6 +119,13 @@ def recorded(columns_of: Motion) -> list[Recording]:
         columns = columns_of(k, random, position, speed, np.gradient(speed, time))
         out.append(Recording(f"{k:02d}", time, columns, started_at_ns=int(2e10 * k) + 1))
     return out
+
+
+def noisy(
+    random: np.random.Generator, made: Mapping[str, tuple[FloatArray, float]]
+) -> dict[str, FloatArray]:
+    """Return columns with white noise; each is given with its noise's standard deviation."""
+    return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
 
 
 def found_in(machine: str, recordings: Sequence[Recording]) -> tuple[Finding, ...]:
@@ -581,7 +588,7 @@ def _elastic(reads, *, bends=lambda k: 1.0, rubs=lambda k: 1.0):
             "joint_torque_n_m": (reads(torque, motor), 0.05),
             "motor_current_a": (drive / 0.2, 0.02),
         }
-        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+        return noisy(random, made)
 
     return recorded(columns)
 
@@ -626,7 +633,7 @@ def test_hysteresis_of_a_cell_is_among_the_causes_where_one_equation_reads_it():
         drive = rope + 0.4 * np.tanh(speed / 0.1) + speed
         made = {"motor_angle_rad": (position, 1e-5), "motor_current_a": (drive / 2.4, 0.01)}
         made |= {"rope_torque_n_m": (rope - 0.5 * _looped(rope, 0.5), 0.05)}
-        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+        return noisy(random, made)
 
     (finding,) = found_in(WINCH, recorded(columns))
     assert "sensor.hysteresis" in {finding.family, *finding.alternatives}
@@ -672,7 +679,7 @@ def test_a_zero_that_moved_between_runs_does_not_draw_the_width_of_friction():
         drive = rope + 2.4 * np.tanh(speed / 0.1) + speed + 0.2 * acceleration
         made = {"motor_angle_rad": (position, 1e-5), "motor_current_a": (drive / 2.4, 0.01)}
         made |= {"rope_torque_n_m": (rope + 2.0 * (k >= RUNS // 2), 0.05)}
-        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+        return noisy(random, made)
 
     runs = recorded(columns)
     laid = lay_out(declared(plant_file.parse(WINCH)), runs, [run.name for run in runs])
@@ -703,6 +710,9 @@ sensor = [
 """
 
 
+STIFF_FINGER = FINGER.replace(", compliant = true", "")
+
+
 def _pulled(*, bends=lambda k: 1.0, read=lambda k: 1.0):
     """Return the columns of a finger; the bend and the reading at the joint have a factor a run."""
 
@@ -719,7 +729,7 @@ def _pulled(*, bends=lambda k: 1.0, read=lambda k: 1.0):
             "joint_torque_n_m": (read(k) * torque, 0.008),
             "motor_current_a": (drive / 0.02, 0.02),
         }
-        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+        return noisy(random, made)
 
     return recorded(columns)
 
@@ -732,13 +742,11 @@ def test_a_tendon_bends_whose_spool_turns_with_a_geared_motor():
 
 
 def test_another_gain_of_a_cell_that_one_equation_reads_is_that_of_the_cell_or_of_its_term():
-    found = found_in(BEFORE_TENDON, _pulled(read=lambda k: 1.2 if k >= RUNS // 2 else 1.0))
-    (finding,) = found
+    runs = _pulled(read=lambda k: 1.2 if k >= RUNS // 2 else 1.0)
+    (finding,) = found_in(STIFF_FINGER, runs)
     assert finding.verdict == "one_of"
     assert {finding.family, *finding.alternatives} == {"sensor.gain", "transmission.ratio"}
 
-
-BEFORE_TENDON = FINGER.replace(", compliant = true", "")
 
 GANTRY = """
 schema = "rig.machine/1"
@@ -762,7 +770,7 @@ def test_another_gain_of_a_second_drive_is_its_torque_constant():
             "left_current_a": (share * force / 60.0, 0.02),
             "right_current_a": ((1.0 - share) * force / 60.0 / right, 0.02),
         }
-        return {name: x + random.normal(0.0, noise, len(x)) for name, (x, noise) in made.items()}
+        return noisy(random, made)
 
     (finding,) = found_in(GANTRY, recorded(columns))
     assert (finding.verdict, finding.family) == ("identified", "motor.torque_constant")
