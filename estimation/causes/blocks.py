@@ -103,7 +103,8 @@ def block_of(joint: Joint, laid: Laid, known: Block | None = None) -> Block:
     for p in joint.parts:
         if (columns := laid.part(p)) is None:
             continue
-        table, places = joint.tables[p].astype(columns.dtype), [*joint.at[p]]
+        # a residual may be a millionth of its target: products of single precision would hide it
+        columns, table, places = columns.astype(np.float64), joint.tables[p], [*joint.at[p]]
         base = np.zeros((runs, len(laid), joint.size, k))
         if known is None:
             product = products(table[:, None], columns)

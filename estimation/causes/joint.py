@@ -79,11 +79,8 @@ class Joint:
             a friction or a damping below zero is a cause that the equation lacks.
     """
 
-    def __init__(
-        self, layout: Layout, numbers: Numbers = DEFAULT, *, is_one_machine: bool = True
-    ) -> None:
+    def __init__(self, layout: Layout, numbers: Numbers = DEFAULT) -> None:
         self.layout, self.numbers = layout, numbers
-        self._is_one_machine = is_one_machine
         self.runs = layout.runs
         counts = [len(equation.kinds) for equation in layout.equations.values()]
         ends = itertools.pairwise(itertools.accumulate(counts, initial=0))
@@ -195,8 +192,7 @@ class Joint:
         kinds = [c for e in self.layout.equations.values() for c in e.kinds]
         bounded[: len(kinds)] = [c.is_bounded for c in kinds]
         self._hold(np.zeros_like(bounded))
-        # of two machines together a friction may be negative: what differs is then a change
-        if self._is_one_machine and (self._amplitudes[bounded] < 0.0).any():
+        if (self._amplitudes[bounded] < 0.0).any():
             self._hold(bounded & (self._within_bounds(bounded) <= 0.0))
 
     def _signals(self, whole: FloatArray) -> float:

@@ -27,7 +27,9 @@ class Changed(Moved):
 def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
     """Yield everything that may have changed, each acting in the runs of one campaign.
 
-    The layout has the runs of both; `is_b` states of each whether it is of the second one.
+    The layout has the runs of both; `is_b` states of each whether it is of the second one. A moved
+    parameter is that of the first campaign and a change in the second, or the other way round: as
+    an effect that came or went, it has the better score of both.
     """
     places = places_of(layout)
     later, earlier = (tuple(b is side for b in is_b) for side in (True, False))
@@ -38,7 +40,7 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
         changed = Changed(
             place, one.effect, one.channels, one.shape, one.parts, column=one.column, key=key
         )
-        yield Claim(changed, later, given=True)
+        yield from (Claim(changed, acts, given=True) for acts in (later, earlier))
     for place in places:
         is_drive = place.name == f"actuator {layout.equations[place.home].target}"
         if place.kind in ("torque sensor", "angle sensor") or is_drive:
@@ -47,11 +49,10 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
             changed = Changed(
                 place, gain, reading, (), (0,), of_all=of_all, key=f"gain of {place.name}"
             )
-            yield Claim(changed, later, given=True)
+            yield from (Claim(changed, acts, given=True) for acts in (later, earlier))
         for source in sources_at(layout, place):
             if _takes_part(source):
-                yield Claim(source, later, given=True)
-                yield Claim(source, earlier, given=True)
+                yield from (Claim(source, acts, given=True) for acts in (later, earlier))
 
 
 def _takes_part(source: Source) -> bool:

@@ -27,7 +27,7 @@ from estimation.causes.numbers import Numbers
 from estimation.causes.ranking import Rank, Ranking
 from estimation.causes.scoring import Scored, assessed, best_of_each
 from estimation.causes.search import hypothesis
-from estimation.changes.candidates import claims
+from estimation.changes.candidates import Changed, claims
 from estimation.changes.difference import Difference, Predicted
 from estimation.changes.stated import likeliest_first, prior_of_moved, shares, stated
 from estimation.copies import copies
@@ -90,7 +90,7 @@ def compare(
     add_instruments(layout, train)
     fitted = layout.select(train)
     is_b = [run.name.startswith(B) for run in fitted.runs]
-    plain = Joint(fitted, numbers, is_one_machine=False)
+    plain = Joint(fitted, numbers)
     late = skews(plain)
     joint = with_skews(plain, late)
     pool = pool_of(joint, claims(fitted, is_b))
@@ -102,6 +102,7 @@ def compare(
         causes, ranked = list[Scored](), list[Sequence[Scored]]()
         if best and best[0].score > 0.0:
             causes, ranked = hypothesis(ranking, best[:1])
+            causes = [_since_the_first(one, is_b, joint) for one in causes]
     random = np.random.default_rng(seed)
     found = [
         stated(one, _is_later(one, is_b), shares(names, prior, numbers), joint, causes, random)
@@ -125,6 +126,14 @@ def compare(
 def _is_later(one: Scored, is_b: Sequence[bool]) -> bool:
     """Whether a change acts in the runs of the second campaign, which may have earlier dates."""
     return any(b and acts for b, acts in zip(is_b, one.candidate.acts or (), strict=True))
+
+
+def _since_the_first(one: Scored, is_b: Sequence[bool], joint: Joint) -> Scored:
+    """Return a moved parameter as a change in the second campaign; an effect stays as it is."""
+    if not isinstance(one.candidate.cause, Changed):
+        return one
+    turned = laid_out(joint, replace(Claim(one.candidate.cause), acts=tuple(is_b), given=True))
+    return one if turned is None else replace(one, candidate=turned)
 
 
 def _named(recordings: Iterable[Recording], mark: str) -> list[Recording]:
@@ -246,7 +255,7 @@ def _predicted(
     """
     names = [run.name for run in layout.runs]
     of = {mark: np.array([float(n.startswith(mark)) for n in names]) for mark in (A, B, ON)}
-    plain = with_skews(Joint(layout, is_one_machine=False), late)
+    plain = with_skews(Joint(layout), late)
     errors = [_rms(plain, plain.fitted_on(of[side]), of[ON]) for side in (A, B)]
     for taken_as in (A, B):
         grown = plain

@@ -259,3 +259,24 @@ def test_a_torque_constant_that_moved_is_named_where_friction_could_stand_in_for
     assert "arameter: motor.torque_constant gain of motor, gain -0.00" in next(lines(difference))
     assert found.parameters["gain"] == pytest.approx(-0.009, rel=0.2)
     assert not compare(held_loads(1, 0.02), held_loads(2, 0.02), [motor()]).changes
+
+
+def test_a_torque_constant_that_moved_is_named_where_all_torque_is_friction_of_the_load():
+    """A negative friction of the motor would describe both campaigns without the current."""
+
+    def rubbing(seed: int, torque_constant: float) -> list[Recording]:
+        runs, random = [], np.random.default_rng(seed)
+        for run in held_loads(seed, torque_constant):
+            speed = np.gradient(run["motor_angle_rad"], TIME_S)
+            torque = 6e-3 * np.tanh(speed / 0.3) + 1e-4 * speed
+            noise = random.normal(0, [[1e-3], [7e-5]], (2, TIME_S.size))
+            columns = {
+                "motor_current_a": torque / torque_constant + noise[0],
+                "proximal_torque_n_m": torque + noise[1],
+            }
+            runs.append(run.with_columns(**columns))
+        return runs
+
+    (found,) = compare(rubbing(1, 0.02), rubbing(2, 0.011), [motor()]).changes
+    assert found.name == "motor.torque_constant gain of motor"
+    assert not compare(rubbing(1, 0.02), rubbing(2, 0.02), [motor()]).changes

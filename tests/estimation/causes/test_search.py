@@ -14,7 +14,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.rigs import draw
 from estimation import model_file, plant_file
-from estimation.causes.candidates import Claim, groups_of
+from estimation.causes.blocks import block_of, errors_of
+from estimation.causes.candidates import Claim, groups_of, without_declared
+from estimation.causes.criterion import base_errors
 from estimation.causes.findings import family_probabilities, others_in_set
 from estimation.causes.folds import folds_of
 from estimation.causes.instruments import add_instruments
@@ -794,6 +796,29 @@ def test_a_set_has_nearly_all_that_effects_have_unless_one_is_sure(
     shares: dict[str, float], others: list[str]
 ) -> None:
     assert others_in_set("a", shares) == others
+
+
+@pytest.mark.parametrize("alike", [1.0, 1e-3, 1e-5])
+def test_causes_are_fitted_as_exactly_as_the_base(alike: float) -> None:
+    """The residual may be a millionth of its target, and the columns of a cause much alike."""
+    random, fine = np.random.default_rng(1), list[Recording]()
+    for run in recordings():
+        torque = 1.2 * run["motor_current_a"]
+        torque += random.normal(0, 1e-6, len(torque))
+        fine.append(run.with_columns(proximal_torque_n_m=torque))
+    layout = _laid(fine, motor())
+    joint = Joint(layout)
+    waves = [np.sin(0.07 * np.arange(len(run.grid[run.used["motor"]]))) for run in layout.runs]
+    pairs = [
+        {"motor": np.column_stack([own, own + alike * random.normal(size=len(own))])}
+        for own in waves
+    ]
+    laid = without_declared(joint, [pairs], [], "each")
+    precision = np.full((1, 2), 4.0 / joint.power)
+    (apart,) = errors_of(joint, block_of(joint, laid), folds_of(layout)[:1], precision)
+    (grown,) = base_errors(joint.with_cause(laid, precision[0]), folds_of(layout)[:1])
+    for part in joint.parts:
+        assert apart[part][:, 0] == pytest.approx(grown[part], rel=1e-2)
 
 
 def test_a_cause_that_comes_once_costs_less_than_one_that_comes_and_goes() -> None:
