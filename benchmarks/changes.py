@@ -51,7 +51,8 @@ class Pair:
         planted: What changed, in words; empty where nothing did.
         kind: `nothing`, `parameter` or `effect`.
         found: The names of the changes found, those that share one place joined by `or`.
-        outcome: `named`, `in a set`, `missed`, `wrong`, or `right` where nothing changed.
+        outcome: `named`, `in a set`, `unnamed` of an unknown form, `missed`, `wrong`, or `right`
+            where nothing changed.
     """
 
     seed: int
@@ -111,11 +112,16 @@ def _judged(
     def is_right(name: str) -> bool:
         return any(name == one or name.startswith(f"{one} at ") for one in right)
 
+    def may_be_right(change: Change) -> bool:
+        return change.verdict == "depends_on" or any(map(is_right, names(change)))
+
     found = tuple(" or ".join(names(change)) for change in changes)
     if not changes:
         outcome = "right" if kind == "nothing" else "missed"
-    elif not all(any(map(is_right, names(c))) for c in changes):
+    elif kind == "nothing" or not all(map(may_be_right, changes)):
         outcome = "wrong"
+    elif changes[0].verdict == "depends_on":
+        outcome = "unnamed"
     elif all(map(is_right, names(changes[0]))):  # a synonym of what was planted is right
         outcome = "named"
     else:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from estimation.causes.acting import Moved, amplitudes_of, reads_target_alone
 from estimation.causes.candidates import Claim
+from estimation.causes.functions import functions_at
 from estimation.causes.layout import Layout
 from estimation.causes.offered import sources_at
 from estimation.causes.places import places_of
@@ -53,6 +54,9 @@ def claims(layout: Layout, is_b: Sequence[bool]) -> Iterator[Claim]:
         for source in sources_at(layout, place):
             if _takes_part(source):
                 yield from (Claim(source, acts, given=True) for acts in (later, earlier))
+        for function in functions_at(layout, place):
+            if "time" not in function.variables:  # the order of the campaigns is it, too
+                yield from (Claim(function, acts, given=True) for acts in (later, earlier))
 
 
 def _takes_part(source: Source) -> bool:

@@ -1,6 +1,6 @@
 """What changed between two campaigns of one machine, with intervals over runs."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ from estimation.causes.scoring import Scored, assessed, best_of_each
 from estimation.causes.search import hypothesis
 from estimation.changes.candidates import Changed, claims
 from estimation.changes.difference import Difference, Predicted
-from estimation.changes.stated import likeliest_first, prior_of_moved, shares, stated
+from estimation.changes.stated import likeliest_first, prior_of_moved, score_of, shares, stated
 from estimation.copies import copies
 from estimation.diagnosis.split import SplitError, periods
 from estimation.errors import EstimationError
@@ -118,7 +118,11 @@ def compare(
         predicted=_predicted(layout, late, [(x, _is_later(x, is_b)) for x in causes])
         if third
         else {},
-        notes=(*_shared(first, second), *_other_conditions(first, second)),
+        notes=(
+            *_shared(first, second),
+            *_other_conditions(first, second),
+            *_unexplained(joint, causes, is_b),
+        ),
         seed=seed,
     )
 
@@ -185,6 +189,31 @@ def _other_conditions(first: Sequence[Recording], second: Sequence[Recording]) -
     )
 
 
+def _unexplained(
+    joint: Joint, causes: Sequence[Scored], is_b: Sequence[bool], least: float = 1.2
+) -> Iterator[str]:
+    """Yield which equations still fit every run of one campaign worse than all of the other.
+
+    The medians of the errors differ by a factor of `least` or more.
+    """
+    for one in causes:
+        joint = joint.with_cause(one.candidate.laid, one.candidate.precision)
+    vector, later = np.append(joint.fitted_on(np.ones(len(is_b))), -1.0), np.array(is_b)
+    for name, equation in joint.layout.equations.items():
+        p = name, "within"
+        squared = np.einsum("i,rij,j->r", vector, joint.gram[p], vector) / joint.samples[p]
+        error = np.sqrt(np.maximum(squared, 0.0))
+        sides = {"first": error[~later], "second": error[later]}
+        better, worse = sorted(sides, key=lambda side: float(np.median(sides[side])))
+        low, high = (float(np.median(sides[side])) for side in (better, worse))
+        if sides[worse].min() > sides[better].max() and high >= least * low:
+            yield (
+                f"Check: the equation {name} fits the {worse} campaign worse than the {better} one,"
+                f" {high:.3g} against {low:.3g} {equation.model.unit}. More has changed than is"
+                " stated here, its form is another one, or a sensor has more noise."
+            )
+
+
 def _folds_of_one_campaign(layout: Layout, is_b: Sequence[bool]) -> list[list[list[int]]]:
     """Return families of folds that omit runs of one campaign at a time, never all of it.
 
@@ -212,11 +241,17 @@ def _in_one_alone(plain: Joint, prior: float, reach: float = 7.0) -> Rank:
     def ranked(joint: Joint, pool: Sequence[Group], folds: Folds) -> list[Scored]:
         found: list[Scored] = []
         least = _form_of_others(plain, joint, folds)
-        for one in best_of_each(assessed(joint, pool, folds)):
+        best = best_of_each(assessed(joint, pool, folds))
+        named = [
+            Claim(x.candidate.cause, x.candidate.acts, x.candidate.choices, given=True)
+            for x in best
+            if not x.candidate.is_function
+        ]
+        for one in best:
             far = bool(found) and one.score < found[0].score - reach / joint.numbers.sharpness
             if one.score < 0.0 or far:
                 break
-            if one.gain > least and _differs(one, joint, folds):
+            if one.gain > least and _differs(one, named, joint, folds, prior):
                 found.append(one)
         return likeliest_first(found, prior)
 
@@ -235,15 +270,23 @@ def _form_of_others(plain: Joint, joint: Joint, folds: Folds) -> float:
     return float(-np.log1p(-left)) if left < 1.0 else float("inf")
 
 
-def _differs(one: Scored, joint: Joint, folds: Folds) -> bool:
-    """Whether a change is worth its price where the same cause acts in both campaigns as well."""
+def _differs(one: Scored, named: Sequence[Claim], joint: Joint, folds: Folds, prior: float) -> bool:
+    """Whether a change is worth its price where the same cause acts in both campaigns as well.
+
+    An unknown form is fitted to what the declared model lacks in both. Next to it in both it has to
+    be likelier than each of the named changes there.
+    """
     shared = laid_out(joint, Claim(one.candidate.cause))
     if one.candidate.cause.is_declared or shared is None:  # in both already
         return True
     both = joint.with_cause(shared.laid, shared.precision)
     changed = replace(Claim(one.candidate.cause), acts=one.candidate.acts, given=True)
     again = assessed(both, groups_of(both, [changed]), folds)
-    return bool(again) and again[0].gain > one.price.score(joint.numbers)
+    worth = max((x.gain for x in again), default=0.0) - one.price.score(joint.numbers)
+    if worth <= 0.0 or not changed.is_function:
+        return worth > 0.0
+    rivals = assessed(both, groups_of(both, named), folds)
+    return worth >= max((score_of(x, prior) for x in rivals), default=0.0)
 
 
 def _predicted(

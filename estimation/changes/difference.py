@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-SCHEMA = "rig.diff/2"
+SCHEMA = "rig.diff/3"
 
 
 @dataclass(frozen=True)
@@ -12,12 +12,13 @@ class Change:
 
     Attributes:
         verdict: `moved` for a parameter, `came` or `went` for an effect, `one_of` where the runs do
-            not distinguish some of them.
-        how: `moved`, `came` or `went`, of the likeliest where the verdict is `one_of`.
+            not distinguish some of them, `depends_on` where the likeliest has an unknown form.
+        how: `moved`, `came` or `went`, of the likeliest.
         family: The effect.
         alternatives: Other names that explain it about as well.
         confidence: Probability of this name next to the other changes, that of no change included.
-        parameters: Parameter to its change from A to B (of an effect: its amplitude), SI.
+        parameters: Parameter to its change from A to B (of an effect: its amplitude), SI; none of
+            an unknown form.
         ci95: Parameter to the 95 % interval of that, over runs.
         unit: Parameter, and shape parameter, to its unit.
         before: Parameter to its value in A; None of an effect.
@@ -33,10 +34,10 @@ class Change:
     family: str
     alternatives: tuple[str, ...]
     confidence: float
-    parameters: Mapping[str, float]
-    ci95: Mapping[str, tuple[float, float]]
-    unit: Mapping[str, str]
-    before: Mapping[str, float | None]
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    ci95: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    unit: Mapping[str, str] = field(default_factory=dict)
+    before: Mapping[str, float | None] = field(default_factory=dict)
     shape: Mapping[str, float] = field(default_factory=dict)
     depends_on: tuple[str, ...] = ()
     form: str = ""

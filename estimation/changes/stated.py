@@ -8,6 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from estimation.causes.candidates import Candidate, Claim, Group, laid_out
 from estimation.causes.findings import SURE, others_in_set, variables_of
+from estimation.causes.functions import Function
 from estimation.causes.grids import order_step
 from estimation.causes.joint import Joint
 from estimation.causes.numbers import Numbers
@@ -32,16 +33,24 @@ def prior_of_moved(pool: Sequence[Group], numbers: Numbers) -> float:
     return float(np.log(max(1, len(names[False])) / max(1, len(names[True]))) / numbers.sharpness)
 
 
+def score_of(one: Scored, prior: float) -> float:
+    """Return the score of a change, a moved parameter's more by `prior`."""
+    return one.score + (prior if isinstance(one.candidate.cause, Changed) else 0.0)
+
+
 def likeliest_first(ranked: Sequence[Scored], prior: float) -> list[Scored]:
-    """Return changes in the order of their scores, a moved parameter's more by `prior`."""
-    return sorted(ranked, key=lambda one: -_score(one, prior))
+    """Return changes in the order of their scores with the prior."""
+    return sorted(ranked, key=lambda one: -score_of(one, prior))
 
 
 def shares(ranked: Sequence[Scored], prior: float, numbers: Numbers) -> dict[str, float]:
     """Return the probability of each name, the likeliest first."""
-    scores, gains = np.array([(_score(one, prior), one.gain) for one in ranked]).T
+    scores, gains = np.array([(score_of(one, prior), one.gain) for one in ranked]).T
     each = probabilities(scores, gains, numbers.sharpness)
-    found = {_name(_source(one)): float(p) for one, p in zip(ranked, each, strict=True)}
+    found: dict[str, float] = {}
+    for one, p in zip(ranked, each, strict=True):  # unknown forms of a place have one name
+        name = _name(one.candidate.cause)
+        found[name] = found.get(name, 0.0) + float(p)
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
 
@@ -60,12 +69,16 @@ def stated(
     of its interval are random.
     """
     others = [c.candidate for c in causes if c is not one]
-    one = replace(one, candidate=_between_the_grid(one.candidate, joint, others))
-    source, acts = _source(one), one.candidate.acts
+    source, acts = one.candidate.cause, one.candidate.acts
     assert acts is not None  # noqa: S101 - every candidate acts in the runs of one campaign
     name = _name(source)
     sure = probability[name] >= SURE
     how = "moved" if isinstance(source, Changed) else ("came" if is_later else "went")
+    if isinstance(source, Function):
+        return _of_unknown_form(one.candidate, how, probability)
+    one = replace(one, candidate=_between_the_grid(one.candidate, source, joint, others))
+    source = one.candidate.cause
+    assert isinstance(source, Source)  # noqa: S101 - a wave stays one between the grid
     term = Term(source.effect, channels=dict(source.channels))
     chosen = [source.effect.amplitudes[k] for k in source.parts]
     labels = [p.name for p in chosen]
@@ -104,16 +117,33 @@ def stated(
     )
 
 
+def _of_unknown_form(candidate: Candidate, how: str, probability: Mapping[str, float]) -> Change:
+    """Return a change without a name: what it depends on is known, and its place."""
+    name = _name(candidate.cause)
+    return Change(
+        verdict="depends_on",
+        how=how,
+        name=name,
+        equation=candidate.cause.place.home,
+        family=candidate.cause.family,
+        alternatives=tuple(others_in_set(name, probability)),
+        confidence=round(probability[name], 4),
+        depends_on=variables_of(candidate),
+    )
+
+
 def _between_the_grid(
-    candidate: Candidate, joint: Joint, others: Sequence[Candidate], steps: float = 4.0
+    candidate: Candidate,
+    source: Source,
+    joint: Joint,
+    others: Sequence[Candidate],
+    steps: float = 4.0,
 ) -> Candidate:
     """Return a wave along a position with the order of the least error next to other causes.
 
     The search tries orders that are this many of the least steps apart. Another effect stays as it
     was found.
     """
-    source = candidate.cause
-    assert isinstance(source, Source)  # noqa: S101 - no candidate here has an unknown form
     position = dict(source.channels)[source.turning] if source.is_wave else "_angle_rad"
     if position.endswith("_angle_rad"):
         return candidate
@@ -166,15 +196,5 @@ def _spread(
     return np.array(spread)
 
 
-def _score(one: Scored, prior: float) -> float:
-    return one.score + (prior if isinstance(_source(one), Changed) else 0.0)
-
-
-def _source(one: Scored) -> Source:
-    cause = one.candidate.cause
-    assert isinstance(cause, Source)  # noqa: S101 - no candidate here has an unknown form
-    return cause
-
-
-def _name(source: Source) -> str:
-    return source.key if isinstance(source, Changed) else f"{source.family} at {source.place.name}"
+def _name(cause: Source | Function) -> str:
+    return cause.key if isinstance(cause, Changed) else f"{cause.family} at {cause.place.name}"

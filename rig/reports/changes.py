@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from estimation.changes.difference import Change, Difference
 from rig.output.table import TextTable
-from rig.reports.diagnosis_words import confidence, in_unit, label, plain_unit, wave
+from rig.reports.diagnosis_words import confidence, in_unit, label, plain_unit, variables_of, wave
 
 PLAIN = {"came": "new effect", "went": "effect that is gone", "moved": "changed parameter"}
 """How something changed, as in the JSON, to the words of a sentence."""
@@ -32,6 +32,8 @@ def _sentence(change: Change) -> str:
         shown = {name: in_unit(value, plain_unit(change.unit[name]))}
         repeats = wave(value, change.depends_on) if name == "order" else shown
         sizes += [f"{name} {text}".strip() for name, text in repeats.items()]
+    if change.verdict == "depends_on":
+        sizes.append(f"of unknown form; it depends on {variables_of(change)}")
     form = f" ({change.form})" if change.form not in ("", change.family) else ""
     for word, plain in PLAIN.items():
         how = how.replace(word, plain)
@@ -63,6 +65,8 @@ def change_table(found: Difference) -> TextTable:
             named = label(change.form or change.family, name)
             unit = plain_unit(change.unit[name])
             rows.append((change.name, named, before, f"{value:+.4g}", interval, unit))
+        if change.verdict == "depends_on":
+            rows.append((change.name, f"of {variables_of(change)}", "-", "-", "-", "-"))
         rows += [
             (change.name, name, "-", f"{value:.4g}", "", plain_unit(change.unit[name]))
             for name, value in _shape(change).items()

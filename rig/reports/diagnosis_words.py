@@ -5,6 +5,7 @@ import math
 import sys
 from collections.abc import Sequence
 
+from estimation.changes.difference import Change
 from estimation.channels import PLAIN_UNIT, unit_or_none
 from estimation.diagnosis.result import Diagnosis, Finding, Value, is_unexplained
 from estimation.effects import catalogue
@@ -107,7 +108,7 @@ def _claim(finding: Finding) -> str:
     return "the model is incomplete, and the cause cannot be identified from these runs"
 
 
-def variables_of(finding: Finding) -> str:
+def variables_of(finding: Finding | Change) -> str:
     """Return the variables that a finding depends on, in words; empty where none is known."""
     return " and ".join(name.replace("_", " ") for name in finding.depends_on)
 

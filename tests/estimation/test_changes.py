@@ -12,13 +12,14 @@ from estimation.effects import effect
 from estimation.filters import LowPass
 from estimation.model import Model, Term
 from estimation.recording import Recording
-from rig.reports.changes import lines
+from rig.reports.changes import change_table, lines
 
 RATE_HZ = 200.0
 TIME_S = np.arange(0, 12, 1 / RATE_HZ)
 SPEEDS = (0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
 DECLARED = {"mass": 2.0, "damping": 5.0, "friction": 1.5, "offset": 0.2}
-MACHINE = {**DECLARED, "asymmetry": 0.0, "stiction": 0.0, "knock": 0.0, "ripple": 0.0}
+LACKING = ("asymmetry", "stiction", "knock", "ripple", "spot")
+MACHINE = {**DECLARED, **dict.fromkeys(LACKING, 0.0), "noise": 0.1}
 
 
 def equation(target: str, first: Term, friction: int, speed: str) -> Model:
@@ -62,7 +63,9 @@ def record(
         force += machine["stiction"] * np.exp(-np.abs(speed) / 0.05) * np.tanh(speed / 0.01)
         force += machine["ripple"] * np.sin(2 * np.pi * position / 0.02)
         force += machine["knock"] * (TIME_S > 7.0)
-        force += random.normal(0, 0.1, TIME_S.size) + random.normal(0, 0.02)
+        there = np.exp(-(((position - 0.1) / 0.03) ** 2))
+        force += machine["spot"] * there * np.tanh(speed / 0.01)
+        force += random.normal(0, machine["noise"], TIME_S.size) + random.normal(0, 0.02)
         columns = {"axis_position_m": position, "drive_force_n": force}
         conditions = {"speed_ratio": scale}
         runs.append(Recording(f"{k:02d}", TIME_S, columns, conditions=conditions))
@@ -169,6 +172,27 @@ def test_a_ripple_that_came_is_stated_with_its_period():
     (change,) = found.changes
     assert change.unit["order"] == "rad/m"
     assert 2.0 * np.pi / change.shape["order"] == pytest.approx(0.02, rel=0.002)
+
+
+def test_a_change_of_unknown_form_is_stated_by_what_it_depends_on():
+    difference = compare(record(1), record(2, spot=1.0), [axis()])
+    (found,) = difference.changes
+    assert (found.verdict, found.how) == ("depends_on", "came")
+    assert {*found.depends_on} == {"velocity_sign", "axis_position"}
+    sentence = next(lines(difference))
+    stated = re.fullmatch(
+        r"New effect: unknown at motor, of unknown form; it depends on (.*) \(.*\)\.", sentence
+    )
+    assert {*stated[1].split(" and ")} == {"velocity sign", "axis position"}
+    (row,) = change_table(difference).rows
+    assert row[0] == "unknown at motor"
+
+
+def test_an_equation_that_fits_one_campaign_worse_is_remarked_on():
+    difference = compare(record(1), record(2, noise=0.2), [axis()])
+    assert not difference.changes
+    assert "motor fits the second campaign worse than the first one" in difference.notes[-1]
+    assert not compare(record(1), record(2), [axis()]).notes
 
 
 @pytest.mark.long

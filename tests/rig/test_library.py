@@ -204,7 +204,7 @@ def test_a_change_is_stated_in_words_and_as_json(tmp_path, axis, said):
     third = recorded(tmp_path / "c", 6.5, 300)
     printed = said("diff", before, after, "--on", third, "--json --model", axis)
     answer = json.loads(printed.out)
-    assert answer["schema"] == "rig.diff/2"
+    assert answer["schema"] == "rig.diff/3"
     (change,) = answer["changes"]
     assert change["verdict"] == "moved"
     assert change["parameters"]["damping"] == pytest.approx(1.5, rel=0.1)
