@@ -119,8 +119,8 @@ def refined(joint: Joint, pool: Sequence[Group], folds: Folds, survey: Survey) -
         shown = [s.candidate for s in best[:REFINED] if s.gain > 0.0]
         jumps = [c for one in shown for c in _at_other_instants(joint.layout, one, part)]
         best = best_of_each([*best, *assessed(joint, groups_of(joint, jumps), folds)])
-    bent = [c for s in best[:BENT] if (c := _bent(joint, s)) is not None]
-    more = assessed(joint, groups_of(joint, bent), folds)
+    free = [c for s in best[:BENT] if (c := bent(joint, s)) is not None]
+    more = assessed(joint, groups_of(joint, free), folds)
     ranked = _by_reading(joint, best_of_each([*best, *more]), folds)
     return _by_whole_form(joint, ranked, folds)
 
@@ -194,7 +194,7 @@ def _by_whole_form(joint: Joint, ranked: Sequence[Scored], folds: Folds) -> list
     return sorted((one for one in out if one is not None), key=lambda one: -one.score)
 
 
-def _bent(joint: Joint, one: Scored) -> Claim | None:
+def bent(joint: Joint, one: Scored) -> Claim | None:
     """Return a named effect of one column with a form that deviates from its equation."""
     candidate, cause = one.candidate, one.candidate.cause
     if isinstance(cause, Function) or len(candidate.size) != 1:
