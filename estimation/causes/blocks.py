@@ -147,10 +147,12 @@ def evaluate(
     for name in {name for name, _ in block.of}:
         at = [*joint.linear(name)]
         usual_there = joint.whole(usual)[at]
-        factor = np.where(usual_there == 0.0, 1.0, usual_there)
         given = _per_unit(joint, block, (name, "within"), at, amplitudes)
-        changes[name] = declared[:, at] / factor
-        slopes[name] = changes[name] + given / factor
+        # of an amplitude at its bound of zero no other one is a multiple
+        is_held = joint.held[at] | (usual_there == 0.0)
+        factor = np.where(is_held, 1.0, usual_there)
+        changes[name] = np.where(is_held, 1.0, declared[:, at] / factor)
+        slopes[name] = np.where(is_held, 1.0, (declared[:, at] + given) / factor)
     # the columns as they were before declared ones were taken off: in some runs these differ
     gram = np.asarray(sum(joint.weights[p] * joint.gram[p] for p in parts))
     count = block.taken.shape[1]

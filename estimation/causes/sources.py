@@ -112,7 +112,7 @@ class Source:
     @property
     def is_bounded(self) -> bool:
         """Whether its amplitudes have a sign: all but a loop over the load of what it bends."""
-        if self.place.kind.endswith("sensor") and self.effect.id in (*LATE, "sensor.creep"):
+        if self.place.kind.endswith("sensor") and self.effect.id in LATE:
             return True  # no reading is early; its place has its sign in every equation
         of_load = any(r == "travel" and not c.endswith(ANGLES) for r, c in self.channels)
         lower = [self.effect.amplitudes[k].lower for k in self.parts]
@@ -203,8 +203,7 @@ def _worked_out(
     reads_itself = tuple(names) == tuple(c for _, c in source.channels)
     is_late = source.ahead or (source.odd and source.place.kind != "actuator")
     if reads_itself and is_late and effect.id == "sensor.lag":
-        # its time times the rate of the reading, which is odd in time
-        columns = -source.shape[0] * _derived(seen["reading"][:, None], run, 1, is_wave=False)
+        columns = -source.shape[0] * _rate(seen["reading"][:, None], run, source.shape[0])
     elif source.odd or (source.ahead and reads_itself):
         back = {r: x[::-1] if r not in CLOCKS else x[-1] - x[::-1] for r, x in seen.items()}
         earlier = -effect.columns(back, source.shape)[::-1]
@@ -217,6 +216,19 @@ def _worked_out(
         gains = [passed(order, speed, run.low_pass) for order in effect.orders(source.shape)]
         columns = columns * np.column_stack(gains)
     return columns
+
+
+def _rate(reading: FloatArray, run: RunSignals, lag_s: float, part: float = 0.25) -> FloatArray:
+    """Return the rate of a reading, shape (n, 1), over a part of its lag to either side.
+
+    A lag times the rate of the reading is what the reading is late by, which is odd in time. Over
+    less than a part of the lag the reading has little but noise.
+    """
+    step, at = part * lag_s * run.rate_hz, np.arange(len(reading))
+    if step < 1.0:
+        return _derived(reading, run, 1, is_wave=False)
+    later, earlier = (np.interp(at + shift, at, reading[:, 0]) for shift in (step, -step))
+    return np.asarray((later - earlier) * run.rate_hz / (2.0 * step))[:, None]
 
 
 def _bent(columns: FloatArray, bend: Bend) -> FloatArray:

@@ -570,11 +570,15 @@ sensor = [
 """
 
 
-def _elastic(reads, *, bends=lambda k: 1.0, rubs=lambda k: 1.0):
+def _exact(torque: FloatArray, motor: FloatArray) -> FloatArray:
+    return torque
+
+
+def _elastic(reads=_exact, *, bends=lambda k: 1.0, rubs=lambda k: 1.0, scale=1.0):
     """Return the columns of a joint behind a spring.
 
     `reads` gives the cell's reading from torque and motor angle; the bend and the viscous friction
-    of run k have a factor.
+    of run k have a factor, and the motor's angle a scale.
     """
 
     def columns(k, random, position, speed, acceleration):
@@ -583,7 +587,7 @@ def _elastic(reads, *, bends=lambda k: 1.0, rubs=lambda k: 1.0):
         turned = RATE_HZ * np.gradient(motor)
         drive = torque / 10.0 + 0.2 * np.tanh(turned / 0.5) + 0.03 * rubs(k) * turned
         made = {
-            "motor_angle_rad": (motor, 1e-4),
+            "motor_angle_rad": (scale * motor, 1e-4),
             "joint_angle_rad": (position, 1e-5),
             "joint_torque_n_m": (reads(torque, motor), 0.05),
             "motor_current_a": (drive / 0.2, 0.02),
@@ -652,8 +656,78 @@ def _cold(k: int) -> float:
     ids=["compliance", "damping"],
 )
 def test_a_bend_or_a_viscous_friction_may_settle_over_a_campaign(changes, form):
-    (finding,) = found_in(ELASTIC, _elastic(lambda torque, motor: torque, **changes))
+    (finding,) = found_in(ELASTIC, _elastic(**changes))
     assert (finding.verdict, finding.form) == ("identified", form)
+
+
+def test_a_ratio_that_is_not_the_declared_one_is_an_error_of_scale():
+    (finding,) = found_in(ELASTIC, _elastic(scale=1.01))
+    assert (finding.verdict, finding.family) == ("identified", "transmission.scale_error")
+    assert abs(finding.parameters["share"].value) == pytest.approx(0.01, rel=0.05)
+
+
+def test_a_cell_that_gives_way_under_a_held_load_creeps():
+    """A load cell may creep to either side."""
+
+    def reads(torque, motor):
+        slow = lfilter([1.0 / (3.0 * RATE_HZ)], [1.0, 1.0 / (3.0 * RATE_HZ) - 1.0], torque)
+        return torque - 0.15 * (slow - torque)
+
+    (finding,) = found_in(ELASTIC, _elastic(reads))
+    assert (finding.verdict, finding.family) == ("identified", "sensor.creep")
+    assert finding.parameters["creep"].value < 0.0
+
+
+SCREW = """
+schema = "rig.machine/1"
+machine = { name = "screw", cutoff_hz = 20.0, run_offsets = false }
+axis = [{ name = "screw", unit = "rad" }, { name = "table", unit = "m" }]
+transmission = [
+  { name = "nut", input = "screw", output = "table", ratio = 500.0, compliant = true },
+]
+actuator = [{ name = "screw_current_a", axis = "screw" }]
+sensor = [
+  { name = "screw_angle_rad", axis = "screw", reads = "position" },
+  { name = "table_position_m", axis = "table", reads = "position" },
+  { name = "table_force_n", axis = "table", reads = "effort" },
+  { name = "nut_temperature_k", axis = "table", reads = "temperature" },
+]
+"""
+
+
+def test_an_effect_shows_where_the_declared_parameter_is_at_its_bound():
+    """The screw is so stiff that expansion, which moves with the load, hides its compliance."""
+
+    def columns(k, random, position, speed, acceleration):
+        temperature = 294.0 + 12.0 * (k + np.linspace(0.0, 1.0, len(position))) / RUNS
+        table = 0.1 * position
+        load = 40.0 * acceleration + 60.0 * np.tanh(speed / 0.05)
+        turned = 500.0 * (table + 2e-4 * table * (temperature - 294.0) + load / 2e7)
+        drive = load / 500.0 + 0.1 * np.tanh(speed / 0.05)
+        made = {"screw_angle_rad": (turned, 3e-4), "table_position_m": (table, 4e-7)}
+        made |= {"screw_current_a": (drive / 0.2, 0.02), "table_force_n": (load, 1.0)}
+        return noisy(random, made) | {"nut_temperature_k": temperature}
+
+    findings = found_in(SCREW, recorded(columns))
+    assert findings[0].form == "transmission.scale_error.thermal"
+    assert findings[0].parameters["rate"].value == pytest.approx(2e-4, rel=0.1)
+
+
+def test_a_cell_behind_a_slow_filter_is_late_by_a_lag_or_a_delay():
+    """The rate of so late a reading is mostly noise, but over a part of its lag."""
+
+    def columns(k, random, position, speed, acceleration):
+        slow = np.sin(2.0 * np.pi * 0.4 * np.arange(len(position)) / RATE_HZ + k)
+        rope = (1.5, 4.5, 9.0)[k % 3] + 3.0 * slow
+        drive = rope + 0.4 * np.tanh(speed / 0.1) + speed
+        part = 1.0 / (0.15 * RATE_HZ)
+        late = lfilter([part], [1.0, part - 1.0], rope - rope[0]) + rope[0]
+        made = {"motor_angle_rad": (position, 1e-5), "motor_current_a": (drive / 2.4, 0.05)}
+        return noisy(random, made | {"rope_torque_n_m": (late, 0.05)})
+
+    (finding,) = found_in(WINCH, recorded(columns))
+    assert "sensor.lag" in (finding.family, *finding.alternatives)
+    assert finding.rmse_after < 0.05
 
 
 def test_a_pressure_behind_a_filter_is_late_by_a_lag():

@@ -1,0 +1,50 @@
+"""Scale error: a transmission whose ratio, or an encoder whose scale, is not the declared one."""
+
+from typing import ClassVar
+
+from estimation.effects.effect import REFERENCE_K, Inputs, Parameter, Pointwise, Row, Shape
+
+
+class ScaleError(Pointwise):
+    """A position after a transmission that is off by a share of itself.
+
+    Equation: deflection = a position. a in the target's unit per unit of the position.
+
+    Check: count teeth or measure the lead, and compare both encoders with a third one.
+
+    Source: lead error of a screw, ISO 3408-3 (travel deviation over the useful travel).
+    """
+
+    id = "transmission.scale_error"
+    balances: ClassVar = {"gearbox": 1, "stretch": -1}
+    roles: ClassVar = {"position": "spindle_angle_rad"}
+    amplitudes = (Parameter("share", "target / position", "deviation per unit of the position"),)
+    told_apart_by = "a third encoder: a ratio and the scale of an encoder have the same form"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        return (inputs["position"],)
+
+
+class ThermalScaleError(ScaleError):
+    """A ratio that follows a measured temperature, as the lead of a screw that expands.
+
+    Equation: deflection = a position (temperature - 298.15 K). a in the target's unit per unit of
+    the position and K, temperature in K.
+
+    Check: move to the same position cold and warm, and compare both encoders.
+
+    Source: linear thermal expansion, 11e-6 /K of steel.
+    """
+
+    id = "transmission.scale_error.thermal"
+    meaning = "a ratio, or an encoder's scale, that follows a measured temperature"
+    roles: ClassVar = {"position": "spindle_angle_rad", "temperature": "motor_temperature_k"}
+    amplitudes = (
+        Parameter("rate", "target / position / temperature", "change of the share per kelvin"),
+    )
+    told_apart_by = "the same position when the transmission is cold and when it is warm"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        return (inputs["position"] * (inputs["temperature"] - REFERENCE_K),)
