@@ -118,6 +118,7 @@ OF_FEW = (
     "motor.gain_by_position",  # a rotating motor has a ripple of its constant instead
     "sensor.gain_by_position",  # its torque sensors are in line with their shafts
     "ripple.sensor",
+    "transmission.scale_error",  # its gears have teeth, and the ratio of its cable is a parameter
 )
 """Families that the reference rig has in the equations that their effects name, and in no other."""
 

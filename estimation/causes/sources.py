@@ -112,7 +112,7 @@ class Source:
     @property
     def is_bounded(self) -> bool:
         """Whether its amplitudes have a sign: all but a loop over the load of what it bends."""
-        if self.place.kind.endswith("sensor") and self.effect.id in LATE:
+        if self.place.kind.endswith("sensor") and self.effect.id in (*LATE, "sensor.creep"):
             return True  # no reading is early; its place has its sign in every equation
         of_load = any(r == "travel" and not c.endswith(ANGLES) for r, c in self.channels)
         lower = [self.effect.amplitudes[k].lower for k in self.parts]

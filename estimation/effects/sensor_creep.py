@@ -19,7 +19,7 @@ def _walk(now: FloatArray, shape: FloatArray, state: FloatArray, rows: FloatArra
 
 
 class SensorCreep(Remembering):
-    """A reading that continues to change exponentially after its load is constant, to either side.
+    """A reading that continues to grow exponentially after its load is constant.
 
     Equation: error = a (slow - reading); d slow / dt = (reading - slow) / T, slow = settled times
     the reading on the first sample. a has no unit, T in s. The immediate response is part of the

@@ -16,7 +16,7 @@ class ScaleError(Pointwise):
     """
 
     id = "transmission.scale_error"
-    balances: ClassVar = {"gearbox": 1, "stretch": -1}
+    balances: ClassVar = {"stretch": -1}
     roles: ClassVar = {"position": "spindle_angle_rad"}
     amplitudes = (Parameter("share", "target / position", "deviation per unit of the position"),)
     told_apart_by = "a third encoder: a ratio and the scale of an encoder have the same form"

@@ -666,18 +666,6 @@ def test_a_ratio_that_is_not_the_declared_one_is_an_error_of_scale():
     assert abs(finding.parameters["share"].value) == pytest.approx(0.01, rel=0.05)
 
 
-def test_a_cell_that_gives_way_under_a_held_load_creeps():
-    """A load cell may creep to either side."""
-
-    def reads(torque, motor):
-        slow = lfilter([1.0 / (3.0 * RATE_HZ)], [1.0, 1.0 / (3.0 * RATE_HZ) - 1.0], torque)
-        return torque - 0.15 * (slow - torque)
-
-    (finding,) = found_in(ELASTIC, _elastic(reads))
-    assert (finding.verdict, finding.family) == ("identified", "sensor.creep")
-    assert finding.parameters["creep"].value < 0.0
-
-
 SCREW = """
 schema = "rig.machine/1"
 machine = { name = "screw", cutoff_hz = 20.0, run_offsets = false }
