@@ -30,6 +30,12 @@ def base_errors(joint: Joint, folds: Folds) -> Sequence[Mapping[Part, FloatArray
     return out
 
 
+def squared_of_runs(joint: Joint, base: FloatArray, part: Part) -> FloatArray:
+    """Return the squared error of each run with a base of these parameters, shape (runs,)."""
+    vector = np.append(base, -1.0)
+    return np.asarray(np.einsum("i,rij,j->r", vector, joint.gram[part], vector))
+
+
 def extrapolated(joint: Joint, family: Family) -> Mapping[Part, float]:
     """Return the squared error that the base's own uncertainty makes in what was left out."""
     fits = joint.left_out(family)

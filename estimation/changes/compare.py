@@ -14,6 +14,7 @@ from estimation.causes.candidates import (
     laid_out,
     pool_of,
 )
+from estimation.causes.criterion import squared_of_runs
 from estimation.causes.instruments import add_instruments
 from estimation.causes.joint import Joint
 from estimation.causes.layout import Layout, lay_out
@@ -157,7 +158,7 @@ def _predicted(
         for one, later in causes:
             own = {A: not later, B: later, ON: (taken_as == B) == later}
             acts = tuple(own[name[:2]] for name in names)
-            laid = laid_out(plain, replace(Claim(one.candidate.cause), acts=acts, given=True))
+            laid = laid_out(plain, Claim(one.candidate.cause, acts, given=True))
             if laid is not None:
                 grown = grown.with_cause(laid.laid, laid.precision)
         errors.append(_rms(grown, grown.fitted_on(of[A] + of[B]), of[ON]))
@@ -170,10 +171,9 @@ def _predicted(
 
 def _rms(joint: Joint, base: FloatArray, counts: FloatArray) -> dict[str, float]:
     """Return the root mean square error of each equation within some runs."""
-    vector = np.append(base, -1.0)
     out = {}
     for name in joint.layout.equations:
         p = (name, "within")
-        squared = np.einsum("i,rij,j->r", vector, joint.gram[p], vector)
-        out[name] = float(np.sqrt(max(squared @ counts, 0.0) / (joint.samples[p] @ counts)))
+        squared = max(float(squared_of_runs(joint, base, p) @ counts), 0.0)
+        out[name] = float(np.sqrt(squared / (joint.samples[p] @ counts)))
     return out

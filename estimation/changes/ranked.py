@@ -42,7 +42,7 @@ def _since_the_first(one: Scored, is_b: Sequence[bool], joint: Joint) -> Scored:
     """Return a moved parameter as a change in the second campaign; an effect stays as it is."""
     if not isinstance(one.candidate.cause, Changed):
         return one
-    turned = laid_out(joint, replace(Claim(one.candidate.cause), acts=tuple(is_b), given=True))
+    turned = laid_out(joint, Claim(one.candidate.cause, tuple(is_b), given=True))
     return one if turned is None else replace(one, candidate=turned)
 
 
@@ -74,14 +74,11 @@ def _in_one_alone(plain: Joint, prior: float, reach: float = 7.0) -> Rank:
         found: list[Scored] = []
         least = _form_of_others(plain, joint, folds)
         best = best_of_each(assessed(joint, pool, folds))
-        forms = [c for x in best if (c := bent(joint, x)) is not None]
-        forms += [x.candidate for x in best if not x.candidate.is_function]
-        named = [Claim(c.cause, c.acts, c.choices, given=True) for c in forms]
         for one in best:
             far = bool(found) and one.score < found[0].score - reach / joint.numbers.sharpness
             if one.score < 0.0 or far:
                 break
-            if one.gain > least and _differs(one, named, joint, folds, prior):
+            if one.gain > least and _differs(one, best, joint, folds, prior):
                 found.append(one)
         return likeliest_first(found, prior)
 
@@ -100,20 +97,25 @@ def _form_of_others(plain: Joint, joint: Joint, folds: Folds) -> float:
     return float(-np.log1p(-left)) if left < 1.0 else float("inf")
 
 
-def _differs(one: Scored, named: Sequence[Claim], joint: Joint, folds: Folds, prior: float) -> bool:
+def _differs(
+    one: Scored, every: Sequence[Scored], joint: Joint, folds: Folds, prior: float
+) -> bool:
     """Whether a change is worth its price where the same cause acts in both campaigns as well.
 
     An unknown form is fitted to what the declared model lacks in both. Next to it in both it has to
-    be likelier than each of the named changes there.
+    be likelier than every named change there, whose form may deviate from its equation.
     """
     shared = laid_out(joint, Claim(one.candidate.cause))
     if one.candidate.cause.is_declared or shared is None:  # in both already
         return True
     both = joint.with_cause(shared.laid, shared.precision)
-    changed = replace(Claim(one.candidate.cause), acts=one.candidate.acts, given=True)
+    changed = Claim(one.candidate.cause, one.candidate.acts, given=True)
     again = assessed(both, groups_of(both, [changed]), folds)
     worth = max((x.gain for x in again), default=0.0) - one.price.score(joint.numbers)
     if worth <= 0.0 or not changed.is_function:
         return worth > 0.0
+    forms: list[Claim] = [c for x in every if (c := bent(joint, x)) is not None]
+    forms += [x.candidate for x in every if not x.candidate.is_function]
+    named = [Claim(c.cause, c.acts, c.choices, given=True) for c in forms]
     rivals = assessed(both, groups_of(both, named), folds)
     return worth >= max((score_of(x, prior) for x in rivals), default=0.0)

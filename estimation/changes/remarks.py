@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from estimation.causes.criterion import squared_of_runs
 from estimation.causes.joint import Joint
 from estimation.causes.scoring import Scored
 from estimation.copies import copies
@@ -38,11 +39,10 @@ def unexplained(
     """
     for one in causes:
         joint = joint.with_cause(one.candidate.laid, one.candidate.precision)
-    vector, later = np.append(joint.fitted_on(np.ones(len(is_b))), -1.0), np.array(is_b)
+    base, later = joint.fitted_on(np.ones(len(is_b))), np.array(is_b)
     for name, equation in joint.layout.equations.items():
         p = name, "within"
-        squared = np.einsum("i,rij,j->r", vector, joint.gram[p], vector) / joint.samples[p]
-        error = np.sqrt(np.maximum(squared, 0.0))
+        error = np.sqrt(np.maximum(squared_of_runs(joint, base, p), 0.0) / joint.samples[p])
         sides = {"first": error[~later], "second": error[later]}
         better, worse = sorted(sides, key=lambda side: float(np.median(sides[side])))
         low, high = (float(np.median(sides[side])) for side in (better, worse))

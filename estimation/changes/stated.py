@@ -153,7 +153,7 @@ def _between_the_grid(
 
     def of(order: float) -> Candidate:
         shape = (*source.shape[:k], order, *source.shape[k + 1 :])
-        claim = replace(Claim(replace(source, shape=shape)), acts=candidate.acts, given=True)
+        claim = Claim(replace(source, shape=shape), candidate.acts, given=True)
         return laid_out(joint, claim) or candidate
 
     def error(order: float) -> float:

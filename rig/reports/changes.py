@@ -66,7 +66,7 @@ def change_table(found: Difference) -> TextTable:
             unit = plain_unit(change.unit[name])
             rows.append((change.name, named, before, f"{value:+.4g}", interval, unit))
         if change.verdict == "depends_on":
-            rows.append((change.name, f"of {variables_of(change)}", "-", "-", "-", "-"))
+            rows.append((change.name, f"depends on {variables_of(change)}", "-", "-", "-", "-"))
         rows += [
             (change.name, name, "-", f"{value:.4g}", "", plain_unit(change.unit[name]))
             for name, value in _shape(change).items()
