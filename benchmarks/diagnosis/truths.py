@@ -151,6 +151,7 @@ NOT_HIDDEN = {
     "ripple.sensor": "the simulated torque sensors are in line with their shafts",
     "sensor.thermal": "the rig measures no temperature",
     "transmission.thermal": "the rig measures no temperature, and its compliances stay constant",
+    "transmission.compliance_by_position": "the simulated cables and gears have one compliance",
     "transmission.scale_error": "the simulated ratios and scales of encoders are the declared ones",
 }
 """Families that no case hides, and why the simulated rig cannot."""

@@ -62,13 +62,15 @@ class Probability:
     """A family's share of the posterior in one slot of the leading hypothesis.
 
     The gain is that of its best candidate, before the price of what was chosen: over the training
-    runs, or over all runs once the test runs are opened.
+    runs, or over all runs once the test runs are opened. `elsewhere` has the places
+    other than that of its best candidate where it is as likely.
     """
 
     family: str
     share: float
     best: Scored
     gain: float
+    elsewhere: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -88,14 +90,28 @@ class Kept:
 
 def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
     """Return the posterior over families of one slot, each by its best candidate, best first."""
-    best: dict[str, Scored] = {}
+    best: dict[str, dict[str, Scored]] = {}
     for scored in ranked:
-        best.setdefault(scored.candidate.cause.family, scored)
-    shares = posterior(list(best.values()), numbers)
+        cause = scored.candidate.cause
+        best.setdefault(cause.family, {}).setdefault(cause.place.name, scored)
+    leading = [next(iter(of_family.values())) for of_family in best.values()]
+    shares = posterior(leading, numbers)
     found = [
-        Probability(f, float(p), best[f], best[f].gain) for f, p in zip(best, shares, strict=True)
+        Probability(f, float(share), one, one.gain, _elsewhere(best[f], numbers))
+        for f, one, share in zip(best, leading, shares, strict=True)
     ]
     return sorted((p for p in found if p.share > 0.0), key=lambda p: -p.share)
+
+
+def _elsewhere(by_place: Mapping[str, Scored], numbers: Numbers) -> tuple[str, ...]:
+    """Return the places of a family besides the first one that are in the set of its places."""
+    shares = posterior(list(by_place.values()), numbers)
+    of_place = {place: float(share) for place, share in zip(by_place, shares, strict=True) if share}
+    if not of_place:
+        return ()
+    whole = sum(of_place.values())
+    first = next(iter(of_place))
+    return tuple(others_in_set(first, {place: s / whole for place, s in of_place.items()}))
 
 
 def named(one: Kept, may_name: bool) -> Finding:
@@ -123,6 +139,7 @@ def named(one: Kept, may_name: bool) -> Finding:
             for where in [p.best.candidate.cause.place.name]
             if p.family in others and where != place.name
         },
+        other_places=lead.elsewhere,
         probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]},
         no_effect=round(max(0.0, 1.0 - sum(p.share for p in one.likely)), 4),
     )
@@ -203,12 +220,12 @@ def _amplitudes_and_shape(
         p.name: Value(float(x), units.unit(p, model.target), None)
         for p, x in zip(cause.effect.shape, cause.shape, strict=True)
     }
-    if elsewhere := _elsewhere(kept, finding, refits):
-        return {**elsewhere, **shape}
+    if in_sensor := _in_sensor(kept, finding, refits):
+        return {**in_sensor, **shape}
     return {**_refitted(kept, home, refits), **shape}
 
 
-def _elsewhere(kept: Kept, finding: Finding, refits: Refits) -> Mapping[str, Value]:
+def _in_sensor(kept: Kept, finding: Finding, refits: Refits) -> Mapping[str, Value]:
     """Return the amplitudes of a sensor's error from the equation whose error it lowers most.
 
     In its home equation they are not identified: crosstalk of the current is a larger constant of

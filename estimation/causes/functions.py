@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from estimation.causes.angles import travel_of
-from estimation.causes.grids import contacts, next_to
+from estimation.causes.grids import contacts, direction_width, next_to
 from estimation.causes.instruments import signal
 from estimation.causes.layout import Layout
 from estimation.causes.places import Place
@@ -162,7 +162,8 @@ def _middle(of: Sequence[Contact]) -> Contact:
 def _function(
     layout: Layout, place: Place, variables: tuple[str, ...], contact: Contact | None = None
 ) -> Function:
-    width, counts = layout.direction_width(place.home), _counts(variables)
+    width = direction_width(layout, place) if "speed" in place.roles else 0.0
+    counts = _counts(variables)
     forms = {v: _form(v, variables, width, contact) for v in variables}
     knots = tuple(_knots(layout, place, v, forms[v], counts[v]) for v in variables)
     return Function(place, variables, knots, width, contact)
@@ -182,7 +183,7 @@ def _form(variable: str, variables: Sequence[str], width: float, contact: Contac
 def variables_at(layout: Layout, place: Place) -> list[str]:
     """Return the variables a cause at a place may depend on, simplest first."""
     found = []
-    if "speed" in place.roles and layout.direction_width(place.home):
+    if "speed" in place.roles and direction_width(layout, place):
         found += ["velocity_sign", "velocity"]
     others = ["position", "load", "current", "acceleration", "history", "dwell", "temperature"]
     if place.kind != "loss":

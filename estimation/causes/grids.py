@@ -36,7 +36,7 @@ def axis(
     """Return the values of one shape parameter to try, over the range that the data cover."""
     if parameter.name == "width" and "speed" in effect.roles:
         usual = NARROW * _range(layout, channels["speed"])[1]
-        return [layout.direction_width(place.home) or usual or 1.0]
+        return [direction_width(layout, place) or usual or 1.0]
     if parameter.name == "middle":
         return [0.0]  # play is crossed where the load changes its side
     if parameter.name == "harmonic":
@@ -49,7 +49,7 @@ def axis(
     if parameter.name == "fall" and relative is not None:
         # one that falls faster is another form of the change of sign
         usual = _range(layout, channels["speed"])[1] or 1.0
-        least = max(relative[0], 2.0 * layout.direction_width(place.home) / usual)
+        least = max(relative[0], 2.0 * direction_width(layout, place) / usual)
         count = len(relative) if least < relative[-1] else 0
         relative = tuple(np.geomspace(least, relative[-1], count))
     if parameter.unit in channels and relative is not None:
@@ -184,6 +184,21 @@ def last_order(layout: Layout, effect: Effect, angle: str) -> int:
     """Return the largest order that a search tries: more where the travel resolves few."""
     resolved = 2 * math.pi / travel_of(layout, angle)
     return max(40, round(MOST_PERIODS * min(resolved, 1.5))) // (len(effect.amplitudes) // 2)
+
+
+def direction_width(layout: Layout, place: Place) -> float:
+    """Return the speed over which friction at a place changes its sign, 0.0 where none is declared.
+
+    Where its own equation has none of that speed, that of another one, at the same share of the
+    usual speed of its shaft.
+    """
+    (speed,), own = place.roles["speed"], layout.equations[place.home]
+    if own.width and own.speed == speed:
+        return own.width
+    usual = _range(layout, speed)[1]
+    declared = [e for e in layout.equations.values() if e.width]
+    shares = [e.width / (_range(layout, e.speed)[1] or usual) for e in declared]
+    return max(shares, default=0.0) * usual
 
 
 def _range(layout: Layout, channel: str) -> tuple[float, float]:

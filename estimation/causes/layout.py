@@ -60,11 +60,6 @@ class Layout:
         """Ranges of signals over the runs that were already worked out."""
         return {}
 
-    def direction_width(self, equation: str) -> float:
-        """Return the speed over which friction of an equation changes its sign, else of another."""
-        own = self.equations[equation].width
-        return own or max((e.width for e in self.equations.values()), default=0.0)
-
     def select(self, names: Sequence[str]) -> "Layout":
         """Return the same equations on some of the runs."""
         kept = set(names)

@@ -25,6 +25,11 @@ DECLARED_ONLY = (
     "transmission.damping",
 )
 DECLARED_FRICTION = ("friction.coulomb", "friction.viscous")
+BEHIND_THE_BEND = (*DECLARED_FRICTION, "inertia.missing")
+"""Losses that an equation of a torque has, and that bend a transmission, too.
+
+Where its torque sensor is behind them, the bend alone shows them.
+"""
 SYNONYMS = ("friction.capstan",)
 """Effects that another one stands for.
 
@@ -118,6 +123,7 @@ OF_FEW = (
     "motor.gain_by_position",  # a rotating motor has a ripple of its constant instead
     "sensor.gain_by_position",  # its torque sensors are in line with their shafts
     "ripple.sensor",
+    "transmission.compliance_by_position",  # its cables have one free length
     "transmission.scale_error",  # its gears have teeth, and the ratio of its cable is a parameter
 )
 """Families that the reference rig has in the equations that their effects name, and in no other."""
@@ -225,6 +231,8 @@ def repeats_one_reference(layout: Layout) -> bool:
 
 
 def _acts(layout: Layout, effect: Effect, place: Place) -> bool:
+    if place.kind == "output":
+        return effect.id in BEHIND_THE_BEND
     if effect.family in DECLARED_FRICTION or effect.id.startswith(DECLARED_ONLY):
         return False
     if effect.id in SYNONYMS:
@@ -248,6 +256,8 @@ def _acts(layout: Layout, effect: Effect, place: Place) -> bool:
         return False  # the gain of a drive by its side
     if effect.id == "ripple.sensor" and len(place.equations) < 2:
         return False  # in one equation a torque at the shaft has the same form
+    if effect.family in ("ripple.motor", "ripple.output") and place.kind == "loss" and not is_known:
+        return len(place.equations) < 2  # in several, the wave of their sensor has
     if (place.kind == "lever") != (effect.id == "eccentric.load.pulley"):
         return False
     if place.kind == "deflection" and effect.id.endswith(".lugre"):

@@ -27,7 +27,7 @@ CLOCKS: Mapping[str, tuple[str, ...]] = {
 STATED = 1e-9
 """Share of its size by which a number that is stated varies within a run: by rounding."""
 
-Kind = Literal["loss", "actuator", "deflection", "lever", "torque sensor", "angle sensor"]
+Kind = Literal["loss", "output", "actuator", "deflection", "lever", "torque sensor", "angle sensor"]
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def places_of(layout: Layout) -> list[Place]:
     sensors = [n for n in layout.measured if n not in known]
     for sensor in sensors:
         if (both := _both(layout, sensor)) is not None:
-            found += [_behind(layout, sensor, *both, angles), *_levers(sensor, *both, angles)]
+            found += [*_behind(layout, sensor, *both, angles), *_levers(sensor, *both, angles)]
     found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
     warmth = tuple(n for n in signals.temperatures if n in layout.measured)
     supplies = tuple(n for n in layout.conditions if n.endswith(SUPPLIES))
@@ -258,7 +258,7 @@ def _one_of_each(places: Sequence[Place]) -> list[Place]:
 
 def _both(layout: Layout, sensor: str) -> tuple[Equation, Equation] | None:
     """Return the equations of a transmission's torque and of its bend that read a torque sensor."""
-    reading = [e for e in layout.equations.values() if sensor in e.channels]
+    reading = [e for e in layout.equations.values() if _share(e, sensor)]
     torque = [e for e in reading if not e.of_angle]
     if len(torque) != 1 or len(reading) < 2:
         return None
@@ -267,13 +267,18 @@ def _both(layout: Layout, sensor: str) -> tuple[Equation, Equation] | None:
 
 def _behind(
     layout: Layout, sensor: str, torque: Equation, bent: Equation, angles: Sequence[str]
-) -> Place:
-    """Return the place of a torque between a compliance and a torque sensor behind it."""
-    reading = [e for e in layout.equations.values() if sensor in e.channels]
-    enters = tuple(Entry(e.name, e.channels[sensor]) for e in reading)
-    angle = bent.target if bent.target in angles else _own_angle(torque, angles)
+) -> Iterator[Place]:
+    """Yield the places of a torque between a compliance and a torque sensor behind it.
+
+    The first one has the effects that no equation declares. The equation of the torque has friction
+    and inertia already, wherever they are: of those behind the compliance the bend has the size.
+    """
+    shares = {e.name: _share(e, sensor) for e in layout.equations.values()}
+    enters = tuple(Entry(name, -share) for name, share in shares.items() if share)
+    angle = _own_angle(bent, angles)
     roles = _motion(angle) | _shared(angles, angle) | {"load": (sensor,)}
-    return Place(f"torque at {sensor}", "loss", torque.name, enters, roles)
+    loss = Place(f"torque at {sensor}", "loss", torque.name, enters, roles)
+    yield from (loss, replace(loss, kind="output", home=bent.name))
 
 
 def _levers(
@@ -290,7 +295,7 @@ def _levers(
         if not share or not angle.endswith("_angle_rad"):  # a carriage does not turn
             continue
         side = -1.0 if torque.speed in _motion(angle)["speed"] else 1.0
-        gain = side * torque.channels[sensor] / share
+        gain = -side * _share(torque, sensor) / share
         enters = (Entry(bent.name, 1.0), Entry(torque.name, gain, load=sensor))
         roles = {"output_angle": (angle,)}
         yield Place(f"wheel of {angle} at {sensor}", "lever", bent.name, enters, roles)
@@ -304,9 +309,9 @@ def _entries(equation: Equation, channel: str) -> Iterator[Entry]:
             yield Entry(equation.name, weight * found[0], found[1])
 
 
-def _share(equation: Equation, angle: str) -> float:
-    """Return the factor of an angle in an equation's target less its right-hand side."""
-    return sum(entry.gain for entry in _entries(equation, angle) if not entry.order)
+def _share(equation: Equation, channel: str) -> float:
+    """Return the factor of a reading in an equation's target less its right-hand side."""
+    return sum(entry.gain for entry in _entries(equation, channel) if not entry.order)
 
 
 def _is_stated(layout: Layout, channel: str) -> bool:

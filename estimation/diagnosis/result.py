@@ -59,6 +59,7 @@ class Finding:
         verdict: What is claimed of it.
         alternatives: Families that these runs cannot distinguish from it.
         alternative_places: Family to the place where it would act, where that is another one.
+        other_places: Places where an effect of this family lowers the error as much.
         probabilities: Family to its probability, for the family and its alternatives.
         no_effect: Probability of none; the rest to one is that of families that are not listed.
         depends_on: Variables it depends on.
@@ -83,6 +84,7 @@ class Finding:
     verdict: str
     alternatives: tuple[str, ...] = ()
     alternative_places: Mapping[str, str] = field(default_factory=dict)
+    other_places: tuple[str, ...] = ()
     probabilities: Mapping[str, float] = field(default_factory=dict)
     no_effect: float = 0.0
     depends_on: tuple[str, ...] = ()

@@ -2,7 +2,15 @@
 
 from typing import ClassVar
 
-from estimation.effects.effect import REFERENCE_K, Inputs, Parameter, Pointwise, Row, Shape
+from estimation.effects.effect import (
+    REFERENCE_K,
+    Inputs,
+    Parameter,
+    Parameters,
+    Pointwise,
+    Row,
+    Shape,
+)
 
 
 class ScaleError(Pointwise):
@@ -18,12 +26,38 @@ class ScaleError(Pointwise):
     id = "transmission.scale_error"
     balances: ClassVar = {"stretch": -1}
     roles: ClassVar = {"position": "spindle_angle_rad"}
-    amplitudes = (Parameter("share", "target / position", "deviation per unit of the position"),)
+    amplitudes: ClassVar[Parameters] = (
+        Parameter("share", "target / position", "deviation per unit of the position"),
+    )
     told_apart_by = "a third encoder: a ratio and the scale of an encoder have the same form"
 
     def row(self, inputs: Inputs, shape: Shape) -> Row:
         """Return one value or one array per amplitude."""
         return (inputs["position"],)
+
+
+class CurvedScaleError(ScaleError):
+    """A ratio that changes along the travel, as the lead of a worn screw or a filling drum does.
+
+    Equation: deflection = a position^2 + b position^3. a and b in the target's unit per square and
+    cube of the unit of the position.
+
+    Check: compare both encoders with a third one at several positions.
+
+    Source: lead error of a screw, ISO 3408-3 (travel deviation over the useful travel).
+    """
+
+    id = "transmission.scale_error.curved"
+    meaning = "a ratio that changes along the travel"
+    amplitudes = (
+        Parameter("bend", "target / position / position", "change of the share with the position"),
+        Parameter("twist", "target / position / position / position", "change with its square"),
+    )
+    told_apart_by = "a third encoder at several positions"
+
+    def row(self, inputs: Inputs, shape: Shape) -> Row:
+        """Return one value or one array per amplitude."""
+        return (inputs["position"] ** 2, inputs["position"] ** 3)
 
 
 class ThermalScaleError(ScaleError):

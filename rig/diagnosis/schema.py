@@ -43,6 +43,8 @@ class Finding(_Strict):
     alternatives: list[Family]
     alternative_places: dict[Family, str]
     """Of the alternatives that would act at another place."""
+    other_places: list[str]
+    """Places where an effect of this family lowers the error as much."""
     probabilities: dict[Family, Annotated[float, Field(ge=0, le=1)]]
     """Of the family and its alternatives."""
     no_effect: Annotated[float, Field(ge=0, le=1)]

@@ -132,7 +132,8 @@ def _named(finding: Finding) -> str:
     plain = meaning_of(finding)
     if finding.family == "sensor.crosstalk" and finding.depends_on:
         plain += f", the {variables_of(finding)}"
-    where = f" ({finding.place})" if finding.place != finding.balance else ""
+    places = " or ".join((finding.place, *finding.other_places))
+    where = f" ({places})" if places != finding.balance else ""
     named = f"[{finding.family}]{where}" + (f", {', '.join(sizes)}" if sizes else "")
     if finding.family in WORDS:
         term = _first_line(finding.family).partition(": ")[0].lower()

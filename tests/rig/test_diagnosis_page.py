@@ -117,6 +117,13 @@ def test_an_alternative_at_another_place_is_said_with_that_place(diagnosed):
     assert "also possible: sensor.delay (actuator motor_current_a); these" in said
 
 
+def test_a_name_that_may_be_at_two_places_is_printed_with_both(diagnosed):
+    diagnosis, _ = diagnosed
+    (finding,) = diagnosis.findings
+    either = replace(finding, place="sensor a_n_m", other_places=("sensor b_n_m",))
+    assert "(sensor a_n_m or sensor b_n_m)" in sentences(replace(diagnosis, findings=(either,)))[0]
+
+
 def test_a_name_without_alternatives_is_not_said_to_have_one(diagnosed):
     (finding,) = diagnosed[0].findings
     alone = replace(finding, alternatives=(), no_effect=0.12, runs_improved=1, runs_total=1)

@@ -86,21 +86,6 @@ effects = [
 ]
 """
 
-JOINT = """
-schema = "rig.machine/1"
-machine = { name = "joint", cutoff_hz = 20.0 }
-axis = [{ name = "motor", unit = "rad" }, { name = "link", unit = "rad" }]
-transmission = [
-  { name = "gear", input = "motor", output = "link", ratio = 100.0, compliant = true },
-]
-actuator = [{ name = "motor_current_a", axis = "motor" }]
-sensor = [
-  { name = "motor_angle_rad", axis = "motor", reads = "position" },
-  { name = "link_angle_rad", axis = "link", reads = "position" },
-  { name = "link_torque_n_m", axis = "link", reads = "effort" },
-]
-"""
-
 Motion = Callable[..., dict[str, FloatArray]]
 
 
@@ -204,25 +189,6 @@ def test_the_wave_of_a_screw_has_its_period_with_an_interval():
     low, high = order.ci95
     assert order.value == pytest.approx(2 * np.pi / lead, rel=3e-3)
     assert low < 2 * np.pi / lead < high < 1.02 * low
-
-
-def test_a_torque_cell_of_another_gain_in_some_runs_is_named_by_that_gain():
-    def columns(k, random, position, speed, acceleration):
-        torque = 25.0 * np.sin(position) + 2.0 * acceleration
-        rub = 0.05 * np.tanh(speed / 0.05) + 2e-3 * speed
-        noise = random.normal(0.0, [[3e-6], [2e-3], [0.03]], (3, len(torque)))
-        reading = torque * (1.05 if k >= 5 else 1.0)
-        return {
-            "motor_angle_rad": 100.0 * (position + torque / 2e4),
-            "link_angle_rad": position + noise[0],
-            "motor_current_a": (0.01 * torque + rub) / 0.1 + noise[1],
-            "link_torque_n_m": reading + noise[2],
-        }
-
-    (finding,) = found_in(JOINT, recorded(columns))
-    assert finding.family == "sensor.gain"
-    assert set(finding.runs_affected) == {f"{k:02d}" for k in range(5, RUNS)}
-    assert finding.parameters["change"].value == pytest.approx(0.05, rel=0.1)
 
 
 def test_a_weight_that_is_stated_has_no_sensor():
@@ -574,22 +540,34 @@ def _exact(torque: FloatArray, motor: FloatArray) -> FloatArray:
     return torque
 
 
-def _elastic(reads=_exact, *, bends=lambda k: 1.0, rubs=lambda k: 1.0, scale=1.0):
+def _none(speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+    return np.zeros_like(speed)
+
+
+def _elastic(
+    reads=_exact,
+    *,
+    bends=lambda k, position: 1.0,
+    rubs=lambda k: 1.0,
+    led=lambda position: position,
+    hidden=_none,
+):
     """Return the columns of a joint behind a spring.
 
-    `reads` gives the cell's reading from torque and motor angle; the bend and the viscous friction
-    of run k have a factor, and the motor's angle a scale.
+    `reads` gives the cell's reading from torque and motor angle, and `hidden` the torque that does
+    not reach the cell; the bend and the viscous friction of run k have a factor, and `led` gives
+    the way of the motor, on the side of the joint.
     """
 
     def columns(k, random, position, speed, acceleration):
         torque = 10.0 * (1 + k % 3) * np.sin(position) + 2.0 * acceleration
-        motor = 10.0 * (position + bends(k) * torque / 800.0)
+        motor = 10.0 * (led(position) + bends(k, position) * torque / 800.0)
         turned = RATE_HZ * np.gradient(motor)
         drive = torque / 10.0 + 0.2 * np.tanh(turned / 0.5) + 0.03 * rubs(k) * turned
         made = {
-            "motor_angle_rad": (scale * motor, 1e-4),
+            "motor_angle_rad": (motor, 1e-4),
             "joint_angle_rad": (position, 1e-5),
-            "joint_torque_n_m": (reads(torque, motor), 0.05),
+            "joint_torque_n_m": (reads(torque - hidden(speed, acceleration), motor), 0.05),
             "motor_current_a": (drive / 0.2, 0.02),
         }
         return noisy(random, made)
@@ -610,6 +588,20 @@ def test_an_error_of_a_cell_that_two_equations_read_is_one_finding(reads, family
     (finding,) = found_in(ELASTIC, _elastic(reads))
     assert (finding.verdict, finding.family) == ("identified", family)
     assert finding.place == "sensor joint_torque_n_m"
+
+
+@pytest.mark.parametrize(
+    ("hidden", "family"),
+    [
+        (lambda speed, acceleration: 1.5 * np.tanh(speed / 0.05), "friction.coulomb"),
+        (lambda speed, acceleration: 0.1 * acceleration, "inertia.missing"),
+    ],
+    ids=["friction", "inertia"],
+)
+def test_a_torque_that_bends_a_spring_and_does_not_reach_the_cell_is_found(hidden, family):
+    """Bearing and mass of the joint are between the spring and the torque cell."""
+    finding, *_ = found_in(ELASTIC, _elastic(hidden=hidden))
+    assert (finding.family, finding.place) == (family, "torque at joint_torque_n_m")
 
 
 def _looped(load: FloatArray, reach: float) -> FloatArray:
@@ -643,6 +635,25 @@ def test_hysteresis_of_a_cell_is_among_the_causes_where_one_equation_reads_it():
     assert "sensor.hysteresis" in {finding.family, *finding.alternatives}
 
 
+def test_a_torque_cell_of_another_gain_in_some_runs_is_named_by_that_gain():
+    def columns(k, random, position, speed, acceleration):
+        torque = 25.0 * np.sin(position) + 2.0 * acceleration
+        rub = 0.05 * np.tanh(speed / 0.05) + 2e-3 * speed
+        noise = random.normal(0.0, [[3e-6], [2e-3], [0.03]], (3, len(torque)))
+        reading = torque * (1.05 if k >= 5 else 1.0)
+        return {
+            "motor_angle_rad": 10.0 * (position + torque / 2e4),
+            "joint_angle_rad": position + noise[0],
+            "motor_current_a": (0.1 * torque + rub) / 0.1 + noise[1],
+            "joint_torque_n_m": reading + noise[2],
+        }
+
+    (finding,) = found_in(ELASTIC, recorded(columns))
+    assert finding.family == "sensor.gain"
+    assert set(finding.runs_affected) == {f"{k:02d}" for k in range(5, RUNS)}
+    assert finding.parameters["change"].value == pytest.approx(0.05, rel=0.1)
+
+
 def _cold(k: int) -> float:
     return float(1.0 + 0.4 * np.exp(-k / 4.0))
 
@@ -650,7 +661,7 @@ def _cold(k: int) -> float:
 @pytest.mark.parametrize(
     ("changes", "form"),
     [
-        ({"bends": _cold}, "transmission.thermal.campaign"),
+        ({"bends": lambda k, position: _cold(k)}, "transmission.thermal.campaign"),
         ({"rubs": _cold}, "friction.warmup.viscous.campaign"),
     ],
     ids=["compliance", "damping"],
@@ -661,9 +672,28 @@ def test_a_bend_or_a_viscous_friction_may_settle_over_a_campaign(changes, form):
 
 
 def test_a_ratio_that_is_not_the_declared_one_is_an_error_of_scale():
-    (finding,) = found_in(ELASTIC, _elastic(scale=1.01))
+    (finding,) = found_in(ELASTIC, _elastic(led=lambda position: 1.01 * position))
     assert (finding.verdict, finding.family) == ("identified", "transmission.scale_error")
     assert abs(finding.parameters["share"].value) == pytest.approx(0.01, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("changes", "form"),
+    [
+        (
+            {"bends": lambda k, position: 1.0 + 0.3 * position},
+            "transmission.compliance_by_position",
+        ),
+        (
+            {"led": lambda position: position + 0.01 * position**2},
+            "transmission.scale_error.curved",
+        ),
+    ],
+    ids=["compliance", "lead"],
+)
+def test_a_bend_or_a_lead_may_change_along_the_travel(changes, form):
+    (finding,) = found_in(ELASTIC, _elastic(**changes))
+    assert (finding.verdict, finding.form) == ("identified", form)
 
 
 SCREW = """
@@ -837,3 +867,36 @@ def test_another_gain_of_a_second_drive_is_its_torque_constant():
     (finding,) = found_in(GANTRY, recorded(columns))
     assert (finding.verdict, finding.family) == ("identified", "motor.torque_constant")
     assert finding.depends_on == ("current",)
+
+
+GEARBOX = """
+schema = "rig.machine/1"
+machine = { name = "gearbox bench", cutoff_hz = 20.0, run_offsets = false }
+axis = [{ name = "drive", unit = "rad" }, { name = "load", unit = "rad" }]
+transmission = [{ name = "gear", input = "drive", output = "load", ratio = 5.0 }]
+actuator = [{ name = "drive_torque_n_m", axis = "drive" }]
+sensor = [
+  { name = "drive_angle_rad", axis = "drive", reads = "position" },
+  { name = "load_torque_n_m", axis = "load", reads = "effort" },
+]
+"""
+
+
+def test_a_drift_is_at_either_of_two_sensors_that_one_equation_compares():
+    def columns(k, random, position, speed, acceleration):
+        torque = 2.0 * (1 + k % 3) * np.sin(3.0 * position)
+        drive = torque / 5.0 + 0.02 * acceleration + 0.05 * np.tanh(speed / 0.05) + 0.02 * speed
+        drifted = torque + 0.1 * np.arange(len(torque)) / RATE_HZ
+        return noisy(
+            random,
+            {
+                "drive_angle_rad": (5.0 * position, 1e-4),
+                "drive_torque_n_m": (drive, 0.005),
+                "load_torque_n_m": (drifted, 0.02),
+            },
+        )
+
+    (finding,) = found_in(GEARBOX, recorded(columns))
+    places = {finding.place, *finding.other_places}
+    assert finding.family == "sensor.drift"
+    assert places == {"sensor drive_torque_n_m", "sensor load_torque_n_m"}
