@@ -197,10 +197,13 @@ class Recording:
 
             known = [n for column in self.columns for n in (column, *rates_of(column))]
             near = difflib.get_close_matches(name, known, n=1)
+            advice = f"Did you mean {near[0]!r}?" if near else OTHER
+            if name in known:
+                advice = "It is a derivative: estimation.derived.zero_phase_channels returns it."
             raise MissingChannelError(
                 f"Run {self.name!r} has no channel {name!r}.",
                 f"It has: {', '.join(self.columns) or 'none'}.",
-                move_condition([name], [self]) or (f"Did you mean {near[0]!r}?" if near else OTHER),
+                move_condition([name], [self]) or advice,
             ) from None
 
     @property

@@ -231,6 +231,8 @@ def repeats_one_reference(layout: Layout) -> bool:
 
 
 def _acts(layout: Layout, effect: Effect, place: Place) -> bool:
+    if effect.id == "ripple.motor.harmonics" and "output_angle" in place.roles:
+        return False  # of several shafts, those that the motor drives have them
     if place.kind == "output":
         return effect.id in BEHIND_THE_BEND
     if effect.family in DECLARED_FRICTION or effect.id.startswith(DECLARED_ONLY):

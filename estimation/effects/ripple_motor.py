@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from estimation.effects.waves import Waves, order_of
+from estimation.effects.waves import Waves, harmonics_in, order_of
 
 
 class MotorRipple(Waves):
@@ -23,3 +23,22 @@ class MotorRipple(Waves):
     roles: ClassVar = {"motor_angle": "motor_angle_rad"}
     shape = order_of("motor_angle", 0.5, 20.5, points=401)
     told_apart_by = "a sweep at a slow constant speed, and coasting without current"
+
+
+class MotorHarmonics(MotorRipple):
+    """A wave over the turn or travel of a drive that is not a pure sine, such as a belt's seam.
+
+    Equation: torque = sum over n = 1, 2, 3 of a_n sin(n order angle) + b_n cos(n order angle), a_n
+    and b_n in N m, angle in rad, order in periods per turn.
+
+    Check: move it slowly without current and feel where it is stiff. Compare the period with the
+    length of the belt, the turn of its rollers, and the numbers of blades and teeth.
+
+    Source: periodic impulses of a local defect; Randall 2011, "Vibration-based Condition
+    Monitoring", section 2.2.
+    """
+
+    id = "ripple.motor.harmonics"
+    meaning = "torque or force that repeats along the turn or travel of a drive, not as a pure sine"
+    amplitudes = harmonics_in("target")
+    shape = order_of("motor_angle", 0.5, 16.0, points=32)

@@ -56,6 +56,7 @@ def test_what_is_no_recording_is_refused(changes, error, match):
     ("name", "advice"),
     [
         ("jaw_accel_rad_s2", "Did you mean 'jaw_acceleration_rad_s2'"),
+        ("jaw_velocity_rad_s", "It is a derivative"),
         ("crosshead_position_m", "--machine"),
     ],
 )

@@ -168,27 +168,43 @@ def test_play_of_a_carriage_follows_the_pull_of_its_own_mass():
     assert finding.parameters["gap"].value == pytest.approx(4e-5, rel=0.2)
 
 
-def test_the_wave_of_a_screw_has_its_period_with_an_interval():
-    lead = 0.005
+LEAD_M = 0.005
+
+
+def _screwed(wave: Callable[[FloatArray], FloatArray]) -> list[Recording]:
+    """Return runs of a press; `wave` gives a force over the turns of its screw."""
 
     def columns(k, random, position, speed, acceleration):
         travel_m, speed_m_s = 0.01 * position, 0.01 * speed
         load = 100.0 * np.sin(0.6 * position + k)
-        wave = 9.0 * np.sin(2 * np.pi * travel_m / lead + 0.7)
-        pull = load + 30.0 * np.tanh(speed_m_s / 0.001) + 1.8 * acceleration + wave
-        current = pull / 400.0 + random.normal(0.0, 2e-3, len(position))
-        return {
-            "motor_current_a": current,
-            "ram_position_m": travel_m + random.normal(0.0, 1e-6, len(position)),
-            "load_force_n": load + random.normal(0.0, 1.5, len(position)),
+        pull = load + 30.0 * np.tanh(speed_m_s / 0.001) + 1.8 * acceleration
+        pull += wave(travel_m / LEAD_M)
+        made = {
+            "motor_current_a": (pull / 400.0, 2e-3),
+            "ram_position_m": (travel_m, 1e-6),
+            "load_force_n": (load, 1.5),
         }
+        return noisy(random, made)
 
-    (finding,) = found_in(PRESS, recorded(columns))
-    assert finding.family == "ripple.motor"
+    return recorded(columns)
+
+
+def test_the_wave_of_a_screw_has_its_period_with_an_interval():
+    waves = _screwed(lambda turns: 9.0 * np.sin(2 * np.pi * turns + 0.7))
+    (finding,) = found_in(PRESS, waves)
+    assert finding.form == "ripple.motor"
     order = finding.parameters["order"]
     low, high = order.ci95
-    assert order.value == pytest.approx(2 * np.pi / lead, rel=3e-3)
-    assert low < 2 * np.pi / lead < high < 1.02 * low
+    assert order.value == pytest.approx(2 * np.pi / LEAD_M, rel=3e-3)
+    assert low < 2 * np.pi / LEAD_M < high < 1.02 * low
+
+
+def test_a_dent_that_every_turn_passes_is_a_wave_that_is_not_a_pure_sine():
+    dents = _screwed(lambda turns: 25.0 * np.exp(-(((turns % 1.0 - 0.4) / 0.08) ** 2)))
+    (finding,) = found_in(PRESS, dents)
+    assert (finding.verdict, finding.form) == ("identified", "ripple.motor.harmonics")
+    order = finding.parameters["order"].value
+    assert order == pytest.approx(2 * np.pi / LEAD_M, rel=3e-3)
 
 
 def test_a_weight_that_is_stated_has_no_sensor():
