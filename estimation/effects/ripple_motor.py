@@ -41,4 +41,4 @@ class MotorHarmonics(MotorRipple):
     id = "ripple.motor.harmonics"
     meaning = "torque or force that repeats along the turn or travel of a drive, not as a pure sine"
     amplitudes = harmonics_in("target")
-    shape = order_of("motor_angle", 0.5, 16.0, points=32)
+    shape = order_of("motor_angle", 0.5, 16.0, points=311)
