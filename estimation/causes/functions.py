@@ -129,6 +129,9 @@ def functions_at(layout: Layout, place: Place) -> Iterator[Function]:
         chosen += [*itertools.product(own, others), *((others[0], v) for v in others[1:])]
     if place.kind == "actuator" and len(place.equations) == 1:
         chosen = [v for v in chosen if "current" in v]  # the others are those of its equation
+    if place.kind == "loss" and len(place.equations) > 1:
+        # of its sensor's reading alone, it is an error of the sensor
+        chosen = [v for v in chosen if v != ("load",)]
     tried = _contacts(layout, place) if "dwell" in known else []
     for variables in chosen:
         if "dwell" not in variables:

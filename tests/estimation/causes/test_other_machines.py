@@ -595,9 +595,10 @@ def _elastic(
     ("reads", "family"),
     [
         (lambda torque, motor: torque + 0.2 * np.abs(torque), "sensor.gain_nonlinear"),
+        (lambda torque, motor: torque + 0.001 * torque**2, "sensor.gain_nonlinear"),
         (lambda torque, motor: torque + 0.8 * np.sin(2.0 * motor), "ripple.sensor"),
     ],
-    ids=["gain by side", "ripple"],
+    ids=["gain by side", "curve", "ripple"],
 )
 def test_an_error_of_a_cell_that_two_equations_read_is_one_finding(reads, family):
     """As a torque and as a bend it would be two effects."""
