@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -97,6 +97,25 @@ class HeldOut:
             gains = self.gains(before, cause)
             acts |= {name: gains.acts_in(name) for name in is_open}
         return acts, is_open
+
+    def begun(self, candidate: Candidate, acts_in: Mapping[str, bool]) -> Candidate:
+        """Return a change at one time of the campaign with the time at which the runs show it.
+
+        The training runs show it to lie between two of them; a test run there is before or after.
+        """
+        acting = [acts_in[run.name] for run in self.layout.runs]
+        cause = candidate.cause
+        if not isinstance(cause, Source) or _since(candidate) is None or acting != sorted(acting):
+            return candidate
+        first = next((r for r, acts in zip(self.layout.runs, acting, strict=True) if acts), None)
+        if first is None:
+            return candidate
+        begins_s = float(first.channels[CAMPAIGN_TIME][0])
+        shape = [
+            begins_s if p.name == "since" else x
+            for p, x in zip(cause.effect.shape, cause.shape, strict=True)
+        ]
+        return replace(candidate, cause=replace(cause, shape=tuple(shape)))
 
     def _acting(self, candidate: Candidate) -> Mapping[str, float]:
         """Return the probability that a cause acts in each run, from the training runs.

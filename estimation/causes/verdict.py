@@ -221,6 +221,8 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
         acts_in = {name: not acts for name, acts in acts_in.items()}  # most runs are the usual ones
     parts, uncounted, notes = dict(refits.parts), refits.open, list[str]()
     if settled:
+        candidate = held_out.begun(candidate, acts_in)
+        one = replace(one, scored=replace(one.scored, candidate=candidate))
         more = refits.open | {*settled}
         counted = candidate.acts is not None or more >= {*sealed.confirm}
         if not counted:

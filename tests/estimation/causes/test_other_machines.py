@@ -917,3 +917,23 @@ def test_a_drift_is_at_either_of_two_sensors_that_one_equation_compares():
     places = {finding.place, *finding.other_places}
     assert finding.family == "sensor.drift"
     assert places == {"sensor drive_torque_n_m", "sensor load_torque_n_m"}
+
+
+def test_a_change_between_two_training_runs_has_its_time_from_the_test_runs():
+    def columns(k, random, position, speed, acceleration):
+        rub = (30.0 + 25.0 * (k >= 5)) * np.tanh(speed / 0.05)
+        load = 100.0 * np.sin(0.6 * position + k)
+        made = {
+            "motor_current_a": ((load + rub + 1.8 * acceleration) / 400.0, 2e-3),
+            "ram_position_m": (0.01 * position, 1e-6),
+            "load_force_n": (load, 1.5),
+        }
+        return noisy(random, made)
+
+    recordings, between = recorded(columns), ("03", "04", "05")
+    others = tuple(r.name for r in recordings if r.name not in between)
+    sealed = replace(split(recordings), discover=others, confirm=between)
+    (finding,) = diagnose(recordings, declared(plant_file.parse(PRESS)), sealed).findings
+    assert "change.step" in (finding.family, *finding.alternatives)
+    assert finding.runs_affected == ("05", "06", "07", "08", "09")
+    assert finding.rmse_after < 0.1 * finding.rmse_before
