@@ -21,13 +21,6 @@ from estimation.causes.numbers import DEFAULT, Numbers
 from estimation.recording import FloatArray
 from estimation.within_bounds import solve_within
 
-DECLARED = 0.04
-"""Prior precision of a declared amplitude: its standard deviation is five times all signals.
-
-That of a cause is half of them. A declared term is there and a cause may not be: of what the runs
-do not separate the term has nearly all.
-"""
-
 HELD = 1e6
 """Precision of an amplitude that is held, in squares of its column: as good as no column."""
 
@@ -189,9 +182,9 @@ class Joint:
         }
         self._run_grams = np.asarray(sum(self.weights[p] * self.gram[p] for p in self.parts))
         whole = self._run_grams.sum(axis=0)
-        # a shape is known to within its own size
+        # no term exceeds half of all signals, and a shape is known to within its own size
         size = self._declared_size
-        self._precision = DECLARED * np.diag(whole)[:size] / self._signals(whole)
+        self._precision = 4.0 * np.diag(whole)[:size] / self._signals(whole)
         shapes = [c.of_shape for e in self.layout.equations.values() for c in e.kinds]
         self._precision[: len(shapes)] += np.where(shapes, (2.0 * SHAPE_STEP) ** 2, 0.0)
         self._unheld = self._precision
