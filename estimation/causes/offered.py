@@ -11,7 +11,7 @@ from estimation.causes.angles import angles_of, travel_of
 from estimation.causes.grids import axis, has_both_signs, last_order, least_order, turns
 from estimation.causes.layout import Layout
 from estimation.causes.orders import largest_orders, orders_elsewhere
-from estimation.causes.places import Place
+from estimation.causes.places import SENSORS, Place
 from estimation.causes.run_signals import ANGLES, EFFORTS
 from estimation.causes.sources import Source
 from estimation.effects import Effect, catalogue
@@ -109,9 +109,6 @@ OVER_TIME = ("friction.warmup", "sensor.drift", "change.step", "motor.thermal")
 
 KNOWN = ("motor", "gearbox", "cable", "stretch", "grasp")
 """Equations of the reference rig that effects name."""
-
-SENSORS = ("proximal_torque_n_m", "distal_torque_n_m")
-"""Torque sensors of the reference rig: a motor without them is one of another machine."""
 
 OF_FEW = (
     "friction.capstan",

@@ -24,6 +24,9 @@ CLOCKS: Mapping[str, tuple[str, ...]] = {
 }
 """Role of a time to its channel, at every place."""
 
+SENSORS = ("proximal_torque_n_m", "distal_torque_n_m")
+"""Torque sensors of the reference rig: a motor without them is one of another machine."""
+
 STATED = 1e-9
 """Share of its size by which a number that is stated varies within a run: by rounding."""
 
@@ -262,6 +265,8 @@ def _both(layout: Layout, sensor: str) -> tuple[Equation, Equation] | None:
     torque = [e for e in reading if not e.of_angle]
     if len(torque) != 1 or len(reading) < 2:
         return None
+    if torque[0].target == sensor and sensor in SENSORS:
+        return None  # on the shaft of the gear: nothing is between the two
     return torque[0], next(e for e in reading if e.of_angle)
 
 
