@@ -11,8 +11,8 @@ from estimation.causes.angles import angles_of, travel_of
 from estimation.causes.grids import axis, has_both_signs, last_order, least_order, turns
 from estimation.causes.layout import Layout
 from estimation.causes.orders import largest_orders, orders_elsewhere
-from estimation.causes.places import SENSORS, Place
-from estimation.causes.run_signals import ANGLES, EFFORTS
+from estimation.causes.places import Place
+from estimation.causes.run_signals import ANGLES, EFFORTS, SENSORS
 from estimation.causes.sources import Source
 from estimation.effects import Effect, catalogue
 

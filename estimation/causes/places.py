@@ -14,7 +14,7 @@ import numpy as np
 from estimation.causes.angles import angles_of, related, signals_of, unrelated
 from estimation.causes.equations import LINKS, Equation, sensitivity
 from estimation.causes.layout import Layout
-from estimation.causes.run_signals import ANGLES, EFFORTS
+from estimation.causes.run_signals import ANGLES, EFFORTS, SENSORS
 from estimation.derived import CAMPAIGN_TIME, origin_of, rates_of
 
 CLOCKS: Mapping[str, tuple[str, ...]] = {
@@ -23,9 +23,6 @@ CLOCKS: Mapping[str, tuple[str, ...]] = {
     "campaign_clock": (CAMPAIGN_TIME,),
 }
 """Role of a time to its channel, at every place."""
-
-SENSORS = ("proximal_torque_n_m", "distal_torque_n_m")
-"""Torque sensors of the reference rig: a motor without them is one of another machine."""
 
 STATED = 1e-9
 """Share of its size by which a number that is stated varies within a run: by rounding."""
@@ -96,14 +93,13 @@ def places_of(layout: Layout) -> list[Place]:
         found.append(_own(layout, equation, own, angles))
         found += _actuators(equation, own)
     found = _one_of_each(found)
-    signals = signals_of(layout)
-    known = {*_computed(layout), *signals.loads}
+    known = {*_computed(layout), *signals_of(layout).loads}
     sensors = [n for n in layout.measured if n not in known]
     for sensor in sensors:
         if (both := _both(layout, sensor)) is not None:
             found += [*_behind(layout, sensor, *both, angles), *_levers(sensor, *both, angles)]
     found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
-    warmth = tuple(n for n in signals.temperatures if n in layout.measured)
+    warmth = tuple(n for n in signals_of(layout).temperatures if n in layout.measured)
     supplies = tuple(n for n in layout.conditions if n.endswith(SUPPLIES))
     conditions = {"loss": layout.conditions, "actuator": supplies}
     for k, place in enumerate(found):
@@ -265,9 +261,8 @@ def _both(layout: Layout, sensor: str) -> tuple[Equation, Equation] | None:
     torque = [e for e in reading if not e.of_angle]
     if len(torque) != 1 or len(reading) < 2:
         return None
-    if torque[0].target == sensor and sensor in SENSORS:
-        return None  # on the shaft of the gear: nothing is between the two
-    return torque[0], next(e for e in reading if e.of_angle)
+    at_gear = sensor in SENSORS and sensor == torque[0].target  # nothing is between the two
+    return None if at_gear else (torque[0], next(e for e in reading if e.of_angle))
 
 
 def _behind(
@@ -275,11 +270,11 @@ def _behind(
 ) -> Iterator[Place]:
     """Yield the places of a torque between a compliance and a torque sensor behind it.
 
-    The first one has the effects that no equation declares. The equation of the torque has friction
-    and inertia already, wherever they are: of those behind the compliance the bend has the size.
+    The equation of the torque has friction and inertia already, wherever they are; the bend has the
+    size of those behind it, at the second place.
     """
-    shares = {e.name: _share(e, sensor) for e in layout.equations.values()}
-    enters = tuple(Entry(name, -share) for name, share in shares.items() if share)
+    shares = ((e.name, _share(e, sensor)) for e in layout.equations.values())
+    enters = tuple(Entry(name, -share) for name, share in shares if share)
     angle = _own_angle(bent, angles)
     roles = _motion(angle) | _shared(angles, angle) | {"load": (sensor,)}
     loss = Place(f"torque at {sensor}", "loss", torque.name, enters, roles)

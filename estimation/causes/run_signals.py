@@ -40,6 +40,8 @@ LEAST = 20
 
 ANGLES = tuple(MOTION)
 EFFORTS = ("_n_m", "_n")
+SENSORS = ("proximal_torque_n_m", "distal_torque_n_m")
+"""Torque sensors of the reference rig: a motor without them is one of another machine."""
 
 
 class LayoutError(EstimationError):
