@@ -62,15 +62,13 @@ class Probability:
     """A family's share of the posterior in one slot of the leading hypothesis.
 
     The gain is that of its best candidate, before the price of what was chosen: over the training
-    runs, or over all runs once the test runs are opened. `elsewhere` has the places
-    other than that of its best candidate where it is as likely.
+    runs, or over all runs once the test runs are opened.
     """
 
     family: str
     share: float
     best: Scored
     gain: float
-    elsewhere: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -90,31 +88,30 @@ class Kept:
 
 def family_probabilities(ranked: Sequence[Scored], numbers: Numbers) -> list[Probability]:
     """Return the posterior over families of one slot, each by its best candidate, best first."""
-    best: dict[str, dict[str, Scored]] = {}
+    best: dict[str, Scored] = {}
     for scored in ranked:
-        cause = scored.candidate.cause
-        best.setdefault(cause.family, {}).setdefault(cause.place.name, scored)
-    leading = [next(iter(of_family.values())) for of_family in best.values()]
-    shares = posterior(leading, numbers)
+        best.setdefault(scored.candidate.cause.family, scored)
+    shares = posterior(list(best.values()), numbers)
     found = [
-        Probability(f, float(share), one, one.gain, _elsewhere(best[f], numbers))
-        for f, one, share in zip(best, leading, shares, strict=True)
+        Probability(f, float(p), best[f], best[f].gain) for f, p in zip(best, shares, strict=True)
     ]
     return sorted((p for p in found if p.share > 0.0), key=lambda p: -p.share)
 
 
-def _elsewhere(by_place: Mapping[str, Scored], numbers: Numbers) -> tuple[str, ...]:
-    """Return the places of a family besides the first one that are in the set of its places."""
-    shares = posterior(list(by_place.values()), numbers)
-    of_place = {place: float(share) for place, share in zip(by_place, shares, strict=True) if share}
-    if not of_place:
+def _other_places(family: str, ranked: Sequence[Scored], numbers: Numbers) -> tuple[str, ...]:
+    """Return the places besides the best one where a family is as likely, best first."""
+    best: dict[str, Scored] = {}
+    for scored in ranked:
+        if scored.candidate.cause.family == family:
+            best.setdefault(scored.candidate.cause.place.name, scored)
+    shares = posterior(list(best.values()), numbers)
+    whole = float(shares.sum())
+    if not whole:
         return ()
-    whole = sum(of_place.values())
-    first = next(iter(of_place))
-    return tuple(others_in_set(first, {place: s / whole for place, s in of_place.items()}))
+    return tuple(others_in_set(next(iter(best)), dict(zip(best, shares / whole, strict=True))))
 
 
-def named(one: Kept, may_name: bool) -> Finding:
+def named(one: Kept, may_name: bool, numbers: Numbers) -> Finding:
     """Return the claim of a cause, without its errors."""
     place, lead = one.scored.candidate.cause.place, one.likely[0]
     finding = Finding(
@@ -139,7 +136,7 @@ def named(one: Kept, may_name: bool) -> Finding:
             for where in [p.best.candidate.cause.place.name]
             if p.family in others and where != place.name
         },
-        other_places=lead.elsewhere,
+        other_places=_other_places(lead.family, one.ranked, numbers),
         probabilities={p.family: round(p.share, 4) for p in one.likely[: 1 + len(others)]},
         no_effect=round(max(0.0, 1.0 - sum(p.share for p in one.likely)), 4),
     )

@@ -105,11 +105,11 @@ class HeldOut:
         """
         acting = [acts_in[run.name] for run in self.layout.runs]
         cause = candidate.cause
-        if not isinstance(cause, Source) or _since(candidate) is None or acting != sorted(acting):
+        if not isinstance(cause, Source) or _since(candidate) is None:
             return candidate
-        first = next((r for r, acts in zip(self.layout.runs, acting, strict=True) if acts), None)
-        if first is None:
+        if not any(acting) or acting != sorted(acting):  # it did not begin once, and stay
             return candidate
+        first = self.layout.runs[acting.index(True)]
         begins_s = float(first.channels[CAMPAIGN_TIME][0])
         shape = [
             begins_s if p.name == "since" else x

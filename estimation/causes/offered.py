@@ -26,9 +26,9 @@ DECLARED_ONLY = (
 )
 DECLARED_FRICTION = ("friction.coulomb", "friction.viscous")
 BEHIND_THE_BEND = (*DECLARED_FRICTION, "inertia.missing")
-"""Losses that an equation of a torque has, and that bend a transmission, too.
+"""Losses that an equation of a torque declares, wherever they are.
 
-Where its torque sensor is behind them, the bend alone shows them.
+Of those between a transmission and a torque sensor behind it, the bend has the size.
 """
 SYNONYMS = ("friction.capstan",)
 """Effects that another one stands for.
@@ -253,10 +253,11 @@ def _acts(layout: Layout, effect: Effect, place: Place) -> bool:
         return False  # a wrapped cable or a linkage, not a shaft in its bearings
     if place.kind == "actuator" and effect.id == "sensor.gain_nonlinear.by_side":
         return False  # the gain of a drive by its side
-    if effect.id == "ripple.sensor" and len(place.equations) < 2:
-        return False  # in one equation a torque at the shaft has the same form
-    if effect.family in ("ripple.motor", "ripple.output") and place.kind == "loss" and not is_known:
-        return len(place.equations) < 2  # in several, the wave of their sensor has
+    of_sensor = effect.id == "ripple.sensor"
+    of_torque = effect.family in ("ripple.motor", "ripple.output") and place.kind == "loss"
+    is_wave = of_sensor or (of_torque and not is_known)
+    if is_wave and of_sensor != (len(place.equations) > 1):
+        return False  # the two have one form: in several equations it is the sensor's
     if (place.kind == "lever") != (effect.id == "eccentric.load.pulley"):
         return False
     if place.kind == "deflection" and effect.id.endswith(".lugre"):

@@ -93,13 +93,14 @@ def places_of(layout: Layout) -> list[Place]:
         found.append(_own(layout, equation, own, angles))
         found += _actuators(equation, own)
     found = _one_of_each(found)
-    known = {*_computed(layout), *signals_of(layout).loads}
+    signals = signals_of(layout)
+    known = {*_computed(layout), *signals.loads}
     sensors = [n for n in layout.measured if n not in known]
     for sensor in sensors:
         if (both := _both(layout, sensor)) is not None:
             found += [*_behind(layout, sensor, *both, angles), *_levers(sensor, *both, angles)]
     found += [p for n in sensors if (p := _sensor(layout, n, angles)) is not None]
-    warmth = tuple(n for n in signals_of(layout).temperatures if n in layout.measured)
+    warmth = tuple(n for n in signals.temperatures if n in layout.measured)
     supplies = tuple(n for n in layout.conditions if n.endswith(SUPPLIES))
     conditions = {"loss": layout.conditions, "actuator": supplies}
     for k, place in enumerate(found):
@@ -273,8 +274,7 @@ def _behind(
     The equation of the torque has friction and inertia already, wherever they are; the bend has the
     size of those behind it, at the second place.
     """
-    shares = ((e.name, _share(e, sensor)) for e in layout.equations.values())
-    enters = tuple(Entry(name, -share) for name, share in shares if share)
+    enters = tuple(Entry(e.name, -x) for e in layout.equations.values() if (x := _share(e, sensor)))
     angle = _own_angle(bent, angles)
     roles = _motion(angle) | _shared(angles, angle) | {"load": (sensor,)}
     loss = Place(f"torque at {sensor}", "loss", torque.name, enters, roles)

@@ -246,7 +246,7 @@ def _opened(one: Kept, kept: Sequence[Kept], held_out: HeldOut, refits: Refits) 
     has_means = not refits.layout.equations[stated].model.run_offsets
     old, new, has_means = that_falls(before[stated], after[stated], has_means, least)
     finding = replace(
-        named(one, sealed.may_name),
+        named(one, sealed.may_name, refits.numbers),
         error_of=stated,
         with_means=has_means,
         rmse_before=old.rmse,

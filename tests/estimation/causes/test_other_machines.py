@@ -171,13 +171,16 @@ def test_play_of_a_carriage_follows_the_pull_of_its_own_mass():
 LEAD_M = 0.005
 
 
-def _screwed(wave: Callable[[FloatArray], FloatArray]) -> list[Recording]:
-    """Return runs of a press; `wave` gives a force over the turns of its screw."""
+def _screwed(wave=lambda turns: 0.0, rubs=lambda k: 1.0) -> list[Recording]:
+    """Return runs of a press.
+
+    `wave` gives a force over the turns of its screw; the friction of run k has a factor.
+    """
 
     def columns(k, random, position, speed, acceleration):
         travel_m, speed_m_s = 0.01 * position, 0.01 * speed
         load = 100.0 * np.sin(0.6 * position + k)
-        pull = load + 30.0 * np.tanh(speed_m_s / 0.001) + 1.8 * acceleration
+        pull = load + 30.0 * rubs(k) * np.tanh(speed_m_s / 0.001) + 1.8 * acceleration
         pull += wave(travel_m / LEAD_M)
         made = {
             "motor_current_a": (pull / 400.0, 2e-3),
@@ -556,17 +559,13 @@ def _exact(torque: FloatArray, motor: FloatArray) -> FloatArray:
     return torque
 
 
-def _none(speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-    return np.zeros_like(speed)
-
-
 def _elastic(
     reads=_exact,
     *,
     bends=lambda k, position: 1.0,
     rubs=lambda k: 1.0,
     led=lambda position: position,
-    hidden=_none,
+    hidden=lambda speed, acceleration: 0.0,
 ):
     """Return the columns of a joint behind a spring.
 
@@ -920,17 +919,7 @@ def test_a_drift_is_at_either_of_two_sensors_that_one_equation_compares():
 
 
 def test_a_change_between_two_training_runs_has_its_time_from_the_test_runs():
-    def columns(k, random, position, speed, acceleration):
-        rub = (30.0 + 25.0 * (k >= 5)) * np.tanh(speed / 0.05)
-        load = 100.0 * np.sin(0.6 * position + k)
-        made = {
-            "motor_current_a": ((load + rub + 1.8 * acceleration) / 400.0, 2e-3),
-            "ram_position_m": (0.01 * position, 1e-6),
-            "load_force_n": (load, 1.5),
-        }
-        return noisy(random, made)
-
-    recordings, between = recorded(columns), ("03", "04", "05")
+    recordings, between = _screwed(rubs=lambda k: 1.8 if k >= 5 else 1.0), ("03", "04", "05")
     others = tuple(r.name for r in recordings if r.name not in between)
     sealed = replace(split(recordings), discover=others, confirm=between)
     (finding,) = diagnose(recordings, declared(plant_file.parse(PRESS)), sealed).findings
